@@ -1,0 +1,179 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm: a chain of modified Denavit-Hartenberg rows that ends in a pointing ray."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import ModelError
+from rrth_planner.rotation import pose_matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ArmModel:
+    """
+    A serial arm in Craig's convention, `T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d)`.
+
+    Parameters
+    ----------
+    joint_names : tuple of str
+        One name a joint, from the mount outwards.
+    is_prismatic : array_like of bool, shape (dof,)
+        A prismatic joint adds its position to `d`, a revolute one to `offset`.
+    dh : array_like, shape (dof + 1, 4)
+        Rows `alpha` [rad], `a` [m], `offset` [rad], `d` [m]; the last row is the tool, whose
+        `d` is the length of the pointing ray and must be 0 here.
+    bounds : array_like, shape (2, dof)
+        Lowest and highest joint positions [rad or m].
+    radii : array_like, shape (dof + 1,)
+        Thickness of the bars of each row, ray included [m].
+    T_base_mount : array_like, shape (4, 4)
+        Pose of the arm's frame 0 in the wearer's base frame [m].
+
+    Raises
+    ------
+    ModelError
+        Rows, names and limits that do not describe one arm.
+
+    """
+
+    joint_names: tuple[str, ...]
+    is_prismatic: tuple[bool, ...]
+    dh: Array
+    bounds: Array
+    radii: Array
+    T_base_mount: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        names = tuple(self.joint_names)
+        dof = len(names)
+        if dof < 1 or len(set(names)) != dof:
+            raise ModelError(f'joint_names: {list(names)}, expected at least one, all different')
+        prismatic = tuple(bool(flag) for flag in self.is_prismatic)
+        if len(prismatic) != dof:
+            raise ModelError(f'is_prismatic: {len(prismatic)} values, expected {dof}')
+        object.__setattr__(self, 'joint_names', names)
+        object.__setattr__(self, 'is_prismatic', prismatic)
+        for field, shape, unit in (
+            ('dh', (dof + 1, 4), 'rad and m'),
+            ('bounds', (2, dof), 'rad or m'),
+            ('radii', (dof + 1,), 'm'),
+            ('T_base_mount', (4, 4), 'm'),
+        ):
+            value = frozen_array(getattr(self, field), shape, field, unit, ModelError)
+            object.__setattr__(self, field, value)
+        if not (self.bounds[0] < self.bounds[1]).all():
+            raise ModelError(f'bounds: {self.bounds.tolist()}, expected lower < upper [rad or m]')
+        if (self.radii < 0.0).any():
+            raise ModelError(f'radii: {self.radii.tolist()}, expected lengths >= 0 [m]')
+        if self.dh[-1, 3] != 0.0:
+            raise ModelError(f'dh: d = {self.dh[-1, 3]} in the row of the tool, expected 0 [m]')
+        r = self.T_base_mount[:3, :3]
+        if np.abs(r @ r.T - np.eye(3)).max() > 1e-6 or np.linalg.det(r) < 0.0:
+            raise ModelError(f'mount: rotation {r.tolist()}, expected a rotation matrix [-]')
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return len(self.joint_names)
+
+
+def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
+    """
+    Return the arm that a mapping describes, laid out as in `config/arm.yaml`.
+
+    Raises
+    ------
+    ModelError
+        Something is missing, has another name or describes no arm.
+
+    """
+    try:
+        joints = list(data['joints'])
+        rows = [*joints, {**data['tool'], 'd': 0.0}]
+        kinds = [str(joint['type']) for joint in joints]
+        for joint, kind in zip(joints, kinds, strict=True):
+            if kind not in ('revolute', 'prismatic'):
+                raise ModelError(
+                    f'joint "{joint["name"]}": type {kind!r}, expected revolute or prismatic'
+                )
+        mount = data['mount']
+        position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
+        quaternion = frozen_array(
+            mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError
+        )
+        if np.linalg.norm(quaternion) < 1e-6:
+            raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
+        return ArmModel(
+            joint_names=tuple(str(joint['name']) for joint in joints),
+            is_prismatic=tuple(kind == 'prismatic' for kind in kinds),
+            dh=np.array([[row[k] for k in ('alpha', 'a', 'offset', 'd')] for row in rows], float),
+            bounds=np.array([[joint[k] for joint in joints] for k in ('lower', 'upper')], float),
+            radii=np.array([row.get('radius', 0.0) for row in rows], float),
+            T_base_mount=pose_matrix(position, quaternion),
+        )
+    except KeyError as missing:
+        raise ModelError(f'arm description: no {missing}, expected as in config/arm.yaml') from None
+    except (TypeError, ValueError, AttributeError) as problem:
+        raise ModelError(
+            f'arm description: {problem}; expected numbers laid out as in config/arm.yaml'
+        ) from problem
+
+
+def forward_kinematics(arm: ArmModel, q: Array) -> Array:
+    """
+    Return the poses of the link frames and of the tool in the base frame.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    q : ndarray, shape (..., dof)
+        Configurations [rad or m].
+
+    Returns
+    -------
+    ndarray, shape (..., dof + 1, 4, 4)
+        The last one is the tool's: the pointing ray leaves its origin along its +z [m].
+
+    """
+    q = np.asarray(q, dtype=np.float64)
+    T = np.broadcast_to(arm.T_base_mount, (*q.shape[:-1], 4, 4))
+    poses = np.empty((*q.shape[:-1], arm.dof + 1, 4, 4))
+    still = np.zeros(q.shape[:-1])
+    for i, (alpha, a, offset, d) in enumerate(arm.dh):
+        slides = i < arm.dof and arm.is_prismatic[i]
+        value = q[..., i] if i < arm.dof else still
+        theta, d = (still + offset, d + value) if slides else (offset + value, d + still)
+        T = T @ _link_pose(alpha, a, theta, d)
+        poses[..., i, :, :] = T
+    return poses
+
+
+def _link_pose(alpha: float, a: float, theta: Array, d: Array) -> Array:
+    """Return the pose of link frame i in frame i - 1 (Craig 2005, eq. 3.6), (..., 4, 4) [m]."""
+    ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
+    pose = np.zeros((*np.shape(theta), 4, 4))
+    pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 3] = ct, -st, a
+    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2], pose[..., 1, 3] = st * ca, ct * ca, -sa, -d * sa
+    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2], pose[..., 2, 3] = st * sa, ct * sa, ca, d * ca
+    pose[..., 3, 3] = 1.0
+    return pose
+
+
+def tool_pose(arm: ArmModel, q: Array) -> Array:
+    """Return the tool's pose in the base frame, its +z the pointing ray, shape (4, 4) [m]."""
+    pose: Array = forward_kinematics(arm, q)[-1]
+    return pose
+
+
+def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:
+    """Return how far the pointing ray passes by a target of the base frame [m]."""
+    T = tool_pose(arm, q)
+    v = target - T[:3, 3]
+    reach = max(0.0, float(v @ T[:3, 2]))
+    return float(np.linalg.norm(v - reach * T[:3, 2]))

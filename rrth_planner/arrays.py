@@ -1,0 +1,44 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Arrays that a frozen value may hold."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rrth_planner.errors import RrthError
+
+Array = NDArray[np.float64]
+
+
+def frozen_array(
+    value: ArrayLike, shape: tuple[int | None, ...], name: str, unit: str, error: type[RrthError]
+) -> Array:
+    """
+    Return a read-only float64 copy in C order, of the given shape and finite.
+
+    Parameters
+    ----------
+    value : array_like
+        What was given.
+    shape : tuple
+        Expected shape; `None` stands for any length.
+    name, unit : str
+        How the array is called in the sentence of the error.
+    error : type
+        Raised when the shape differs or an element is not a finite number.
+
+    """
+    wanted = '(' + ', '.join('n' if n is None else str(n) for n in shape) + ')'
+    try:
+        array = np.array(value, dtype=np.float64, order='C')
+    except (TypeError, ValueError) as problem:
+        raise error(f'{name}: {value!r}, expected numbers of shape {wanted} [{unit}]') from problem
+    fits = array.ndim == len(shape) and all(
+        n is None or n == given for n, given in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise error(f'{name}: shape {array.shape}, expected {wanted} [{unit}]')
+    if not np.isfinite(array).all():
+        raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,121 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Rounded corners: where a path may leave its waypoint to pass it without stopping."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrth_planner.arrays import Array
+from rrth_planner.kernels import arm_validity
+from rrth_planner.path import Path
+from rrth_planner.trajectory import MotionLimits
+from rrth_planner.world import World
+
+# A blend takes at most this share of an edge, so that two neighbours leave a straight between.
+SHARE = 0.45
+# Each try is this much smaller than the last, down to the smallest that still saves time [rad].
+SHRINK, SMALLEST = 0.6, 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Blend:
+    """
+    A quartic from `half_length` before a corner to as much after it, in tau from 0 to 1.
+
+    q(tau) = corner - d u1 + 2 d (u1 tau + (u2 - u1) (tau^3 - tau^4 / 2)): its derivative turns
+    from u1 to u2 by a smooth step, and its curvature vanishes at both ends, so it meets the
+    straight edges with two continuous derivatives.
+
+    Parameters
+    ----------
+    corner, u_in, u_out : ndarray, shape (dof,)
+        The waypoint [rad], and the unit directions of the edges before and after it.
+    half_length : float
+        d [rad]; 0 where the corner cannot be rounded.
+
+    """
+
+    corner: Array
+    u_in: Array
+    u_out: Array
+    half_length: float
+
+    def coefficients(self) -> Array:
+        """Return the polynomial in tau, lowest power first, shape (5, dof) [rad]."""
+        d, turn = self.half_length, self.u_out - self.u_in
+        zero = np.zeros_like(turn)
+        return np.stack(
+            [self.corner - d * self.u_in, 2 * d * self.u_in, zero, 2 * d * turn, -d * turn]
+        )
+
+    def derivative_bounds(self) -> tuple[Array, Array]:
+        """Return bounds of |dq/dtau| and |d2q/dtau2| of each joint, shapes (dof,) [rad]."""
+        d = self.half_length
+        speed = 2 * d * np.maximum(np.abs(self.u_in), np.abs(self.u_out))
+        return speed, 3 * d * np.abs(self.u_out - self.u_in)
+
+    def top_speed(self, limits: MotionLimits) -> float:
+        """Return the greatest constant speed that holds all limits within the blend [rad/s]."""
+        if self.half_length == 0.0:
+            return 0.0
+        turn = np.abs(self.u_out - self.u_in) + 1e-300
+        width = 2 * self.half_length
+        along = np.maximum(np.abs(self.u_in), np.abs(self.u_out)) + 1e-300
+        # q'' peaks at 3/2 and q''' at 6 times the turn, over width and width^2.
+        return float(
+            min(
+                (limits.velocity / along).min(),
+                np.sqrt((limits.acceleration * width / (1.5 * turn)).min()),
+                np.cbrt((limits.jerk * width**2 / (6.0 * turn)).min()),
+            )
+        )
+
+
+def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend, ...]:
+    """
+    Return a blend for each inner waypoint, as large as its proof allows.
+
+    Parameters
+    ----------
+    path : Path
+    world : World
+        Where the rounded curve itself is proven free.
+    limits : MotionLimits
+        A blend is no larger than full speed through it needs.
+
+    """
+    q = path.waypoints
+    lengths = np.linalg.norm(np.diff(q, axis=0), axis=1)
+    directions = np.diff(q, axis=0) / lengths[:, None]
+    blends = []
+    for i in range(1, len(q) - 1):
+        room = SHARE * min(lengths[i - 1], lengths[i])
+        whole = Blend(
+            corner=q[i], u_in=directions[i - 1], u_out=directions[i], half_length=float(room)
+        )
+        blends.append(_largest_free(whole, world, limits))
+    return tuple(blends)
+
+
+def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
+    """Return the largest blend of a corner, no larger than the given one, that is proven free."""
+    cap = min((limits.velocity / np.maximum(np.abs(whole.u_in), np.abs(whole.u_out)).clip(1e-9)))
+    turn = np.abs(whole.u_out - whole.u_in)
+    enough = max(
+        float((0.75 * turn * cap**2 / limits.acceleration).max()),
+        float(np.sqrt(1.5 * turn * cap**3 / limits.jerk).max()),
+    )
+    half_length = min(whole.half_length, enough)
+    while half_length > SMALLEST:
+        blend = Blend(
+            corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=half_length
+        )
+        speed, bend = blend.derivative_bounds()
+        proof = arm_validity.prove_curve(
+            blend.coefficients(), speed, bend, world.resolution, world.robot, world.obstacles
+        )
+        if proof == 1:
+            return blend
+        half_length *= SHRINK
+    return Blend(corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=0.0)

@@ -1,0 +1,38 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the arm is asked to do: point its tool at a point."""
+
+from dataclasses import dataclass
+
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import SceneError
+from rrth_planner.scene import FARTHEST
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointingGoal:
+    """
+    A point that the pointing ray shall meet.
+
+    Parameters
+    ----------
+    target : array_like, shape (3,)
+        The point in the base frame [m].
+
+    Raises
+    ------
+    SceneError
+        A coordinate that is no finite number, or too far.
+
+    """
+
+    target: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        target = frozen_array(self.target, (3,), 'target', 'm', SceneError)
+        if abs(target).max() > FARTHEST:
+            raise SceneError(
+                f'target: {target.tolist()}, expected coordinates up to {FARTHEST:g} [m]'
+            )
+        object.__setattr__(self, 'target', target)

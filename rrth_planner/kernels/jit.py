@@ -1,0 +1,128 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Argument types, column names and the one decorator of the compiled kernels."""
+
+from collections.abc import Callable
+import hashlib
+import os
+from pathlib import Path
+from typing import Any
+import warnings
+
+from numba import config, njit, types
+from numba.core.types import float64, int32, int64
+from numba.experimental.function_type import _get_wrapper_address
+
+# Read-only types accept writable arrays too, and the compiler refuses to write through them:
+# a signature tells inputs (VEC, MAT) from outputs (OUT_...).
+VEC = types.Array(float64, 1, 'C', readonly=True)
+MAT = types.Array(float64, 2, 'C', readonly=True)
+OUT_VEC = types.Array(float64, 1, 'C')
+OUT_MAT = types.Array(float64, 2, 'C')
+OUT_CUBE = types.Array(float64, 3, 'C')
+OUT_FLAGS = types.Array(types.int8, 1, 'C')
+OUT_INTS = types.Array(int64, 1, 'C')
+OUT_INT_MAT = types.Array(int64, 2, 'C')
+OUT_POOL = types.Array(int32, 1, 'C')
+
+# The seam between planning and geometry: (q_from, q_to, resolution, robot rows, obstacle rows)
+# -> is the straight edge between the two configurations free?
+EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, MAT, MAT))
+
+# Columns of `robot`, a row for each DH row of the arm; then dof columns with the reach of the end
+# of the row's `a` offset and dof with that of its `d` offset.
+COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D, REACH = range(9)
+REVOLUTE, PRISMATIC, FIXED = 0.0, 1.0, 2.0
+NO_BAR = -1.0
+
+# Rows of `boxes`, a column for each box: the rotation into the box's own axes (9), the position of
+# the arm's base in them (3), the half extents grown by margin and slack (3). A structure of
+# arrays, so that the compiler vectorises over the boxes.
+BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
+
+
+def _cache_folder() -> Path | None:
+    """Return the folder of the compiled code, or None where none can be written."""
+    # numba does not see that a kernel of another file has changed, so all sources name the folder.
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob('*.py')):
+        digest.update(source.read_bytes())
+    root = os.environ.get('RRTH_CACHE_DIR') or os.path.join(
+        os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache'),
+        'rrth_planner',
+    )
+    folder = Path(root) / f'kernels-{digest.hexdigest()[:16]}'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise PermissionError('not writable')
+    except OSError as problem:
+        warnings.warn(
+            f'compiled kernels are not kept: {folder}: {problem}; expected a writable folder '
+            '(environment variable RRTH_CACHE_DIR)',
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return None
+    return folder
+
+
+CACHE_FOLDER = _cache_folder()
+
+
+def is_compiled() -> bool:
+    """Return whether the cache holds compiled kernels of these sources."""
+    return CACHE_FOLDER is not None and any(CACHE_FOLDER.rglob('*.nbc'))
+
+
+def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a kernel for one signature, and keeps the result."""
+
+    def decorate(function: Callable[..., Any]) -> Any:
+        given = config.CACHE_DIR
+        if CACHE_FOLDER is not None:
+            config.CACHE_DIR = str(CACHE_FOLDER)
+        try:
+            # No `nnan`: a NaN must fail every comparison, and so never be certified.
+            return njit(
+                signature,
+                cache=CACHE_FOLDER is not None,
+                nogil=True,
+                error_model='numpy',
+                fastmath={'contract', 'arcp', 'nsz'},
+            )(function)
+        finally:
+            config.CACHE_DIR = given
+
+    return decorate
+
+
+class FirstClass(types.WrapperAddressProtocol):
+    """
+    A kernel to be handed to other kernels, its address looked up once.
+
+    numba looks it up anew at each call that passes the bare kernel, which costs more (70 us) than
+    most plans spend in the call.
+    """
+
+    def __init__(self, compiled: Any) -> None:
+        self.compiled = compiled
+        (self._signature,) = compiled.nopython_signatures
+        self._address = _get_wrapper_address(compiled, self._signature)
+
+    def __wrapper_address__(self) -> int:
+        """Return the address of the compiled code, as numba's protocol asks."""
+        return int(self._address)
+
+    def signature(self) -> Any:
+        """Return the signature, as numba's protocol asks."""
+        return self._signature
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the kernel from Python."""
+        return self.compiled(*arguments)
+
+
+def first_class(compiled: Any) -> Any:
+    """Return a kernel in the form in which it is handed to other kernels."""
+    return compiled if config.DISABLE_JIT else FirstClass(compiled)

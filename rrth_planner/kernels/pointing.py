@@ -1,0 +1,181 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The goal manifold: every configuration whose pointing ray meets the target, in closed form."""
+
+import math
+
+from numba.core.types import boolean, float64, int64, void
+import numpy as np
+
+from rrth_planner.kernels.arm_validity import is_configuration_free
+from rrth_planner.kernels.jit import (
+    A,
+    COS_ALPHA,
+    D,
+    EDGE_CHECK,
+    kernel,
+    KIND,
+    MAT,
+    OFFSET,
+    OUT_FLAGS,
+    OUT_MAT,
+    OUT_VEC,
+    PRISMATIC,
+    SIN_ALPHA,
+    VEC,
+)
+from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.kernels.tree import distance
+
+TURN = 2.0 * math.pi
+
+
+@kernel(void(MAT, int64, OUT_MAT))
+def tilt_frame(robot, i, frame):
+    """Apply Tx(a) Rx(alpha) of row i; frame (4, 3) = x, y, z axes and origin as rows."""
+    for k in range(3):
+        frame[3, k] += robot[i, A] * frame[0, k]
+        y, z = frame[1, k], frame[2, k]
+        frame[1, k] = robot[i, COS_ALPHA] * y + robot[i, SIN_ALPHA] * z
+        frame[2, k] = robot[i, COS_ALPHA] * z - robot[i, SIN_ALPHA] * y
+
+
+@kernel(float64(float64, float64, float64, float64))
+def unwrap(angle, near, lower, upper):
+    """Return angle + 2 pi n within [lower, upper] closest to `near`, or NaN where none fits."""
+    angle += TURN * math.floor((near - angle) / TURN + 0.5)
+    if angle > upper:
+        angle -= TURN * math.ceil((angle - upper) / TURN)
+    if angle < lower:
+        angle += TURN * math.ceil((lower - angle) / TURN)
+    return angle if lower <= angle <= upper else math.nan
+
+
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+def aim(robot, bounds, target, q_near, branch, q):
+    """
+    Complete q so that the ray meets the target; return the ray's reach [m], or -1.
+
+    All joints but the last two are given in q; the target is in the arm's base frame. The last
+    joint's axis is square to the one before, the ray square to it, both without `a` offset: a pan
+    and tilt unit with the ray beside the pan axis by e = d of the last row. Then, seen from the
+    elbow, v . z_last = e fixes the pan (two branches) and the ray's direction the tilt
+    (`docs/algorithms.md`, section 4). -1: too near to the pan axis, or beyond a joint's limit.
+    """
+    dof = q.shape[0]
+    frame = np.zeros((4, 3))
+    frame[0, 0] = frame[1, 1] = frame[2, 2] = 1.0
+    for i in range(dof - 2):
+        tilt_frame(robot, i, frame)
+        slides = robot[i, KIND] == PRISMATIC
+        s, c = sine_cosine(robot[i, OFFSET] + (0.0 if slides else q[i]))
+        d = robot[i, D] + (q[i] if slides else 0.0)
+        for k in range(3):
+            x, y = frame[0, k], frame[1, k]
+            frame[0, k], frame[1, k] = c * x + s * y, c * y - s * x
+            frame[3, k] += d * frame[2, k]
+    pan, tilt = dof - 2, dof - 1
+    tilt_frame(robot, pan, frame)
+    vx = vy = vz = 0.0
+    for k in range(3):
+        v = target[k] - frame[3, k] - robot[pan, D] * frame[2, k]
+        vx, vy, vz = vx + v * frame[0, k], vy + v * frame[1, k], vz + v * frame[2, k]
+    e = robot[tilt, D]
+    tilt_sign, ray_sign = robot[tilt, SIN_ALPHA], robot[tilt + 1, SIN_ALPHA]
+    across = math.hypot(vx, vy)
+    if across <= abs(e):
+        return -1.0
+    rise = math.asin(tilt_sign * e / across)
+    phi = math.atan2(vy, vx) + (rise if branch == 0 else math.pi - rise)
+    s, c = math.sin(phi), math.cos(phi)
+    wx = c * vx + s * vy
+    theta = math.atan2(ray_sign * wx, -ray_sign * tilt_sign * vz)
+    q[pan] = unwrap(phi - robot[pan, OFFSET], q_near[pan], bounds[0, pan], bounds[1, pan])
+    q[tilt] = unwrap(theta - robot[tilt, OFFSET], q_near[tilt], bounds[0, tilt], bounds[1, tilt])
+    if math.isnan(q[pan]) or math.isnan(q[tilt]):
+        return -1.0
+    return math.hypot(wx, vz)
+
+
+@kernel(int64(MAT, MAT, VEC, VEC, VEC, int64, OUT_MAT, OUT_VEC))
+def goal_candidates(robot, bounds, target, q_near, ratios, n_draws, candidates, reaches):
+    """
+    Write the aiming configurations over a low-discrepancy set of the free joints; return how many.
+
+    The first draw keeps the free joints of q_near, so an arm that aims already may stay.
+    ratios (dof - 2,): steps of the additive recurrence that spreads the draws (Roberts 2018).
+    candidates (2 n_draws, dof), reaches (2 n_draws,) [m].
+    """
+    n_free = ratios.shape[0]
+    n = 0
+    for i in range(n_draws):
+        for branch in range(2):
+            for k in range(n_free):
+                share = (0.5 + i * ratios[k]) % 1.0
+                spread = bounds[0, k] + share * (bounds[1, k] - bounds[0, k])
+                candidates[n, k] = q_near[k] if i == 0 else spread
+            reach = aim(robot, bounds, target, q_near, branch, candidates[n])
+            if reach >= 0.0:
+                reaches[n] = reach
+                n += 1
+    return n
+
+
+@kernel(boolean(MAT, MAT, VEC, float64))
+def is_goal_free(robot, obstacles, q, reach):
+    """Return whether q is free with its ray out to the target, and as far as it is guarded."""
+    ray_length = max(reach, robot[robot.shape[0] - 1, D])
+    return is_configuration_free(q, ray_length, robot, obstacles)
+
+
+@kernel(void(MAT, MAT, MAT, VEC, OUT_FLAGS))
+def find_free_goals(robot, obstacles, candidates, reaches, is_free):
+    """Write for each of the candidates (n, dof) whether it is free."""
+    for i in range(candidates.shape[0]):
+        is_free[i] = is_goal_free(robot, obstacles, candidates[i], reaches[i])
+
+
+@kernel(float64(EDGE_CHECK, float64, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))
+def slide_goal(is_edge_free, resolution, robot, obstacles, bounds, target, path, n, finest):
+    """
+    Move the last waypoint along the goal manifold so that the path gets shorter; return the gain.
+
+    Pattern search over the free joints: the neighbours of a grid whose step halves when none is
+    better, down to `finest` [rad]. The new last edge is proven before it is taken.
+    """
+    dof = path.shape[1]
+    n_free = dof - 2
+    q, before = np.empty(dof), path[n - 2]
+    start_cost = cost = distance(before, path[n - 1])
+    branch, closest = 0, math.inf
+    for b in range(2):
+        q[:n_free] = path[n - 1, :n_free]
+        if aim(robot, bounds, target, path[n - 1], b, q) >= 0.0:
+            offset = distance(q, path[n - 1])
+            if offset < closest:
+                branch, closest = b, offset
+    step = 0.4
+    while step > finest:
+        is_better = False
+        for neighbour in range(3**n_free):
+            code = neighbour
+            is_inside = True
+            for k in range(n_free):
+                q[k] = path[n - 1, k] + step * (code % 3 - 1)
+                is_inside &= (q[k] >= bounds[0, k]) & (q[k] <= bounds[1, k])
+                code //= 3
+            if not is_inside:
+                continue
+            reach = aim(robot, bounds, target, path[n - 1], branch, q)
+            if reach < 0.0 or distance(before, q) >= cost - 1e-9:
+                continue
+            if is_goal_free(robot, obstacles, q, reach) and is_edge_free(
+                before, q, resolution, robot, obstacles
+            ):
+                path[n - 1] = q
+                cost = distance(before, q)
+                is_better = True
+                break
+        if not is_better:
+            step *= 0.5
+    return start_cost - cost

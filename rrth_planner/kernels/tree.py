@@ -1,0 +1,80 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Trees in joint space: nearest node, one step towards a point, the way back to the root."""
+
+import math
+
+from numba.core.types import float64, int64, void
+
+from rrth_planner.kernels.jit import kernel, MAT, OUT_CUBE, OUT_INT_MAT, OUT_MAT, OUT_VEC, VEC
+
+
+@kernel(float64(VEC, VEC))
+def distance(p, q):
+    """Return the length of the straight edge between two configurations."""
+    total = 0.0
+    for k in range(p.shape[0]):
+        total += (p[k] - q[k]) ** 2
+    return math.sqrt(total)
+
+
+@kernel(float64(MAT, int64))
+def path_length(path, n):
+    """Return the length of the first n waypoints of a path."""
+    total = 0.0
+    for i in range(n - 1):
+        total += distance(path[i], path[i + 1])
+    return total
+
+
+@kernel(int64(MAT, int64, VEC))
+def nearest(nodes, size, q):
+    """Return the index of the node nearest to q; brute force wins up to some 700 nodes."""
+    best, index = math.inf, 0
+    for i in range(size):
+        total = 0.0
+        for k in range(q.shape[0]):
+            total += (nodes[i, k] - q[k]) ** 2
+        if total < best:
+            best, index = total, i
+    return index
+
+
+@kernel(void(VEC, VEC, float64, OUT_VEC))
+def steer(q_near, q_towards, step_size, q_new):
+    """Write the point at most `step_size` from q_near on the way to q_towards."""
+    length = distance(q_near, q_towards)
+    share = 1.0 if length <= step_size else step_size / length
+    for k in range(q_new.shape[0]):
+        q_new[k] = q_towards[k] if share == 1.0 else q_near[k] + share * (q_towards[k] - q_near[k])
+
+
+@kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))
+def trace_path(tree_q, parents, from_start, from_goal, path):
+    """
+    Write the path root - from_start - from_goal - root of two trees; return its waypoints.
+
+    tree_q (2, capacity, dof), parents (2, capacity): a root is its own parent's -1. The two nodes
+    where the trees meet may be the same point; it is then written once. 0: the path has no room.
+    """
+    n = 0
+    i = from_start
+    while i >= 0:
+        n += 1
+        i = parents[0, i]
+    if n >= path.shape[0]:
+        return 0
+    i = from_start
+    for row in range(n - 1, -1, -1):
+        path[row] = tree_q[0, i]
+        i = parents[0, i]
+    i = from_goal
+    if distance(path[n - 1], tree_q[1, i]) == 0.0:
+        i = parents[1, i]
+    while i >= 0:
+        if n >= path.shape[0]:
+            return 0
+        path[n] = tree_q[1, i]
+        n += 1
+        i = parents[1, i]
+    return n

@@ -1,0 +1,206 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Slow and obvious answers in plain numpy, to judge what the kernels and planners say.
+
+Nothing here is shared with them: kinematics are products of matrices, contact is clipping the bar
+against the slabs of the box, and a motion is looked at instant by instant.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A bar of the arm that touches a box at an instant of a motion."""
+
+    index: int
+    bar: int
+    box: str
+
+
+def frames(arm: ArmModel, q: Array) -> Array:
+    """Return the poses of all link frames and of the tool, q (n, dof) -> (n, dof + 1, 4, 4)."""
+    n = len(q)
+    T = np.tile(arm.T_base_mount, (n, 1, 1))
+    result = np.empty((n, arm.dof + 1, 4, 4))
+    for i, (alpha, a, offset, d) in enumerate(arm.dh):
+        value = q[:, i] if i < arm.dof else np.zeros(n)
+        slides = i < arm.dof and arm.is_prismatic[i]
+        theta = np.full(n, offset) if slides else offset + value
+        rx = np.eye(4)
+        rx[1:3, 1:3] = [[np.cos(alpha), -np.sin(alpha)], [np.sin(alpha), np.cos(alpha)]]
+        rx[0, 3] = a
+        rz = np.tile(np.eye(4), (n, 1, 1))
+        rz[:, 0, 0] = rz[:, 1, 1] = np.cos(theta)
+        rz[:, 1, 0] = np.sin(theta)
+        rz[:, 0, 1] = -np.sin(theta)
+        rz[:, 2, 3] = d + (value if slides else 0.0)
+        T = T @ rx @ rz
+        result[:, i] = T
+    return result
+
+
+def bars(arm: ArmModel, q: Array, ray_length: float) -> Array:
+    """
+    Return all bars of the moving arm in the base frame, (n, n_bars, 2, 3) [m].
+
+    Each DH row gives two, `a` along the x axis before it and `d` along its own z axis; the last
+    is the pointing ray. Bars of the mount (before the first joint) are left out.
+    """
+    T = frames(arm, q)
+    result = []
+    for i in range(arm.dof + 1):
+        origin, z = T[:, i, :3, 3], T[:, i, :3, 2]
+        if i == arm.dof:
+            corner, end = origin, origin + ray_length * z
+        else:
+            d = arm.dh[i, 3] + (q[:, i, None] if arm.is_prismatic[i] else 0.0)
+            corner, end = origin - d * z, origin
+        if i > 0:
+            result.append(np.stack([T[:, i - 1, :3, 3], corner], axis=1))
+        if i > 0 or arm.is_prismatic[0]:
+            result.append(np.stack([corner, end], axis=1))
+    return np.stack(result, axis=1)
+
+
+def bar_box_touch(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
+    """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
+    local = (ends - center) @ rotation
+    a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        t0, t1 = (-half - a) / step, (half - a) / step
+    is_parallel = step == 0.0
+    is_between = np.abs(a) <= half
+    enter = np.where(is_parallel, np.where(is_between, -np.inf, np.inf), np.minimum(t0, t1))
+    leave = np.where(is_parallel, np.where(is_between, np.inf, -np.inf), np.maximum(t0, t1))
+    first = np.maximum(enter.max(axis=-1), 0.0)
+    last = np.minimum(leave.min(axis=-1), 1.0)
+    result: Array = first <= last
+    return result
+
+
+def first_contact(
+    arm: ArmModel, scene: Scene, q: Array, ray_length: float, margin: float
+) -> Contact | None:
+    """
+    Return the first contact of the arm with the boxes grown by `margin` [m], or None.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+    q : ndarray, shape (n, dof)
+        The instants of a motion [rad].
+    ray_length : float
+        How much of the pointing ray counts as arm [m].
+    margin : float
+        Growth of each box on every side [m]; the bars' own radii come on top.
+
+    """
+    ends = bars(arm, q, ray_length)
+    radii = _bar_radii(arm)
+    found: Contact | None = None
+    for box in scene.boxes:
+        for k, radius in enumerate(radii):
+            half = 0.5 * box.size + margin + radius
+            hit = np.flatnonzero(bar_box_touch(ends[:, k], box.center, box.rotation, half))
+            if len(hit) and (found is None or hit[0] < found.index):
+                found = Contact(int(hit[0]), k, box.name)
+    return found
+
+
+def _bar_radii(arm: ArmModel) -> list[float]:
+    radii = []
+    for i in range(arm.dof + 1):
+        if i > 0:
+            radii.append(float(arm.radii[i]))
+        if i > 0 or arm.is_prismatic[0]:
+            radii.append(float(arm.radii[i]))
+    return radii
+
+
+def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> float:
+    """
+    Return the least distance of the arm from the boxes over the instants q, (n, dof) [m].
+
+    Each bar is cut at its closest point by golden section: its distance from a box is convex.
+    """
+    ends = bars(arm, q, ray_length)
+    radii = np.array(_bar_radii(arm))
+    least = np.inf
+    golden = 0.5 * (np.sqrt(5.0) - 1.0)
+    for box in scene.boxes:
+        local = (ends - box.center) @ box.rotation
+        a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
+        half = 0.5 * box.size
+
+        def distance(t: Array, a: Array = a, step: Array = step, half: Array = half) -> Array:
+            excess = np.maximum(np.abs(a + t[..., None] * step) - half, 0.0)
+            result: Array = np.linalg.norm(excess, axis=-1)
+            return result
+
+        low, high = np.zeros(a.shape[:-1]), np.ones(a.shape[:-1])
+        for _ in range(48):
+            left, right = high - golden * (high - low), low + golden * (high - low)
+            is_left = distance(left) <= distance(right)
+            low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+        least = min(least, float((distance(0.5 * (low + high)) - radii).min()))
+    return least
+
+
+# Position, first and second derivative of a quintic at 0 and at 1, from its coefficients.
+_HERMITE = np.array(
+    [
+        [1, 0, 0, 0, 0, 0],
+        [0, 1, 0, 0, 0, 0],
+        [0, 0, 2, 0, 0, 0],
+        [1, 1, 1, 1, 1, 1],
+        [0, 1, 2, 3, 4, 5],
+        [0, 0, 2, 6, 12, 20],
+    ]
+)
+
+
+def quintic_states(
+    times: Array, positions: Array, velocities: Array, accelerations: Array, period: float
+) -> tuple[Array, Array, Array, Array]:
+    """
+    Return what a quintic-interpolating controller commands, every `period` and at each point.
+
+    Each piece solves the six linear equations of its boundary values.
+
+    Returns
+    -------
+    tuple of ndarray
+        Times (m,) [s], positions, velocities, accelerations (m, dof) [rad, rad/s, rad/s^2].
+
+    """
+    grid = np.unique(np.concatenate([np.arange(0.0, times[-1], period), times]))
+    q, v, a = (np.empty((len(grid), positions.shape[1])) for _ in range(3))
+    for i in range(len(times) - 1):
+        # In units of the piece's own length the equations are well conditioned.
+        T = times[i + 1] - times[i]
+        values = np.stack(
+            [
+                positions[i],
+                T * velocities[i],
+                T * T * accelerations[i],
+                positions[i + 1],
+                T * velocities[i + 1],
+                T * T * accelerations[i + 1],
+            ]
+        )
+        c = np.linalg.solve(_HERMITE, values)
+        inside = (grid >= times[i]) & (grid <= times[i + 1])
+        s = ((grid[inside] - times[i]) / T)[:, None]
+        q[inside] = sum(c[k] * s**k for k in range(6))
+        v[inside] = sum(k * c[k] * s ** (k - 1) for k in range(1, 6)) / T
+        a[inside] = sum(k * (k - 1) * c[k] * s ** (k - 2) for k in range(2, 6)) / T**2
+    return grid, q, v, a

@@ -1,0 +1,38 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Geometry without time: the waypoints of a path in joint space."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import RrthError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """
+    Straight joint motions from waypoint to waypoint.
+
+    Parameters
+    ----------
+    waypoints : array_like, shape (n, dof)
+        At least one configuration [rad].
+
+    """
+
+    waypoints: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        dof = np.shape(self.waypoints)[-1]
+        value = frozen_array(self.waypoints, (None, dof), 'waypoints', 'rad', RrthError)
+        if len(value) == 0:
+            raise RrthError('waypoints: none, expected at least one [rad]')
+        object.__setattr__(self, 'waypoints', value)
+
+    @property
+    def length(self) -> float:
+        """Sum of the edge lengths in joint space [rad]."""
+        return float(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1).sum())

@@ -1,0 +1,269 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The straight line from a scene and a target to a certified trajectory."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+import time
+
+import numpy as np
+
+from rrth_planner.aiming import FEW, goal_configurations, GoalSet, MANY, pointing_problem
+from rrth_planner.arm import ArmModel, tool_pose
+from rrth_planner.arrays import Array
+from rrth_planner.blend import Blend, round_corners
+from rrth_planner.certificate import certify, least_clearance
+from rrth_planner.fcl_check import first_touch
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import RRTHOptions
+from rrth_planner.path import Path
+from rrth_planner.planner import plan, PlanResult
+from rrth_planner.refusal import goal_refusal, Refusal, start_refusal, target_refusal
+from rrth_planner.scene import Box, Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.timing import parameterize
+from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.world import arm_world, grown, World
+
+# Clearance that the path is planned with on top of the margin, for its rounded corners to spend;
+# in a tight place, next to none [m].
+SPARES = (5e-3, 1e-5)
+# Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
+# has other intervals, does not fail for a hair [m].
+HAIR = 2e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MotionPlan:
+    """
+    How a request ended.
+
+    Parameters
+    ----------
+    status : PlanStatus
+    sentence : str
+        What happened, with figures and units, for the caller.
+    seed : int
+        Seed that was used; the same seed and inputs give the same trajectory to the bit.
+    planning_time : float
+        From the call to the certified trajectory [s].
+    path : Path or None
+        The shortened path before timing; None unless solved.
+    trajectory : Trajectory or None
+        From rest to rest, certified; None unless solved.
+    clearance : float
+        Least distance of the arm and of the guarded ray from the wearer [m]; NaN unless solved.
+    reach : float
+        Distance from the tool to the target at the end [m]; NaN unless solved.
+
+    """
+
+    status: PlanStatus
+    sentence: str
+    seed: int
+    planning_time: float
+    path: Path | None = None
+    trajectory: Trajectory | None = None
+    clearance: float = float('nan')
+    reach: float = float('nan')
+
+
+def plan_motion(
+    arm: ArmModel,
+    scene: Scene,
+    q_start: Array,
+    goal: PointingGoal,
+    limits: MotionLimits,
+    options: RRTHOptions,
+    *,
+    margin: float,
+    ray_guard_length: float,
+    seed: int,
+    should_stop: Callable[[], bool] = lambda: False,
+) -> MotionPlan:
+    """
+    Return a certified motion that ends with the tool pointing at the goal.
+
+    Parameters
+    ----------
+    arm : ArmModel
+        Passes `aiming.check_pointing_arm`.
+    scene : Scene
+        The wearer in the base frame.
+    q_start : ndarray, shape (dof,)
+        Where the arm is, at rest [rad].
+    goal : PointingGoal
+    limits : MotionLimits
+    options : RRTHOptions
+    margin : float
+        Clearance kept from every box [m].
+    ray_guard_length : float
+        How much of the pointing ray is kept clear in motion [m]; at the end, all of it.
+    seed : int
+        >= 0.
+    should_stop : callable
+        Polled while planning; True cancels.
+
+    """
+    begin = time.perf_counter()
+    world = arm_world(arm, scene, margin, ray_guard_length)
+    refusal = start_refusal(arm, world, q_start, margin) or target_refusal(scene, goal, margin)
+    if refusal is None:
+        found = _find_path(arm, goal, world, q_start, options, seed, should_stop, begin)
+        if isinstance(found, PlanResult) and found.path is not None:
+            timed = _time_path(arm, scene, goal, world, found.path, limits, margin)
+            if isinstance(timed, Trajectory):
+                return _solved(arm, goal, world, found, timed, margin, seed, begin)
+            refusal = timed
+        else:
+            assert isinstance(found, Refusal)
+            refusal = found
+    return MotionPlan(
+        status=refusal.status,
+        sentence=f'{refusal.sentence}, seed {seed}',
+        seed=seed,
+        planning_time=time.perf_counter() - begin,
+    )
+
+
+def warm_up(arm: ArmModel) -> None:
+    """Plan once round a small box, so that every kernel is compiled and loaded."""
+    q_start = arm.bounds.mean(axis=0)
+    T = tool_pose(arm, q_start)
+    far = T[:3, 3] + 100.0 * T[:3, 0]
+    scene = Scene((Box('far', far, np.ones(3), np.eye(3)),))
+    ones = np.ones(arm.dof)
+    plan_motion(
+        arm,
+        scene,
+        q_start,
+        PointingGoal(T[:3, 3] + T[:3, 2] + 0.1 * T[:3, 1]),
+        MotionLimits(velocity=ones, acceleration=ones, jerk=ones),
+        RRTHOptions(),
+        margin=0.0,
+        ray_guard_length=1.0,
+        seed=0,
+    )
+
+
+def _find_path(
+    arm: ArmModel,
+    goal: PointingGoal,
+    world: World,
+    q_start: Array,
+    options: RRTHOptions,
+    seed: int,
+    should_stop: Callable[[], bool],
+    begin: float,
+) -> PlanResult | Refusal:
+    """Return the shortest path found, with as much spare clearance as there is room for."""
+    goals: GoalSet | None = None
+    result: PlanResult | None = None
+    for spare in SPARES:
+        roomy = grown(world, spare)
+        if not roomy.is_valid(q_start):
+            continue
+        goals = goal_configurations(arm, goal, roomy, q_start, FEW)
+        if len(goals.q_goals) == 0:
+            goals = goal_configurations(arm, goal, roomy, q_start, MANY)
+        if len(goals.q_goals) == 0:
+            continue
+        left = max(1e-3, options.time_limit - (time.perf_counter() - begin))
+        problem = pointing_problem(arm, goal, roomy, q_start, goals)
+        rng = np.random.default_rng(seed)
+        result = plan(problem, replace(options, time_limit=left), rng, should_stop)
+        if result.status in (PlanStatus.SOLVED, PlanStatus.CANCELLED):
+            break
+    if result is None:
+        # The start was valid without any spare, so the goals were asked for at least once, or
+        # only the hair of the smallest spare is missing at the start.
+        if goals is None:
+            goals = goal_configurations(arm, goal, world, q_start, MANY)
+        return goal_refusal(world, goals)
+    if result.status is PlanStatus.SOLVED:
+        return result
+    elapsed = time.perf_counter() - begin
+    sentence = {
+        PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
+        PlanStatus.CANCELLED: 'the plan was cancelled',
+        PlanStatus.SAMPLE_LIMIT: 'the free postures that aim at the target were not reached',
+    }[result.status]
+    return Refusal(
+        result.status, f'{sentence} ({result.n_samples} samples, {elapsed * 1e3:.0f} ms)'
+    )
+
+
+def _time_path(
+    arm: ArmModel,
+    scene: Scene,
+    goal: PointingGoal,
+    world: World,
+    path: Path,
+    limits: MotionLimits,
+    margin: float,
+) -> Trajectory | Refusal:
+    """Return the timed path once both judges agree that it is free, with stops if need be."""
+    rounded = round_corners(path, grown(world, HAIR), limits)
+    stops = tuple(replace(blend, half_length=0.0) for blend in rounded)
+    trajectory = _first_proven(path, (rounded, stops), limits, world)
+    if trajectory is None:
+        return Refusal(
+            PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
+        )
+    touch = first_touch(
+        arm, scene, trajectory, margin, world.ray_length, _reach(arm, goal, path.waypoints[-1])
+    )
+    if touch is not None:
+        return Refusal(
+            PlanStatus.NOT_CERTIFIED,
+            f'the two collision checks disagree: {touch.bar} is {touch.distance:.4f} m from box '
+            f'"{touch.box}" at {touch.time:.3f} s, expected at least {margin:g} m',
+        )
+    return trajectory
+
+
+def _first_proven(
+    path: Path, choices: tuple[tuple[Blend, ...], ...], limits: MotionLimits, world: World
+) -> Trajectory | None:
+    for blends in choices:
+        trajectory = parameterize(path, blends, limits)
+        if certify(trajectory, world).is_proven:
+            return trajectory
+    return None
+
+
+def _solved(
+    arm: ArmModel,
+    goal: PointingGoal,
+    world: World,
+    result: PlanResult,
+    trajectory: Trajectory,
+    margin: float,
+    seed: int,
+    begin: float,
+) -> MotionPlan:
+    path = result.path
+    assert path is not None
+    # The world's boxes are the body's grown by margin and slack.
+    clearance = least_clearance(trajectory, grown(world, -margin))
+    planning_time = time.perf_counter() - begin
+    note = '' if result.is_reproducible else '; the clock ended the improvement'
+    return MotionPlan(
+        status=PlanStatus.SOLVED,
+        sentence=(
+            f'{len(path.waypoints)} waypoints, duration {trajectory.duration:.3f} s, path length '
+            f'{path.length:.4f} rad, least clearance {clearance:.4f} m, planning time '
+            f'{planning_time * 1e3:.2f} ms, seed {seed}{note}'
+        ),
+        seed=seed,
+        planning_time=planning_time,
+        path=path,
+        trajectory=trajectory,
+        clearance=clearance,
+        reach=_reach(arm, goal, path.waypoints[-1]),
+    )
+
+
+def _reach(arm: ArmModel, goal: PointingGoal, q: Array) -> float:
+    """Return the distance from the tool to the target at q [m]."""
+    return float(np.linalg.norm(goal.target - tool_pose(arm, q)[:3, 3]))

@@ -1,0 +1,142 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""How far the points of an arm can be from the axes of its joints."""
+
+import functools
+import math
+
+import numpy as np
+
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+
+# A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
+Offsets = list[tuple[int, str]]
+
+
+def reach_bound(arm: ArmModel, ray_length: float, joint: int, row: int, end: str) -> float:
+    """
+    Return a bound of the distance of a point of the arm from the axis of a joint.
+
+    The point is the end of the `a` or of the `d` offset of a DH row. Neighbouring offsets keep
+    fixed angles whatever the joints do, so the norm of their sum is known exactly; the best split
+    of the chain into such groups bounds the whole by the triangle inequality
+    (`docs/algorithms.md`, section 2).
+
+    Parameters
+    ----------
+    arm : ArmModel
+    ray_length : float
+        Length of the pointing ray [m].
+    joint, row : int
+        Indices of the joint and of the DH row, counted from 0.
+    end : str
+        'a' or 'd'.
+
+    Returns
+    -------
+    float
+        Greatest distance from a revolute joint's axis [m]; for a prismatic joint 1 where it
+        moves the point [-]; 0 where the joint does not move it.
+
+    """
+    if row < joint or (row == joint and end == 'a'):
+        return 0.0
+    if arm.is_prismatic[joint]:
+        return 1.0
+    offsets: Offsets = []
+    for i in range(joint + 1, row + 1):
+        offsets.append((i, 'a'))
+        if i < row or end == 'd':
+            offsets.append((i, 'd'))
+    # best[n]: bound of the sum of the offsets from the n-th on.
+    best = [math.inf] * (len(offsets) + 1)
+    best[-1] = 0.0
+    for first in range(len(offsets) - 1, -1, -1):
+        for size in range(1, min(3, len(offsets) - first) + 1):
+            group = offsets[first : first + size]
+            length = _group_norm(arm, ray_length, group, is_first=first == 0)
+            if length is not None:
+                best[first] = min(best[first], length + best[first + size])
+    return best[0]
+
+
+def _group_norm(
+    arm: ArmModel, ray_length: float, group: Offsets, *, is_first: bool
+) -> float | None:
+    """Return the norm of neighbouring offsets (the first ones: across the axis) or None."""
+    kinds = ''.join(kind for _, kind in group)
+    row = group[0][0]
+    alphas, lengths = arm.dh[:, 0], arm.dh[:, 1]
+    if kinds == 'a':
+        return abs(float(lengths[row]))
+    if kinds == 'd':
+        return max(abs(d) for d in _extremes(arm, ray_length, row))
+    if kinds == 'ad':
+        # x(i-1) is square to z(i); only the part of d square to the joint's own axis counts.
+        tilt = abs(math.sin(alphas[row])) if is_first else 1.0
+        return max(math.hypot(lengths[row], d * tilt) for d in _extremes(arm, ray_length, row))
+    if kinds == 'da':
+        return max(
+            math.hypot(d, lengths[row + 1]) for d in _extremes(arm, ray_length, row)
+        )
+    if kinds == 'dad':
+        # z(i) and z(i+1) enclose alpha(i+1), and x(i) is square to both. Convex in either d, so
+        # the greatest value is at an end of its range.
+        cosine = math.cos(alphas[row + 1])
+        return max(
+            math.sqrt(max(0.0, lengths[row + 1] ** 2 + d * d + e * e + 2.0 * d * e * cosine))
+            for d in _extremes(arm, ray_length, row)
+            for e in _extremes(arm, ray_length, row + 1)
+        )
+    return None
+
+
+def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
+    """Return the least and greatest d of a row [m]."""
+    if row == arm.dof:
+        return (ray_length,)
+    d = float(arm.dh[row, 3])
+    if arm.is_prismatic[row]:
+        return (d + float(arm.bounds[0, row]), d + float(arm.bounds[1, row]))
+    return (d,)
+
+
+def bar_ends(arm: ArmModel) -> list[tuple[int, str]]:
+    """
+    Return the offsets of the chain that are bars of the arm, from the mount outwards.
+
+    Offsets of length zero are no bars. Those that no joint moves belong to the mount, which is
+    worn on the body and so cannot keep clear of it.
+    """
+    bars = []
+    is_moved = False
+    for row in range(arm.dof + 1):
+        is_joint = row < arm.dof
+        if is_moved and arm.dh[row, 1] != 0.0:
+            bars.append((row, 'a'))
+        slides = is_joint and arm.is_prismatic[row]
+        if slides or not is_joint or (is_moved and arm.dh[row, 3] != 0.0):
+            bars.append((row, 'd'))
+        is_moved = True
+    return bars
+
+
+def bar_names(arm: ArmModel) -> list[str]:
+    """Return what messages call the bars of `bar_ends`."""
+    return [
+        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
+    ]
+
+
+@functools.lru_cache(maxsize=16)
+def reach_table(arm: ArmModel, ray_length: float) -> Array:
+    """Return `reach_bound` for every bar end (rows) and joint (columns), (n_bars, dof) [m]."""
+    table = np.array(
+        [
+            [reach_bound(arm, ray_length, joint, row, end) for joint in range(arm.dof)]
+            for row, end in bar_ends(arm)
+        ]
+    )
+    table.setflags(write=False)
+    return table

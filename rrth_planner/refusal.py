@@ -1,0 +1,105 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Why a request cannot be planned: the part of the arm, the box, and by how much."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrth_planner.aiming import GoalSet
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.goal import PointingGoal
+from rrth_planner.scene import Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """
+    A request that ends without a motion.
+
+    Parameters
+    ----------
+    status : PlanStatus
+    sentence : str
+        For the caller, with figures and units.
+
+    """
+
+    status: PlanStatus
+    sentence: str
+
+
+def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) -> Refusal | None:
+    """Return why no motion can start at q_start, shape (dof,), or None."""
+    for k, name in enumerate(arm.joint_names):
+        low, high = arm.bounds[:, k]
+        if not low <= q_start[k] <= high:
+            unit = 'm' if arm.is_prismatic[k] else 'rad'
+            return Refusal(
+                PlanStatus.START_OUT_OF_BOUNDS,
+                f'{name} is at {q_start[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}',
+            )
+    if world.is_valid(q_start):
+        return None
+    distances = world.clearances(q_start)
+    bar, box = np.unravel_index(int(np.argmin(distances)), distances.shape)
+    return Refusal(
+        PlanStatus.START_IN_COLLISION,
+        f'{world.bar_names[bar]} is {_how_close(distances[bar, box], margin)} box '
+        f'"{world.box_names[box]}"',
+    )
+
+
+def _how_close(clearance: float, margin: float) -> str:
+    """Say a clearance from the grown box as a distance from the body itself."""
+    distance = clearance + margin
+    if distance <= 0.0:
+        return f'{-distance:.4f} m inside'
+    return f'about {distance:.4f} m, less than the margin of {margin:g} m, from'
+
+
+def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal | None:
+    """Return why a target cannot be pointed at from anywhere, or None."""
+    where = ', '.join(f'{value:.3f}' for value in goal.target)
+    for box in scene.boxes:
+        local = box.rotation.T @ (goal.target - box.center)
+        excess = np.abs(local) - 0.5 * box.size
+        if (excess <= 0.0).all():
+            return Refusal(
+                PlanStatus.GOAL_IN_COLLISION,
+                f'the target ({where}) m is inside box "{box.name}"',
+            )
+        if (excess <= margin).all():
+            return Refusal(
+                PlanStatus.GOAL_IN_COLLISION,
+                f'the target ({where}) m is nearer to box "{box.name}" than the margin of '
+                f'{margin:g} m',
+            )
+    return None
+
+
+def goal_refusal(world: World, goals: GoalSet) -> Refusal:
+    """Return why no posture that aims at the target will do."""
+    if goals.n_aiming == 0:
+        return Refusal(
+            PlanStatus.GOAL_UNREACHABLE,
+            'no posture within the joint limits aims at the target',
+        )
+    pairs: Counter[tuple[str, str]] = Counter()
+    for q, reach in zip(goals.q_blocked, goals.blocked_reaches, strict=True):
+        distances = world.clearances(q, max(reach, world.ray_length))
+        for bar, box in np.argwhere(distances < 0.0):
+            pairs[world.bar_names[bar], world.box_names[box]] += 1
+    blame = 'with next to no clearance'
+    if pairs:
+        (bar, box), count = pairs.most_common(1)[0]
+        share = 100.0 * count / len(goals.q_blocked)
+        blame = f'most often {bar} and box "{box}" ({share:.0f} %)'
+    return Refusal(
+        PlanStatus.GOAL_IN_COLLISION,
+        f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',
+    )

@@ -1,0 +1,54 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Unit quaternions (x, y, z, w) and poses, as ROS messages carry them."""
+
+from numpy.typing import ArrayLike
+import numpy as np
+
+from rrth_planner.arrays import Array
+
+
+def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
+    """Return the rotation of a quaternion of any positive length, shape (3, 3)."""
+    q = np.asarray(quaternion_xyzw, dtype=np.float64)
+    x, y, z, w = q / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_xyzw(rotation: Array) -> Array:
+    """Return the unit quaternion (x, y, z, w) of a rotation, w >= 0 (Shepperd 1978)."""
+    r = rotation
+    squares = np.array(
+        [
+            1 + r[0, 0] - r[1, 1] - r[2, 2],
+            1 - r[0, 0] + r[1, 1] - r[2, 2],
+            1 - r[0, 0] - r[1, 1] + r[2, 2],
+            1 + r[0, 0] + r[1, 1] + r[2, 2],
+        ]
+    )
+    # The largest of the four is far from zero, so the divisions below are safe.
+    table = np.array(
+        [
+            [squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
+            [r[0, 1] + r[1, 0], squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
+            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[2], r[1, 0] - r[0, 1]],
+            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], squares[3]],
+        ]
+    )
+    q = table[int(np.argmax(squares))]
+    q = q / np.linalg.norm(q)
+    return -q if q[3] < 0 else q
+
+
+def pose_matrix(position: ArrayLike, quaternion: ArrayLike) -> Array:
+    """Return the pose of a frame from its position [m] and quaternion (x, y, z, w), (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3] = rotation_matrix(quaternion)
+    T[:3, 3] = position
+    return T

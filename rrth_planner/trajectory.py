@@ -1,0 +1,157 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Geometry with time: quintic pieces from rest to rest, as a controller interpolates them."""
+
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+import numpy as np
+
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import OptionsError, RrthError
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MotionLimits:
+    """
+    What each joint may do.
+
+    Parameters
+    ----------
+    velocity, acceleration, jerk : array_like, shape (dof,)
+        Greatest magnitudes [rad/s, rad/s^2, rad/s^3], all > 0.
+
+    Raises
+    ------
+    OptionsError
+        A limit that is not a positive number, or another number of joints.
+
+    """
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        dof = np.size(self.velocity)
+        for name, unit in (
+            ('velocity', 'rad/s'),
+            ('acceleration', 'rad/s^2'),
+            ('jerk', 'rad/s^3'),
+        ):
+            value = frozen_array(getattr(self, name), (dof,), f'max_{name}', unit, OptionsError)
+            if not (value > 0.0).all():
+                raise OptionsError(
+                    f'max_{name}: {value.tolist()}, expected a value > 0 for every joint [{unit}]'
+                )
+            object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Trajectory:
+    """
+    Points in time; between two of them each joint follows the quintic that fits both.
+
+    Parameters
+    ----------
+    times : array_like, shape (n,)
+        From 0, strictly increasing [s].
+    positions, velocities, accelerations : array_like, shape (n, dof)
+        [rad, rad/s, rad/s^2].
+
+    Raises
+    ------
+    RrthError
+        Shapes that differ, numbers that are not finite, times that do not increase.
+
+    """
+
+    times: Array
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        times = frozen_array(self.times, (None,), 'times', 's', RrthError)
+        if len(times) == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
+            raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
+        object.__setattr__(self, 'times', times)
+        dof = np.shape(self.positions)[-1]
+        for name, unit in (
+            ('positions', 'rad'),
+            ('velocities', 'rad/s'),
+            ('accelerations', 'rad/s^2'),
+        ):
+            value = frozen_array(getattr(self, name), (len(times), dof), name, unit, RrthError)
+            object.__setattr__(self, name, value)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last point [s]."""
+        return float(self.times[-1])
+
+
+def piece_coefficients(trajectory: Trajectory) -> Array:
+    """
+    Return the polynomials of all pieces in u = (t - t_i) / (t_(i+1) - t_i), lowest power first.
+
+    Returns
+    -------
+    ndarray, shape (n - 1, 6, dof)
+        The quintic that fits position, velocity and acceleration at both ends of each piece [rad].
+
+    """
+    T = np.diff(trajectory.times)[:, None]
+    p0, p1 = trajectory.positions[:-1], trajectory.positions[1:]
+    v0, v1 = trajectory.velocities[:-1] * T, trajectory.velocities[1:] * T
+    a0, a1 = trajectory.accelerations[:-1] * T * T, trajectory.accelerations[1:] * T * T
+    # What position, velocity and acceleration at u = 1 still lack after the first three terms.
+    dp = p1 - p0 - v0 - 0.5 * a0
+    dv = v1 - v0 - a0
+    da = a1 - a0
+    return np.stack(
+        [
+            p0,
+            v0,
+            0.5 * a0,
+            10.0 * dp - 4.0 * dv + 0.5 * da,
+            -15.0 * dp + 7.0 * dv - da,
+            6.0 * dp - 3.0 * dv + 0.5 * da,
+        ],
+        axis=1,
+    )
+
+
+def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Array]:
+    """
+    Return the state at some times; before the first and after the last point it stands still.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    times : array_like, shape (m,)
+        [s].
+
+    Returns
+    -------
+    tuple of ndarray, each of shape (m, dof)
+        Positions [rad], velocities [rad/s], accelerations [rad/s^2].
+
+    """
+    t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    grid = trajectory.times
+    if len(grid) == 1:
+        held = np.repeat(trajectory.positions, len(t), axis=0)
+        return held, np.zeros_like(held), np.zeros_like(held)
+    i = np.clip(np.searchsorted(grid, t, side='right') - 1, 0, len(grid) - 2)
+    width = np.diff(grid)[i][:, None]
+    u = (t - grid[i])[:, None] / width
+    is_outside = (u < 0.0) | (t[:, None] > grid[-1])
+    u = np.clip(u, 0.0, 1.0)
+    c = piece_coefficients(trajectory)[i]
+    q = ((((c[:, 5] * u + c[:, 4]) * u + c[:, 3]) * u + c[:, 2]) * u + c[:, 1]) * u + c[:, 0]
+    v = (((5 * c[:, 5] * u + 4 * c[:, 4]) * u + 3 * c[:, 3]) * u + 2 * c[:, 2]) * u + c[:, 1]
+    a = ((20 * c[:, 5] * u + 12 * c[:, 4]) * u + 6 * c[:, 3]) * u + 2 * c[:, 2]
+    return q, np.where(is_outside, 0.0, v / width), np.where(is_outside, 0.0, a / width**2)
