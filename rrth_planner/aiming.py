@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError

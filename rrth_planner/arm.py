@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import ModelError
 from rrth_planner.rotation import pose_matrix
@@ -118,7 +117,9 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
             T_base_mount=pose_matrix(position, quaternion),
         )
     except KeyError as missing:
-        raise ModelError(f'arm description: no {missing}, expected as in config/arm.yaml') from None
+        raise ModelError(
+            f'arm description: no {missing}, expected as in config/arm.yaml'
+        ) from None
     except (TypeError, ValueError, AttributeError) as problem:
         raise ModelError(
             f'arm description: {problem}; expected numbers laid out as in config/arm.yaml'
@@ -159,8 +160,18 @@ def _link_pose(alpha: float, a: float, theta: Array, d: Array) -> Array:
     ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
     pose = np.zeros((*np.shape(theta), 4, 4))
     pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 3] = ct, -st, a
-    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2], pose[..., 1, 3] = st * ca, ct * ca, -sa, -d * sa
-    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2], pose[..., 2, 3] = st * sa, ct * sa, ca, d * ca
+    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2], pose[..., 1, 3] = (
+        st * ca,
+        ct * ca,
+        -sa,
+        -d * sa,
+    )
+    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2], pose[..., 2, 3] = (
+        st * sa,
+        ct * sa,
+        ca,
+        d * ca,
+    )
     pose[..., 3, 3] = 1.0
     return pose
 

@@ -4,7 +4,6 @@
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
 from rrth_planner.errors import RrthError
 
 Array = NDArray[np.float64]

@@ -5,7 +5,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-
 from rrth_planner.arrays import Array
 from rrth_planner.kernels import arm_validity
 from rrth_planner.path import Path
@@ -100,7 +99,7 @@ def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend
 
 def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
     """Return the largest blend of a corner, no larger than the given one, that is proven free."""
-    cap = min((limits.velocity / np.maximum(np.abs(whole.u_in), np.abs(whole.u_out)).clip(1e-9)))
+    cap = min(limits.velocity / np.maximum(np.abs(whole.u_in), np.abs(whole.u_out)).clip(1e-9))
     turn = np.abs(whole.u_out - whole.u_in)
     enough = max(
         float((0.75 * turn * cap**2 / limits.acceleration).max()),

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-
 from rrth_planner.arrays import Array
 from rrth_planner.kernels import arm_validity
 from rrth_planner.trajectory import piece_coefficients, sample, Trajectory

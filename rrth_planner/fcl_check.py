@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import fcl
 import numpy as np
-
 from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
 from rrth_planner.reach import bar_ends, bar_names, reach_table

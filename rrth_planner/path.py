@@ -5,7 +5,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import RrthError
 

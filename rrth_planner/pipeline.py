@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import time
 
 import numpy as np
-
 from rrth_planner.aiming import FEW, goal_configurations, GoalSet, MANY, pointing_problem
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import time
 
 import numpy as np
-
 from rrth_planner.arrays import Array
-from rrth_planner.kernels import rrt_h, tree
+from rrth_planner.kernels import rrt, rrt_h, tree
 from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -173,14 +172,17 @@ def _grow(
         stopped = deadline.status()
         if stopped is not None:
             return None, drawn, stopped
-        drawn += rrt_h.advance(
+        drawn += rrt.advance(
             world.edge_check,
+            world.free_radius,
             world.resolution,
             world.robot,
             world.obstacles,
             world.bounds,
             options.step_size,
+            0.0,
             options.goal_bias,
+            True,
             best_cost,
             club,
             options.club_radius,

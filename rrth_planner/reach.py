@@ -6,7 +6,6 @@ import functools
 import math
 
 import numpy as np
-
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 
@@ -77,9 +76,7 @@ def _group_norm(
         tilt = abs(math.sin(alphas[row])) if is_first else 1.0
         return max(math.hypot(lengths[row], d * tilt) for d in _extremes(arm, ray_length, row))
     if kinds == 'da':
-        return max(
-            math.hypot(d, lengths[row + 1]) for d in _extremes(arm, ray_length, row)
-        )
+        return max(math.hypot(d, lengths[row + 1]) for d in _extremes(arm, ray_length, row))
     if kinds == 'dad':
         # z(i) and z(i+1) enclose alpha(i+1), and x(i) is square to both. Convex in either d, so
         # the greatest value is at an end of its range.
@@ -124,9 +121,7 @@ def bar_ends(arm: ArmModel) -> list[tuple[int, str]]:
 
 def bar_names(arm: ArmModel) -> list[str]:
     """Return what messages call the bars of `bar_ends`."""
-    return [
-        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
-    ]
+    return ['pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)]
 
 
 @functools.lru_cache(maxsize=16)

@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-
 from rrth_planner.aiming import GoalSet
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array

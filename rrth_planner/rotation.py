@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Unit quaternions (x, y, z, w) and poses, as ROS messages carry them."""
 
-from numpy.typing import ArrayLike
 import numpy as np
-
+from numpy.typing import ArrayLike
 from rrth_planner.arrays import Array
 
 

@@ -5,10 +5,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import SceneError
-
 
 # Further out the slack of the certificates would no longer cover rounding.
 FARTHEST = 1e4

@@ -5,13 +5,12 @@
 import math
 
 import numpy as np
-from ruckig import InputParameter, Result, Ruckig, Trajectory as Profile
-
 from rrth_planner.arrays import Array
 from rrth_planner.blend import Blend
 from rrth_planner.errors import RrthError
 from rrth_planner.path import Path
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
+from ruckig import InputParameter, Result, Ruckig, Trajectory as Profile
 
 # A motion shorter than this is none: the arm holds still for HOLD seconds.
 STILL, HOLD = 1e-9, 0.1
@@ -47,15 +46,13 @@ def parameterize(path: Path, blends: tuple[Blend, ...], limits: MotionLimits) ->
     if path.length < STILL:
         still = np.zeros((2, q.shape[1]))
         return Trajectory(
-            times=[0.0, HOLD], positions=q[[0, 0]], velocities=still, accelerations=still
+            times=np.array([0.0, HOLD]), positions=q[[0, 0]], velocities=still, accelerations=still
         )
     cuts = [0.0, *(blend.half_length for blend in blends), 0.0]
     edges = np.diff(q, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     directions = edges / lengths[:, None]
-    straights = [
-        length - cuts[i] - cuts[i + 1] for i, length in enumerate(lengths)
-    ]
+    straights = [length - cuts[i] - cuts[i + 1] for i, length in enumerate(lengths)]
     bounds = [_along(direction, limits) for direction in directions]
     speeds = _corner_speeds(straights, bounds, blends, limits)
     zero = np.zeros(q.shape[1])

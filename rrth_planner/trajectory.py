@@ -4,9 +4,8 @@
 
 from dataclasses import dataclass
 
-from numpy.typing import ArrayLike
 import numpy as np
-
+from numpy.typing import ArrayLike
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError, SceneError
-from rrth_planner.kernels import arm_validity, jit
+from rrth_planner.kernels import arm_sampling, arm_validity, jit
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -19,6 +18,7 @@ from rrth_planner.scene import Scene
 # errors of about 1e-11 m.
 SLACK = 1e-9
 EDGE_CHECK = jit.first_class(arm_validity.is_edge_free)
+FREE_RADIUS = jit.first_class(arm_sampling.free_radius)
 # Shortest interval that the proof of an edge looks at before it gives up [rad].
 RESOLUTION = 5e-4
 
@@ -38,6 +38,8 @@ class World:
         Boxes grown by the margin, in the arm's base frame, rows as in `kernels.jit` [m].
     edge_check : compiled function
         The seam `kernels.jit.EDGE_CHECK`.
+    free_radius : compiled function
+        The seam `kernels.jit.FREE_RADIUS`.
     resolution : float
         Last argument but two of the edge check [rad].
     bar_names, box_names : tuple of str
@@ -49,6 +51,7 @@ class World:
     robot: Array
     obstacles: Array
     edge_check: Callable[..., bool]
+    free_radius: Callable[..., float]
     resolution: float
     bar_names: tuple[str, ...]
     box_names: tuple[str, ...]
@@ -118,6 +121,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         robot=_robot_rows(arm, ray_guard_length),
         obstacles=_box_rows(arm, scene, margin),
         edge_check=EDGE_CHECK,
+        free_radius=FREE_RADIUS,
         resolution=RESOLUTION,
         bar_names=tuple(bar_names(arm)),
         box_names=tuple(box.name for box in scene.boxes),

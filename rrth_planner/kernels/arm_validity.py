@@ -6,11 +6,8 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-
-from rrth_planner.kernels.geometry import bar_box_distance, bar_touches_boxes, hull_is_apart
+from rrth_planner.kernels.geometry import bar_distance, bar_touches_boxes, hull_is_apart
 from rrth_planner.kernels.jit import (
-    BOX_HALF,
-    BOX_OFFSET,
     D,
     kernel,
     KIND,
@@ -82,19 +79,12 @@ def clearances(positions, ray_length, robot, boxes, distances):
     n_bars = count_bars(robot)
     points, radii = np.empty((1, 3 * (n_bars + 1))), np.empty(n_bars)
     bar_radii(robot, radii)
-    start, step, half = np.empty(3), np.empty(3), np.empty(3)
     distances[:] = math.inf
     for i in range(positions.shape[0]):
         chain_points(robot, positions[i], ray_length, points, 0)
         for k in range(n_bars):
             for j in range(boxes.shape[1]):
-                for r in range(3):
-                    at_start, at_end = boxes[BOX_OFFSET + r, j], boxes[BOX_OFFSET + r, j]
-                    for c in range(3):
-                        at_start += boxes[3 * r + c, j] * points[0, 3 * k + c]
-                        at_end += boxes[3 * r + c, j] * points[0, 3 * k + 3 + c]
-                    start[r], step[r], half[r] = at_start, at_end - at_start, boxes[BOX_HALF + r, j]
-                distance = bar_box_distance(start, step, half) - radii[k]
+                distance = bar_distance(points, 0, 3 * k, boxes, j) - radii[k]
                 distances[k, j] = min(distances[k, j], distance)
 
 

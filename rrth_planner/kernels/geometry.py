@@ -5,7 +5,7 @@
 import math
 
 from numba.core.types import boolean, float64, int64
-
+import numpy as np
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, MAT, OUT_VEC
 
 
@@ -99,6 +99,19 @@ def bar_box_distance(start, step, half):
             offset = abs(start[i] * step[j] - start[j] * step[i]) / norm
             overlap = min(overlap, reach - offset)
     return -max(overlap, 0.0)
+
+
+@kernel(float64(MAT, int64, int64, MAT, int64))
+def bar_distance(points, row, column, boxes, j):
+    """Return the signed distance of the bar at points[row, column:] from box j [m]."""
+    start, step, half = np.empty(3), np.empty(3), np.empty(3)
+    for r in range(3):
+        at_start = at_end = boxes[BOX_OFFSET + r, j]
+        for c in range(3):
+            at_start += boxes[3 * r + c, j] * points[row, column + c]
+            at_end += boxes[3 * r + c, j] * points[row, column + 3 + c]
+        start[r], step[r], half[r] = at_start, at_end - at_start, boxes[BOX_HALF + r, j]
+    return bar_box_distance(start, step, half)
 
 
 @kernel(boolean(MAT, int64, int64, int64, float64, float64, float64, MAT, int64))

@@ -29,6 +29,10 @@ OUT_POOL = types.Array(int32, 1, 'C')
 # -> is the straight edge between the two configurations free?
 EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, MAT, MAT))
 
+# A second one: (q, robot rows, obstacle rows) -> radius of a ball of joint space round q that is
+# free [rad].
+FREE_RADIUS = types.FunctionType(float64(VEC, MAT, MAT))
+
 # Columns of `robot`, a row for each DH row of the arm; then dof columns with the reach of the end
 # of the row's `a` offset and dof with that of its `d` offset.
 COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D, REACH = range(9)

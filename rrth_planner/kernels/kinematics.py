@@ -5,7 +5,6 @@
 import math
 
 from numba.core.types import float64, int64, UniTuple, void
-
 from rrth_planner.kernels.jit import (
     A,
     COS_ALPHA,

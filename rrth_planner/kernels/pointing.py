@@ -6,7 +6,6 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-
 from rrth_planner.kernels.arm_validity import is_configuration_free
 from rrth_planner.kernels.jit import (
     A,

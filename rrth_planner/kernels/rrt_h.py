@@ -1,142 +1,20 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H: growth to a first path, and the three steps that pull it taut (Zou et al. 2024)."""
+"""RRT-H: the three steps that pull a path taut (Zou et al. 2024, section 2, corrected)."""
 
-import math
-
-from numba.core.types import boolean, float64, int64, npy_rng, void
+from numba.core.types import boolean, float64, int64, void
 import numpy as np
-
 from rrth_planner.kernels.jit import (
     EDGE_CHECK,
     kernel,
     MAT,
-    OUT_CUBE,
-    OUT_INT_MAT,
-    OUT_INTS,
     OUT_MAT,
     VEC,
 )
-from rrth_planner.kernels.sampling import draw_informed, draw_uniform
-from rrth_planner.kernels.tree import distance, nearest, path_length, steer
+from rrth_planner.kernels.tree import distance, path_length
 
 # What a gain in length must exceed to be worth another round, relative.
 TAUT = 1e-5
-
-
-@kernel(boolean(VEC, MAT, float64, int64, float64, npy_rng))
-def is_rejected_by_club(q, club, radius, count, probability, rng):
-    """Return whether the path club turns a new point away (section 4 of the paper)."""
-    if club.shape[0] == 0:
-        return False
-    n_near = 0
-    for i in range(club.shape[0]):
-        if distance(q, club[i]) < radius:
-            n_near += 1
-    return n_near > count and rng.random() < probability
-
-
-@kernel(
-    int64(
-        EDGE_CHECK,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        float64,
-        float64,
-        MAT,
-        float64,
-        int64,
-        float64,
-        int64,
-        npy_rng,
-        OUT_CUBE,
-        OUT_INT_MAT,
-        OUT_INTS,
-        OUT_INTS,
-    )
-)
-def advance(
-    is_edge_free,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    step_size,
-    goal_bias,
-    best_cost,
-    club,
-    club_radius,
-    club_count,
-    club_probability,
-    n_draws,
-    rng,
-    tree_q,
-    parents,
-    sizes,
-    meeting,
-):
-    """
-    Grow two trees towards each other by at most n_draws draws; return how many were made.
-
-    tree_q (2, capacity, dof) and parents (2, capacity): the tree of the start and the tree of the
-    goals, whose first sizes[1] nodes without parent are the goals themselves. Each draw extends
-    one tree by a step, then the other reaches for the new node, straight or step by step (Kuffner
-    and LaValle 2000). On success meeting[0], meeting[1] are the nodes of the two trees that an
-    edge joins, otherwise -1. A draw that cannot shorten a path of best_cost is not made.
-    """
-    dof, capacity = tree_q.shape[2], tree_q.shape[1]
-    q, q_new = np.empty(dof), np.empty(dof)
-    meeting[0] = meeting[1] = -1
-    n_goals = 0
-    while n_goals < sizes[1] and parents[1, n_goals] < 0:
-        n_goals += 1
-    for draw in range(n_draws):
-        if sizes[0] >= capacity - 1 or sizes[1] >= capacity - 1:
-            return n_draws
-        side = draw & 1
-        goal = int64(rng.random() * n_goals)
-        if rng.random() < goal_bias:
-            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
-        elif best_cost < math.inf:
-            if not draw_informed(bounds, tree_q[0, 0], tree_q[1, goal], best_cost, rng, q):
-                continue
-        else:
-            draw_uniform(bounds, rng, q)
-        near = nearest(tree_q[side], sizes[side], q)
-        if distance(tree_q[side, near], q) == 0.0:
-            continue
-        steer(tree_q[side, near], q, step_size, q_new)
-        if is_rejected_by_club(q_new, club, club_radius, club_count, club_probability, rng):
-            continue
-        if not is_edge_free(tree_q[side, near], q_new, resolution, robot, obstacles):
-            continue
-        new = sizes[side]
-        tree_q[side, new] = q_new
-        parents[side, new] = near
-        sizes[side] += 1
-        other = 1 - side
-        reached = nearest(tree_q[other], sizes[other], q_new)
-        is_joined = is_edge_free(tree_q[other, reached], q_new, resolution, robot, obstacles)
-        while not is_joined and sizes[other] < capacity - 1:
-            steer(tree_q[other, reached], q_new, step_size, q)
-            if distance(q, q_new) == 0.0 or is_rejected_by_club(
-                q, club, club_radius, club_count, club_probability, rng
-            ):
-                break
-            if not is_edge_free(tree_q[other, reached], q, resolution, robot, obstacles):
-                break
-            tree_q[other, sizes[other]] = q
-            parents[other, sizes[other]] = reached
-            reached = sizes[other]
-            sizes[other] += 1
-            is_joined = is_edge_free(q, q_new, resolution, robot, obstacles)
-        if is_joined:
-            meeting[side], meeting[other] = new, reached
-            return draw + 1
-    return n_draws
 
 
 @kernel(int64(OUT_MAT, int64, int64))

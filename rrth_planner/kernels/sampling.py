@@ -5,7 +5,6 @@
 import math
 
 from numba.core.types import boolean, float64, npy_rng, void
-
 from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, VEC
 
 

@@ -5,8 +5,16 @@
 import math
 
 from numba.core.types import float64, int64, void
-
-from rrth_planner.kernels.jit import kernel, MAT, OUT_CUBE, OUT_INT_MAT, OUT_MAT, OUT_VEC, VEC
+from rrth_planner.kernels.jit import (
+    FREE_RADIUS,
+    kernel,
+    MAT,
+    OUT_CUBE,
+    OUT_INT_MAT,
+    OUT_MAT,
+    OUT_VEC,
+    VEC,
+)
 
 
 @kernel(float64(VEC, VEC))
@@ -47,6 +55,29 @@ def steer(q_near, q_towards, step_size, q_new):
     share = 1.0 if length <= step_size else step_size / length
     for k in range(q_new.shape[0]):
         q_new[k] = q_towards[k] if share == 1.0 else q_near[k] + share * (q_towards[k] - q_near[k])
+
+
+@kernel(float64(FREE_RADIUS, MAT, MAT, VEC, float64, float64))
+def adapted_step(free_radius, robot, obstacles, q, step_size, clearance_gain):
+    """
+    Return the step from q: shorter where obstacles are near (after Cai, as the paper cites it).
+
+    clearance_gain times the free radius, between a tenth of step_size and step_size; a gain of 0
+    leaves step_size as it is.
+    """
+    if clearance_gain == 0.0:
+        return step_size
+    step = clearance_gain * free_radius(q, robot, obstacles)
+    return min(step_size, max(step, 0.1 * step_size))
+
+
+@kernel(int64(OUT_INT_MAT, int64))
+def count_roots(parents, size):
+    """Return how many goals the tree of the goals begins with; parents (2, capacity)."""
+    n = 0
+    while n < size and parents[1, n] < 0:
+        n += 1
+    return n
 
 
 @kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))

@@ -1,0 +1,93 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A point among axis-aligned boxes, in a space of any dimension: exact, or at check points."""
+
+import math
+
+from numba.core.types import boolean, float64, int64
+import numpy as np
+from rrth_planner.kernels.jit import kernel, MAT, VEC
+
+# Obstacles of a map are rows lower corner, upper corner, (m, 2 dof). Touching is allowed: a wall
+# begins this far inside its faces.
+TOUCH = 1e-9
+
+
+@kernel(boolean(VEC, VEC, float64, MAT, MAT))
+def is_edge_free(q_from, q_to, resolution, robot, obstacles):
+    """
+    Return whether the straight edge stays out of the inside of every box: exact.
+
+    The shares of the edge between the two faces of each axis are intervals; the edge enters the
+    box where they all overlap (Kay and Kajiya 1986). `resolution` and `robot` are not used.
+    """
+    dof = q_from.shape[0]
+    for j in range(obstacles.shape[0]):
+        enter, leave = 0.0, 1.0
+        for k in range(dof):
+            lower, upper = obstacles[j, k] + TOUCH, obstacles[j, dof + k] - TOUCH
+            step = q_to[k] - q_from[k]
+            if step == 0.0:
+                if q_from[k] <= lower or q_from[k] >= upper:
+                    enter = math.inf
+                    break
+            else:
+                at_lower, at_upper = (lower - q_from[k]) / step, (upper - q_from[k]) / step
+                enter = max(enter, min(at_lower, at_upper))
+                leave = min(leave, max(at_lower, at_upper))
+                if enter >= leave:
+                    break
+        # A single point inside (an edge of length zero) counts too.
+        if enter < leave:
+            return False
+    return True
+
+
+@kernel(boolean(VEC, MAT))
+def is_point_inside(q, obstacles):
+    """Return whether a point is inside any box."""
+    dof = q.shape[0]
+    for j in range(obstacles.shape[0]):
+        is_inside = True
+        for k in range(dof):
+            is_inside &= obstacles[j, k] + TOUCH < q[k] < obstacles[j, dof + k] - TOUCH
+        if is_inside:
+            return True
+    return False
+
+
+@kernel(boolean(VEC, VEC, float64, MAT, MAT))
+def is_edge_free_sampled(q_from, q_to, resolution, robot, obstacles):
+    """
+    Return whether no check point of the edge is inside a box: the paper's test.
+
+    The check points are spread evenly, their number by the length of the edge (section 2), no
+    further apart than `resolution`. What lies between them is not seen.
+    """
+    dof = q_from.shape[0]
+    length = 0.0
+    for k in range(dof):
+        length += (q_to[k] - q_from[k]) ** 2
+    n = int64(math.sqrt(length) / resolution) + 1
+    q = np.empty(dof)
+    for i in range(n, 0, -1):
+        for k in range(dof):
+            q[k] = q_from[k] + i / n * (q_to[k] - q_from[k])
+        if is_point_inside(q, obstacles):
+            return False
+    return True
+
+
+@kernel(float64(VEC, MAT, MAT))
+def free_radius(q, robot, obstacles):
+    """Return the distance of q from the nearest box, 0 inside: a ball that far is free."""
+    dof = q.shape[0]
+    least = math.inf
+    for j in range(obstacles.shape[0]):
+        squared = 0.0
+        for k in range(dof):
+            excess = max(obstacles[j, k] - q[k], q[k] - obstacles[j, dof + k])
+            if excess > 0.0:
+                squared += excess * excess
+        least = min(least, squared)
+    return math.sqrt(least)
