@@ -163,7 +163,7 @@ def _grow(
     world, dof = problem.world, len(problem.q_start)
     tree_q = np.empty((2, CAPACITY, dof))
     parents = np.full((2, CAPACITY), -1, dtype=np.int64)
-    sizes = np.array([1, len(roots)], dtype=np.int64)
+    sizes = np.array([1, len(roots), 0, len(roots)], dtype=np.int64)
     tree_q[0, 0] = problem.q_start
     tree_q[1, : len(roots)] = roots
     meeting = np.full(2, -1, dtype=np.int64)
@@ -199,7 +199,7 @@ def _grow(
             path = np.empty((MAX_WAYPOINTS, dof))
             n = tree.trace_path(tree_q, parents, meeting[0], meeting[1], path)
             return (path[:n].copy() if n else None), drawn, None
-        if sizes.max() >= CAPACITY - 1:
+        if sizes[:2].max() >= CAPACITY - 1:
             break
     return None, drawn, None
 

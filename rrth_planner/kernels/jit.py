@@ -23,6 +23,7 @@ OUT_CUBE = types.Array(float64, 3, 'C')
 OUT_FLAGS = types.Array(types.int8, 1, 'C')
 OUT_INTS = types.Array(int64, 1, 'C')
 OUT_INT_MAT = types.Array(int64, 2, 'C')
+OUT_INT_CUBE = types.Array(int64, 3, 'C')
 OUT_POOL = types.Array(int32, 1, 'C')
 
 # The seam between planning and geometry: (q_from, q_to, resolution, robot rows, obstacle rows)
@@ -32,6 +33,10 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, MAT, MAT))
 # A second one: (q, robot rows, obstacle rows) -> radius of a ball of joint space round q that is
 # free [rad].
 FREE_RADIUS = types.FunctionType(float64(VEC, MAT, MAT))
+
+# Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
+# they meet, and how many goals the second tree begins with.
+N_START, N_GOAL, N_MEETINGS, N_GOALS = range(4)
 
 # Columns of `robot`, a row for each DH row of the arm; then dof columns with the reach of the end
 # of the row's `a` offset and dof with that of its `d` offset.

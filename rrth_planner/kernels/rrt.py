@@ -11,13 +11,14 @@ from rrth_planner.kernels.jit import (
     FREE_RADIUS,
     kernel,
     MAT,
+    N_GOALS,
     OUT_CUBE,
     OUT_INT_MAT,
     OUT_INTS,
     VEC,
 )
 from rrth_planner.kernels.sampling import draw_informed, draw_uniform
-from rrth_planner.kernels.tree import adapted_step, count_roots, distance, nearest, steer
+from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
 
 
 @kernel(boolean(VEC, MAT, float64, int64, float64, npy_rng))
@@ -81,7 +82,7 @@ def advance(
     """
     Make at most n_draws draws until start and goal are joined; return how many were made.
 
-    tree_q (2, capacity, dof), parents (2, capacity), sizes (2,): the tree of the start and that of
+    tree_q (2, capacity, dof), parents (2, capacity), sizes (4,): the tree of the start and that of
     the goals, which begins with the goals themselves. One tree: it grows from the start, a step
     towards each draw, and joins a goal within a step (LaValle 1998). Two: they take turns, and the
     other one reaches for each new node, at once or step by step (Kuffner and LaValle 2000). On
@@ -91,7 +92,7 @@ def advance(
     dof, capacity = tree_q.shape[2], tree_q.shape[1]
     q, q_new = np.empty(dof), np.empty(dof)
     meeting[0] = meeting[1] = -1
-    n_goals = count_roots(parents, sizes[1])
+    n_goals = sizes[N_GOALS]
     for draw in range(n_draws):
         if sizes[0] >= capacity - 1 or sizes[1] >= capacity - 1:
             return n_draws

@@ -15,6 +15,18 @@ def draw_uniform(bounds, rng, q):
         q[k] = bounds[0, k] + (bounds[1, k] - bounds[0, k]) * rng.random()
 
 
+@kernel(void(VEC, float64, MAT, npy_rng, OUT_VEC))
+def draw_ball(centre, radius, bounds, rng, q):
+    """Draw uniformly from a ball, moved to the bounds where it sticks out."""
+    norm = 0.0
+    for k in range(q.shape[0]):
+        q[k] = rng.standard_normal()
+        norm += q[k] * q[k]
+    scale = radius * rng.random() ** (1.0 / q.shape[0]) / math.sqrt(norm)
+    for k in range(q.shape[0]):
+        q[k] = min(bounds[1, k], max(bounds[0, k], centre[k] + scale * q[k]))
+
+
 @kernel(boolean(MAT, VEC, VEC, float64, npy_rng, OUT_VEC))
 def draw_informed(bounds, q_start, q_goal, best_cost, rng, q):
     """

@@ -71,15 +71,6 @@ def adapted_step(free_radius, robot, obstacles, q, step_size, clearance_gain):
     return min(step_size, max(step, 0.1 * step_size))
 
 
-@kernel(int64(OUT_INT_MAT, int64))
-def count_roots(parents, size):
-    """Return how many goals the tree of the goals begins with; parents (2, capacity)."""
-    n = 0
-    while n < size and parents[1, n] < 0:
-        n += 1
-    return n
-
-
 @kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))
 def trace_path(tree_q, parents, from_start, from_goal, path):
     """

@@ -1,0 +1,299 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""RRT*: trees whose paths get shorter as they grow (Karaman and Frazzoli 2011)."""
+
+import math
+
+from numba.core.types import boolean, float64, int64, npy_rng, void
+import numpy as np
+from rrth_planner.kernels.jit import (
+    EDGE_CHECK,
+    FREE_RADIUS,
+    kernel,
+    MAT,
+    N_GOALS,
+    N_MEETINGS,
+    OUT_CUBE,
+    OUT_INT_CUBE,
+    OUT_INT_MAT,
+    OUT_INTS,
+    OUT_MAT,
+    OUT_VEC,
+    VEC,
+)
+from rrth_planner.kernels.sampling import draw_uniform
+from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
+
+# What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
+# resolution, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two
+# trees or one, biasing ratio, beacons, draws, rng, tree_q, links, costs, sizes, meetings, best,
+# history.
+STAR_SIGNATURE = int64(
+    EDGE_CHECK,
+    FREE_RADIUS,
+    float64,
+    MAT,
+    MAT,
+    MAT,
+    float64,
+    float64,
+    float64,
+    float64,
+    boolean,
+    int64,
+    MAT,
+    int64,
+    npy_rng,
+    OUT_CUBE,
+    OUT_INT_CUBE,
+    OUT_MAT,
+    OUT_INTS,
+    OUT_INT_MAT,
+    OUT_VEC,
+    OUT_VEC,
+)
+# Rows of the links of a tree, (3, capacity): parent, first child, next sibling.
+PARENT, CHILD, SIBLING = 0, 1, 2
+# A gain below this is rounding.
+GAIN = 1e-12
+
+
+@kernel(float64(int64, int64, float64, float64))
+def near_radius(size, dof, rewire_radius, step_size):
+    """
+    Return the radius of the neighbourhood, gamma (log n / n)^(1/dof) (algorithm 6).
+
+    Never beyond a step: longer edges would enter by rewiring alone.
+    """
+    radius = rewire_radius * (math.log(size + 1.0) / (size + 1.0)) ** (1.0 / dof)
+    return min(radius, step_size)
+
+
+@kernel(void(OUT_INT_MAT, int64))
+def detach(links, node):
+    """Take a node out of its parent's list of children; links (3, capacity)."""
+    parent = links[PARENT, node]
+    if links[CHILD, parent] == node:
+        links[CHILD, parent] = links[SIBLING, node]
+        return
+    child = links[CHILD, parent]
+    while links[SIBLING, child] != node:
+        child = links[SIBLING, child]
+    links[SIBLING, child] = links[SIBLING, node]
+
+
+@kernel(void(OUT_INT_MAT, int64, int64))
+def attach(links, node, parent):
+    """Make a node the first child of a parent."""
+    links[PARENT, node] = parent
+    links[SIBLING, node] = links[CHILD, parent]
+    links[CHILD, parent] = node
+
+
+@kernel(void(OUT_INT_MAT, OUT_VEC, int64, float64))
+def shift_costs(links, costs, node, change):
+    """Add a change to the cost of a node and of all its descendants, depth first."""
+    costs[node] += change
+    at = node
+    while True:
+        if links[CHILD, at] >= 0:
+            at = links[CHILD, at]
+        else:
+            while at != node and links[SIBLING, at] < 0:
+                at = links[PARENT, at]
+            if at == node:
+                return
+            at = links[SIBLING, at]
+        costs[at] += change
+
+
+@kernel(
+    int64(EDGE_CHECK, float64, MAT, MAT, VEC, int64, float64, OUT_MAT, OUT_INT_MAT, OUT_VEC, int64)
+)
+def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes, links, costs, n):
+    """
+    Add q to a tree of n nodes: best parent first, then rewire; return 0 where it is not reached.
+
+    nodes (capacity, dof), links (3, capacity), costs (capacity,). `near`, the nearest node, is the
+    parent unless one within the radius makes a shorter way (ChooseParent); afterwards q becomes
+    the parent of those to which it makes one (Rewire).
+    """
+    if not is_edge_free(nodes[near], q, resolution, robot, obstacles):
+        return 0
+    parent, cost = near, costs[near] + distance(nodes[near], q)
+    for i in range(n):
+        if i != near:
+            length = distance(nodes[i], q)
+            is_shorter = length <= radius and costs[i] + length < cost - GAIN
+            if is_shorter and is_edge_free(nodes[i], q, resolution, robot, obstacles):
+                parent, cost = i, costs[i] + length
+    nodes[n] = q
+    links[CHILD, n] = -1
+    costs[n] = cost
+    attach(links, n, parent)
+    for i in range(n):
+        length = distance(nodes[i], q)
+        is_shorter = i != parent and length <= radius and cost + length < costs[i] - GAIN
+        if is_shorter and is_edge_free(q, nodes[i], resolution, robot, obstacles):
+            detach(links, i)
+            attach(links, i, n)
+            shift_costs(links, costs, i, cost + length - costs[i])
+    return 1
+
+
+@kernel(void(OUT_CUBE, OUT_MAT, OUT_INTS, OUT_INT_MAT, OUT_VEC))
+def find_best(tree_q, costs, sizes, meetings, best):
+    """Write the least cost over all meetings, and the row of that meeting, into best (2,)."""
+    best[0], best[1] = math.inf, -1.0
+    for row in range(sizes[N_MEETINGS]):
+        a, b = meetings[row, 0], meetings[row, 1]
+        cost = costs[0, a] + distance(tree_q[0, a], tree_q[1, b]) + costs[1, b]
+        if cost < best[0]:
+            best[0], best[1] = cost, row
+
+
+@kernel(
+    boolean(
+        EDGE_CHECK,
+        FREE_RADIUS,
+        float64,
+        MAT,
+        MAT,
+        float64,
+        float64,
+        float64,
+        boolean,
+        int64,
+        VEC,
+        OUT_CUBE,
+        OUT_INT_CUBE,
+        OUT_MAT,
+        OUT_INTS,
+        OUT_INT_MAT,
+        OUT_VEC,
+    )
+)
+def extend(
+    is_edge_free,
+    free_radius,
+    resolution,
+    robot,
+    obstacles,
+    step_size,
+    clearance_gain,
+    rewire_radius,
+    is_bidirectional,
+    side,
+    q,
+    tree_q,
+    links,
+    costs,
+    sizes,
+    meetings,
+    best,
+):
+    """
+    Extend one of the two trees towards q; return whether there is a better path now.
+
+    tree_q (2, capacity, dof), links (2, 3, capacity), costs (2, capacity): the tree of the start
+    and that of the goals. meetings (rows, 2): pairs of their nodes that a proven edge joins. With
+    one tree each goal within a step of a new node is a meeting; with two, whatever node of the
+    other tree within a step makes a better path. best (2,): its cost and the row of its meeting.
+    """
+    other, dof = 1 - side, q.shape[0]
+    near = nearest(tree_q[side], sizes[side], q)
+    q_near, q_new, new = tree_q[side, near], np.empty(dof), sizes[side]
+    if new >= tree_q.shape[1] or distance(q_near, q) == 0.0:
+        return False
+    step = adapted_step(free_radius, robot, obstacles, q_near, step_size, clearance_gain)
+    steer(q_near, q, step, q_new)
+    radius = near_radius(new, dof, rewire_radius, step_size)
+    if not add_node(
+        is_edge_free,
+        resolution,
+        robot,
+        obstacles,
+        q_new,
+        near,
+        radius,
+        tree_q[side],
+        links[side],
+        costs[side],
+        new,
+    ):
+        return False
+    sizes[side] += 1
+    for i in range(sizes[other] if is_bidirectional else sizes[N_GOALS]):
+        length = distance(tree_q[other, i], q_new)
+        cost = costs[side, new] + length + costs[other, i]
+        if length > step_size or sizes[N_MEETINGS] >= meetings.shape[0]:
+            continue
+        if is_bidirectional and cost >= best[0] - GAIN:
+            continue
+        if is_edge_free(tree_q[other, i], q_new, resolution, robot, obstacles):
+            meetings[sizes[N_MEETINGS], side], meetings[sizes[N_MEETINGS], other] = new, i
+            sizes[N_MEETINGS] += 1
+    before = best[0]
+    find_best(tree_q, costs, sizes, meetings, best)
+    return best[0] < before - GAIN
+
+
+@kernel(STAR_SIGNATURE)
+def advance(
+    is_edge_free,
+    free_radius,
+    resolution,
+    robot,
+    obstacles,
+    bounds,
+    step_size,
+    clearance_gain,
+    goal_bias,
+    rewire_radius,
+    is_bidirectional,
+    bias,
+    beacons,
+    n_draws,
+    rng,
+    tree_q,
+    links,
+    costs,
+    sizes,
+    meetings,
+    best,
+    history,
+):
+    """
+    Make n_draws uniform draws; return how many were made.
+
+    history (n_draws,): cost of the best path after each draw. `bias` and `beacons` are not used.
+    """
+    q = np.empty(tree_q.shape[2])
+    for draw in range(n_draws):
+        side = draw & 1 if is_bidirectional else 0
+        if rng.random() < goal_bias:
+            goal = int64(rng.random() * sizes[N_GOALS])
+            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+        else:
+            draw_uniform(bounds, rng, q)
+        extend(
+            is_edge_free,
+            free_radius,
+            resolution,
+            robot,
+            obstacles,
+            step_size,
+            clearance_gain,
+            rewire_radius,
+            is_bidirectional,
+            side,
+            q,
+            tree_q,
+            links,
+            costs,
+            sizes,
+            meetings,
+            best,
+        )
+        history[draw] = best[0]
+    return n_draws

@@ -1,0 +1,99 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""RRT*-Smart: RRT* that draws near the corners of its shortened path."""
+
+from numba.core.types import float64, int64
+import numpy as np
+from rrth_planner.kernels.jit import EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
+from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
+from rrth_planner.kernels.sampling import draw_ball, draw_uniform
+
+
+@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64))
+def skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n):
+    """
+    Drop the waypoints that are not needed, in place; return how many are left.
+
+    From the end back: each waypoint is joined to the earliest ancestor that it sees (the path
+    optimisation of Nasir et al. 2013, seen from the start).
+    """
+    kept, i = 1, 0
+    while i < n - 1:
+        ahead = n - 1
+        while ahead > i + 1 and not is_edge_free(
+            path[i], path[ahead], resolution, robot, obstacles
+        ):
+            ahead -= 1
+        path[kept] = path[ahead]
+        kept += 1
+        i = ahead
+    return kept
+
+
+@kernel(STAR_SIGNATURE)
+def advance(
+    is_edge_free,
+    free_radius,
+    resolution,
+    robot,
+    obstacles,
+    bounds,
+    step_size,
+    clearance_gain,
+    goal_bias,
+    rewire_radius,
+    is_bidirectional,
+    bias,
+    beacons,
+    n_draws,
+    rng,
+    tree_q,
+    links,
+    costs,
+    sizes,
+    meetings,
+    best,
+    history,
+):
+    """
+    Make n_draws draws, or fewer if the path gets better; return how many were made.
+
+    beacons (n, dof): the inner waypoints of the shortened best path; every `bias`-th draw comes
+    from a ball of half a step round one of them (Nasir et al. 2013). history (n_draws,): cost of
+    the best path of the tree after each draw.
+    """
+    dof = tree_q.shape[2]
+    q = np.empty(dof)
+    for draw in range(n_draws):
+        side = draw & 1 if is_bidirectional else 0
+        if beacons.shape[0] > 0 and draw % bias == 0:
+            beacon = int64(rng.random() * beacons.shape[0])
+            draw_ball(beacons[beacon], 0.5 * step_size, bounds, rng, q)
+        elif rng.random() < goal_bias:
+            goal = int64(rng.random() * sizes[N_GOALS])
+            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+        else:
+            draw_uniform(bounds, rng, q)
+        is_better = extend(
+            is_edge_free,
+            free_radius,
+            resolution,
+            robot,
+            obstacles,
+            step_size,
+            clearance_gain,
+            rewire_radius,
+            is_bidirectional,
+            side,
+            q,
+            tree_q,
+            links,
+            costs,
+            sizes,
+            meetings,
+            best,
+        )
+        history[draw] = best[0]
+        if is_better:
+            return draw + 1
+    return n_draws
