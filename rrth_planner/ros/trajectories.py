@@ -120,8 +120,8 @@ def tool_path_to_msg(arm: ArmModel, trajectory: Trajectory, frame: str, n_poses:
     """Return the tool's poses at so many equal steps of time along a trajectory (n_poses > 1)."""
     msg = Path()
     msg.header.frame_id = frame
-    for q in sample(trajectory, np.linspace(0.0, trajectory.duration, n_poses))[0]:
-        msg.poses.append(pose_to_msg(tool_pose(arm, q), frame))
+    positions, _, _ = sample(trajectory, np.linspace(0.0, trajectory.duration, n_poses))
+    msg.poses = [pose_to_msg(T, frame) for T in tool_pose(arm, positions)]
     return msg
 
 
