@@ -1,0 +1,471 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The proof that a motion is free: never wrong, seldom undecided, silent about nonsense."""
+
+from dataclasses import replace
+import json
+import os
+import subprocess
+import sys
+
+import numba
+from numba.core.types import boolean, float64
+import numpy as np
+import pytest
+from rrth_planner.certificate import derivative_bounds
+from rrth_planner.kernels.arm_validity import (
+    is_configuration_free,
+    is_edge_free,
+    MAX_NODES,
+    MAX_OPEN,
+    prove_curve,
+)
+from rrth_planner.kernels.jit import (
+    BOX_HALF,
+    BOX_OFFSET,
+    BOX_ROWS,
+    D,
+    first_class,
+    kernel,
+    MAT,
+    VEC,
+)
+from rrth_planner.options import RRTHOptions
+from rrth_planner.oracle import bar_box_touch, bars, first_contact
+from rrth_planner.planner import plan
+from rrth_planner.problem import PlanningProblem
+from rrth_planner.scene import Box, Scene
+from rrth_planner.world import arm_world
+from worlds import (
+    bezier_quintic,
+    dense_touch,
+    edge_touches,
+    FOLDED,
+    free_configuration,
+    line,
+    MARGIN,
+    random_boxes,
+    random_chain,
+    RAY,
+    table_1_arm,
+    varied_body,
+    wearer,
+    wearer_world,
+)
+
+
+def decide(world, q_from, q_to):
+    """Return 1, 0 or -1: free, touching, undecided."""
+    curve = np.ascontiguousarray(line(q_from, q_to))
+    return prove_curve(
+        curve,
+        np.abs(curve[1]),
+        np.zeros(len(q_from)),
+        world.resolution,
+        world.robot,
+        world.obstacles,
+    )
+
+
+def is_free(world, q_from, q_to):
+    return is_edge_free(q_from, q_to, world.resolution, world.robot, world.obstacles)
+
+
+@pytest.fixture(scope='module')
+def taut_edges():
+    """Edges of shortened paths round the standing wearer: they pass its corners closely."""
+    world = wearer_world()
+    rng = np.random.default_rng(11)
+    options = RRTHOptions(club_attempts=0, improve_time=0.0)
+    edges = []
+    while len(edges) < 250:
+        q_start, q_goal = free_configuration(rng, world), free_configuration(rng, world)
+        if world.is_edge_valid(q_start, q_goal):
+            continue
+        problem = PlanningProblem(world=world, q_start=q_start, q_goals=[q_goal])
+        path = plan(problem, options, rng).path
+        if path is not None:
+            edges += zip(path.waypoints[:-1], path.waypoints[1:], strict=True)
+    return edges
+
+
+def test_configurations_are_judged_as_by_the_oracle():
+    rng = np.random.default_rng(12)
+    for arm in (table_1_arm(), table_1_arm(radius=0.03)):
+        for scene in (wearer(), varied_body(rng)):
+            world = arm_world(arm, scene, MARGIN, RAY)
+            q = rng.uniform(*arm.bounds, (2500, arm.dof))
+            got = [is_configuration_free(row, RAY, world.robot, world.obstacles) for row in q]
+            ends, touched = bars(arm, q, RAY), np.zeros(len(q), dtype=bool)
+            for box in scene.boxes:
+                half = 0.5 * box.size + MARGIN + arm.radii[0]
+                touched |= bar_box_touch(ends, box.center, box.rotation, half).any(axis=1)
+            assert np.array_equal(got, ~touched)
+            assert 300 < np.sum(got) < 2450
+
+
+def test_the_dense_oracle_of_the_tests_is_the_oracle():
+    rng = np.random.default_rng(13)
+    n_touching = 0
+    for i in range(60):
+        arm, scene = random_chain(rng, i % 2 == 0), random_boxes(rng, 4, spread=0.6)
+        thin = np.full(arm.dof + 1, 0.02)
+        object.__setattr__(arm, 'radii', thin)
+        q_from, q_to = rng.uniform(*arm.bounds, (2, arm.dof))
+        share = np.linspace(0.0, 1.0, 200)[:, None]
+        contact = first_contact(arm, scene, q_from + share * (q_to - q_from), 0.5, 0.01)
+        expected = -1 if contact is None else contact.index
+        assert dense_touch(arm, scene, 0.01, 0.5, line(q_from, q_to), 200) == expected
+        n_touching += contact is not None
+    assert 10 < n_touching < 58
+
+
+def test_no_random_edge_is_certified_that_touches():
+    rng = np.random.default_rng(14)
+    n_certified = n_touching = 0
+    for i in range(20):
+        scene = wearer() if i == 0 else varied_body(rng)
+        arm = table_1_arm(radius=0.0 if i % 3 else 0.02)
+        world = arm_world(arm, scene, MARGIN, RAY)
+        for _ in range(80):
+            q_from = free_configuration(rng, world)
+            step = rng.standard_normal(4)
+            step *= rng.choice([0.02, 0.3, 1.0, 3.0]) / np.linalg.norm(step)
+            proof = decide(world, q_from, q_from + step)
+            touches = edge_touches(arm, scene, MARGIN, RAY, q_from, q_from + step)
+            assert not (proof == 1 and touches)
+            assert proof != 0 or edge_touches(
+                arm, scene, MARGIN + 2e-9, RAY, q_from, q_from + step, 1e-4
+            )
+            n_certified += proof == 1
+            n_touching += touches
+    assert n_certified > 500
+    assert n_touching > 250
+
+
+def test_no_edge_of_any_chain_is_certified_that_touches():
+    rng = np.random.default_rng(15)
+    n_certified = n_refused = 0
+    for i in range(120):
+        arm, scene = random_chain(rng, i % 2 == 0), random_boxes(rng, 4, spread=0.7)
+        world = arm_world(arm, scene, 0.005, 0.6)
+        for _ in range(12):
+            q_from, q_to = rng.uniform(*arm.bounds, (2, arm.dof))
+            q_to = q_from + rng.choice([0.1, 0.5, 1.0]) * (q_to - q_from)
+            proof = decide(world, q_from, q_to)
+            touches = edge_touches(arm, scene, 0.005, 0.6, q_from, q_to, 1e-3)
+            assert not (proof == 1 and touches)
+            n_certified += proof == 1
+            n_refused += touches
+    assert n_certified > 300
+    assert n_refused > 300
+
+
+def grazing(world, arm, scene, edge, rng):
+    """Return an edge shifted until it touches by dense sampling, then back by a hair."""
+    shift = rng.standard_normal(len(edge[0]))
+    shift *= 0.3 / np.linalg.norm(shift)
+
+    def touches(share):
+        ends = [q + share * shift for q in edge]
+        return edge_touches(arm, scene, MARGIN, RAY, *ends)
+
+    low, high = 0.0, 1.0
+    if touches(low) or not touches(high):
+        return None
+    for _ in range(22):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if touches(middle) else (middle, high)
+    return low, high, shift
+
+
+def test_no_taut_or_grazing_edge_is_certified_that_touches(taut_edges):
+    rng = np.random.default_rng(16)
+    arm, scene, world = table_1_arm(), wearer(), wearer_world()
+    n_grazing = n_certified = 0
+    for edge in taut_edges:
+        assert not edge_touches(arm, scene, MARGIN, RAY, *edge, 2e-4)
+        found = grazing(world, arm, scene, edge, rng)
+        if found is None:
+            continue
+        low, high, shift = found
+        n_grazing += 1
+        for share in (low, high, high + 1e-7, high + 1e-5, low - 1e-7, low - 1e-4):
+            ends = [q + share * shift for q in edge]
+            if is_free(world, *ends):
+                n_certified += 1
+                assert not edge_touches(arm, scene, MARGIN, RAY, *ends, 1e-4)
+    assert n_grazing > 60
+    assert n_certified > 20
+
+
+def test_truly_free_taut_edges_are_nearly_all_certified(taut_edges):
+    rng = np.random.default_rng(17)
+    arm, scene, world = table_1_arm(), wearer(), wearer_world()
+    results = []
+    for edge in taut_edges:
+        found = grazing(world, arm, scene, edge, rng)
+        if found is None:
+            continue
+        # About a tenth of a millimetre from the wearer, or less.
+        ends = [q + (found[0] - 3e-4) * found[2] for q in edge]
+        if not edge_touches(arm, scene, MARGIN, RAY, *ends, 1e-4):
+            results.append(is_free(world, *ends))
+    assert len(results) > 60
+    assert np.mean(results) >= 0.97
+
+
+def test_planned_edges_are_certified_in_the_other_direction_too(taut_edges):
+    world = wearer_world()
+    # But for rounding.
+    assert np.mean([is_free(world, b, a) for a, b in taut_edges]) >= 0.97
+
+
+@kernel(boolean(VEC, VEC, float64, MAT, MAT))
+def is_free_at_instants(q_from, q_to, resolution, robot, boxes):
+    """Return whether an edge is free at instants of some spacing: no proof."""
+    length = 0.0
+    for k in range(q_from.shape[0]):
+        length += (q_to[k] - q_from[k]) ** 2
+    n = int(np.sqrt(length) / resolution) + 2
+    q = np.empty(q_from.shape[0])
+    for i in range(n):
+        for k in range(q.shape[0]):
+            q[k] = q_from[k] + i / (n - 1) * (q_to[k] - q_from[k])
+        if not is_configuration_free(q, robot[robot.shape[0] - 1, D], robot, boxes):
+            return False
+    return True
+
+
+def test_edges_pulled_taut_by_a_sampled_check_are_nearly_all_certified_if_free():
+    world, arm, scene = wearer_world(), table_1_arm(), wearer()
+    sampled = replace(world, edge_check=first_class(is_free_at_instants))
+    options = RRTHOptions(club_attempts=0, improve_time=0.0)
+    rng = np.random.default_rng(11)
+    results = []
+    while len(results) < 300:
+        q_start, q_goal = free_configuration(rng, world), free_configuration(rng, world)
+        if world.is_edge_valid(q_start, q_goal):
+            continue
+        problem = PlanningProblem(world=sampled, q_start=q_start, q_goals=[q_goal])
+        path = plan(problem, options, rng).path
+        if path is None:
+            continue
+        for a, b in zip(path.waypoints[:-1], path.waypoints[1:], strict=True):
+            if not edge_touches(arm, scene, MARGIN + 2e-9, RAY, a, b, 5e-5):
+                results.append(is_free(world, a, b))
+    assert np.mean(results) >= 0.97
+
+
+def test_no_quintic_is_proven_that_touches():
+    rng = np.random.default_rng(18)
+    n_proven = n_touching = 0
+    for i in range(500):
+        arm = table_1_arm() if i % 2 else random_chain(rng, i % 4 == 0)
+        scene = random_boxes(rng, 3) if i % 2 == 0 else varied_body(rng)
+        world = arm_world(arm, scene, 0.01, 0.7)
+        control = rng.uniform(*arm.bounds, (6, arm.dof))
+        middle = control.mean(axis=0)
+        curve = bezier_quintic(middle + rng.choice([0.05, 0.3, 1.0]) * (control - middle))
+        speed, bend = derivative_bounds(curve[None])
+        proof = prove_curve(
+            curve, speed[0], bend[0], world.resolution, world.robot, world.obstacles
+        )
+        touches = dense_touch(arm, scene, 0.01, 0.7, curve, 8000) >= 0
+        assert not (proof == 1 and touches)
+        n_proven += proof == 1
+        n_touching += touches
+    assert n_proven > 80
+    assert n_touching > 80
+
+
+def test_both_directions_of_an_edge_are_never_judged_opposite(taut_edges):
+    rng = np.random.default_rng(19)
+    world = wearer_world()
+    edges = [rng.uniform(*world.bounds, (2, 4)) for _ in range(1500)]
+    n_decided = 0
+    for a, b in [*edges, *taut_edges]:
+        forth, back = decide(world, a, b), decide(world, b, a)
+        assert {forth, back} != {0, 1}
+        n_decided += forth == back != -1
+    assert n_decided > 1400
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf, 1e19, 1e200])
+def test_an_edge_to_no_configuration_is_never_certified(value):
+    world = wearer_world()
+    for k in range(4):
+        q = FOLDED.copy()
+        q[k] = value
+        assert not is_free(world, FOLDED, q)
+        assert not is_free(world, q, FOLDED)
+        assert not is_free(world, q, q)
+
+
+@pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
+def test_a_configuration_that_is_none_is_never_free(value):
+    world = wearer_world()
+    for k in range(4):
+        q = FOLDED.copy()
+        q[k] = value
+        assert not is_configuration_free(q, RAY, world.robot, world.obstacles)
+        assert not world.is_valid(q)
+    assert not is_configuration_free(FOLDED, np.nan, world.robot, world.obstacles)
+
+
+def test_a_curve_with_a_number_that_is_none_is_never_proven():
+    world = wearer_world()
+    curve, speed, bend = line(FOLDED, FOLDED + 0.1), np.full(4, 0.1), np.zeros(4)
+    rest = (world.resolution, world.robot, world.obstacles)
+    assert prove_curve(curve, speed, bend, *rest) == 1
+    for which in range(3):
+        for index in range(4):
+            parts = [curve.copy(), speed.copy(), bend.copy()]
+            parts[which].flat[index] = np.nan
+            assert prove_curve(*parts, *rest) != 1, (which, index)
+
+
+def test_a_box_with_a_number_that_is_none_is_never_passed():
+    world = wearer_world()
+    # One box that fills the space where the arm is, broken row by row.
+    rows = np.zeros((BOX_ROWS, 1))
+    rows[:BOX_OFFSET, 0] = np.eye(3).ravel()
+    rows[BOX_HALF:] = 5.0
+    for row in range(BOX_ROWS):
+        broken = rows.copy()
+        broken[row] = np.nan
+        assert not is_edge_free(FOLDED, FOLDED + 0.1, 5e-4, world.robot, broken)
+        if row >= BOX_HALF:
+            broken[row] = np.inf
+            assert not is_edge_free(FOLDED, FOLDED + 0.1, 5e-4, world.robot, broken)
+
+
+def test_no_boxes_leave_everything_free_and_many_are_all_seen():
+    rng = np.random.default_rng(20)
+    arm = table_1_arm()
+    empty = arm_world(arm, Scene(()), MARGIN, RAY)
+    many = random_boxes(rng, 300, spread=1.6, largest=0.15)
+    crowded = arm_world(arm, many, 0.0, RAY)
+    n_certified = n_touching = 0
+    for _ in range(200):
+        a, b = rng.uniform(*arm.bounds, (2, 4))
+        assert is_free(empty, a, b)
+        b = a + 0.1 * (b - a)
+        touches = edge_touches(arm, many, 0.0, RAY, a, b)
+        certified = is_free(crowded, a, b)
+        assert not (certified and touches)
+        n_certified += certified
+        n_touching += touches
+    assert n_certified > 20
+    assert n_touching > 20
+
+
+def test_each_single_box_is_seen():
+    rng = np.random.default_rng(21)
+    arm = table_1_arm()
+    decisions = set()
+    for box in wearer().boxes:
+        alone = Scene((box,))
+        world = arm_world(arm, alone, MARGIN, RAY)
+        for _ in range(150):
+            a, b = rng.uniform(*arm.bounds, (2, 4))
+            b = a + 0.4 * (b - a)
+            proof = decide(world, a, b)
+            decisions.add((box.name, proof))
+            assert not (proof == 1 and edge_touches(arm, alone, MARGIN, RAY, a, b, 1e-3))
+    assert {(box.name, 1) for box in wearer().boxes} <= decisions
+    # The arm cannot reach the thighs, and may or may not find the left forearm.
+    for name in ('torso', 'head', 'upper_arm_right', 'upper_arm_left', 'forearm_right'):
+        assert (name, 0) in decisions
+
+
+def test_more_boxes_than_the_proof_has_room_for_are_refused():
+    arm = table_1_arm()
+    n = MAX_OPEN // 3 + 1
+    far = Box('far', (50.0, 0.0, 0.0), (0.1, 0.1, 0.1), np.eye(3))
+    world = arm_world(arm, Scene((far,) * n), MARGIN, RAY)
+    assert decide(world, FOLDED, FOLDED + 0.1) == -1
+    assert not is_free(world, FOLDED, FOLDED + 0.1)
+    touched = arm_world(arm, Scene((*(far,) * (n - 1), wearer().boxes[0])), MARGIN, RAY)
+    rng = np.random.default_rng(22)
+    for _ in range(20):
+        a, b = rng.uniform(*arm.bounds, (2, 4))
+        if edge_touches(arm, Scene((wearer().boxes[0],)), MARGIN, RAY, a, b, 1e-2):
+            assert not is_free(touched, a, b)
+
+
+def test_open_pairs_that_outgrow_their_room_are_refused(taut_edges):
+    n = MAX_OPEN // 3 // 8
+    crowd = arm_world(table_1_arm(), Scene(wearer().boxes * n), MARGIN, RAY)
+    decisions = [decide(crowd, *edge) for edge in taut_edges[:60]]
+    assert set(decisions) == {1, -1}
+
+
+def test_an_edge_longer_than_the_proof_has_room_for_is_refused():
+    world = wearer_world()
+    q_to = FOLDED + np.array([2.0 * MAX_NODES, 0.0, 0.0, 0.0])
+    assert decide(world, FOLDED, q_to) == -1
+
+
+SAMPLE = """
+import json
+import numpy as np
+from rrth_planner.certificate import derivative_bounds
+from rrth_planner.kernels.arm_validity import is_configuration_free, prove_curve
+from rrth_planner.kernels.geometry import bar_box_distance
+from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.options import RRTHOptions
+from rrth_planner.planner import plan
+from rrth_planner.problem import PlanningProblem
+from worlds import FOLDED, bezier_quintic, line, wearer_world
+
+rng = np.random.default_rng(5)
+world = wearer_world()
+rest = (world.resolution, world.robot, world.obstacles)
+proofs = []
+for _ in range(40):
+    q = rng.uniform(*world.bounds, (2, 4))
+    curve = np.ascontiguousarray(line(*q))
+    proofs.append(int(prove_curve(curve, np.abs(curve[1]), np.zeros(4), *rest)))
+    curve = bezier_quintic(rng.uniform(*world.bounds, (6, 4)) * 0.2 + 0.8 * q[0])
+    speed, bend = derivative_bounds(curve[None])
+    proofs.append(int(prove_curve(curve, speed[0], bend[0], *rest)))
+distances = []
+for _ in range(40):
+    start, step = rng.uniform(-1, 1, (2, 3))
+    distances.append(float(bar_box_distance(start, step, rng.uniform(0.1, 0.5, 3))))
+q_goal = np.array([2.2, -1.0, 0.3, -0.4])
+free = [
+    bool(is_configuration_free(q, 1.0, world.robot, world.obstacles))
+    for q in (FOLDED, q_goal, np.zeros(4))
+]
+problem = PlanningProblem(world=world, q_start=FOLDED, q_goals=[q_goal])
+options = RRTHOptions(club_attempts=0, time_limit=1000.0)
+path = plan(problem, options, np.random.default_rng(3)).path
+print(json.dumps([proofs, distances, free, [list(sine_cosine(x)) for x in (0.1, 7.0, -40.0)],
+                  None if path is None else path.waypoints.tolist()]))
+"""
+
+
+def run_sample(**environment):
+    folder = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    paths = [os.path.dirname(folder), folder, os.environ.get('PYTHONPATH', '')]
+    done = subprocess.run(
+        [sys.executable, '-c', SAMPLE],
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths), **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason='nothing is compiled')
+def test_interpreted_kernels_say_what_compiled_ones_say():
+    plain, compiled = run_sample(NUMBA_DISABLE_JIT='1'), run_sample(NUMBA_DISABLE_JIT='0')
+    assert plain[0] == compiled[0]
+    assert {0, 1} <= set(plain[0])
+    assert np.allclose(plain[1], compiled[1], rtol=0.0, atol=1e-12)
+    assert plain[2] == compiled[2]
+    assert np.allclose(plain[3], compiled[3], rtol=0.0, atol=1e-15)
+    assert np.allclose(plain[4], compiled[4], rtol=0.0, atol=1e-6)

@@ -1,0 +1,99 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Kinematics against numpy, the oracle and roboticstoolbox."""
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.oracle import frames
+from rrth_planner.scene import Scene
+from rrth_planner.world import arm_world
+from worlds import examples, kernel_bars, oracle_bars, random_chain, table_1_arm, wearer_world
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def test_sine_and_cosine_are_numpys_to_the_last_bits():
+    rng = np.random.default_rng(1)
+    angles = np.concatenate(
+        [
+            rng.uniform(-1e4, 1e4, 20000),
+            rng.uniform(-7.0, 7.0, 20000),
+            np.arange(-400, 400) * (0.25 * np.pi),
+            [0.0, -0.0, 1e-300, 1e-9],
+        ]
+    )
+    got = np.array([sine_cosine(x) for x in angles])
+    assert np.abs(got[:, 0] - np.sin(angles)).max() <= 2e-15
+    assert np.abs(got[:, 1] - np.cos(angles)).max() <= 2e-15
+
+
+def test_bars_of_the_paper_arm_are_those_of_the_oracle():
+    rng = np.random.default_rng(2)
+    arm, world = table_1_arm(), wearer_world()
+    q = rng.uniform(*(1.2 * arm.bounds), (10000, arm.dof))
+    expected = oracle_bars(arm, q, 1.7)
+    got = np.array([kernel_bars(arm, world, row, 1.7) for row in q])
+    assert np.abs(got - expected).max() < 1e-13
+
+
+@examples(150)
+@given(seed=SEEDS, has_tail=st.booleans())
+def test_bars_of_any_chain_are_those_of_the_oracle(seed, has_tail):
+    rng = np.random.default_rng(seed)
+    arm = random_chain(rng, has_tail)
+    world = arm_world(arm, Scene(()), 0.0, 0.8)
+    for q in rng.uniform(*arm.bounds, (5, arm.dof)):
+        got = kernel_bars(arm, world, q, 0.8)
+        assert np.abs(got - oracle_bars(arm, q, 0.8)[0]).max() < 1e-12
+        # Bars hang together, and only the ray knows how long it is.
+        assert np.array_equal(got[1:, 0], got[:-1, 1])
+        longer = kernel_bars(arm, world, q, 3.0)
+        assert np.array_equal(longer[:-1], got[:-1])
+        assert abs(np.linalg.norm(longer[-1, 1] - longer[-1, 0]) - 3.0) < 1e-12
+
+
+@examples(100)
+@given(seed=SEEDS, has_tail=st.booleans())
+def test_forward_kinematics_is_the_oracles(seed, has_tail):
+    rng = np.random.default_rng(seed)
+    arm = random_chain(rng, has_tail)
+    q = rng.uniform(*arm.bounds)
+    poses = forward_kinematics(arm, q)
+    assert np.abs(poses - frames(arm, q[None])[0]).max() < 1e-12
+    assert np.abs(poses[:, :3, :3] @ poses[:, :3, :3].mT - np.eye(3)).max() < 1e-12
+    assert np.array_equal(tool_pose(arm, q), poses[-1])
+
+
+@examples(60)
+@given(seed=SEEDS)
+def test_forward_kinematics_is_roboticstoolboxs(seed):
+    rtb = pytest.importorskip('roboticstoolbox')
+    rng = np.random.default_rng(seed)
+    arm = random_chain(rng, has_tail=bool(seed % 2))
+    links = [
+        rtb.PrismaticMDH(alpha=alpha, a=a, theta=offset, offset=d)
+        if slides
+        else rtb.RevoluteMDH(alpha=alpha, a=a, offset=offset, d=d)
+        for (alpha, a, offset, d), slides in zip(arm.dh[:-1], arm.is_prismatic, strict=True)
+    ]
+    # The tool's row is one more link that is never moved.
+    alpha, a, offset, d = arm.dh[-1]
+    links.append(rtb.RevoluteMDH(alpha=alpha, a=a, offset=offset, d=d))
+    robot = rtb.DHRobot(links)
+    q = rng.uniform(*arm.bounds)
+    expected = arm.T_base_mount @ robot.fkine(np.append(q, 0.0)).A
+    assert np.abs(tool_pose(arm, q) - expected).max() < 1e-12
+
+
+def test_pointing_error_is_the_distance_of_the_target_from_the_ray():
+    arm = table_1_arm()
+    q = np.array([0.3, -0.9, 0.4, 1.1])
+    T = tool_pose(arm, q)
+    on_ray = T[:3, 3] + 2.0 * T[:3, 2]
+    assert pointing_error(arm, q, on_ray) < 1e-14
+    assert pointing_error(arm, q, on_ray + 0.01 * T[:3, 0]) == pytest.approx(0.01)
+    # Behind the tool it is the distance from the tool, not from the line.
+    assert pointing_error(arm, q, T[:3, 3] - 0.5 * T[:3, 2]) == pytest.approx(0.5)

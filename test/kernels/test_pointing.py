@@ -1,0 +1,229 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Aiming in closed form, and sliding the goal along its manifold."""
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+from rrth_planner.aiming import check_pointing_arm, goal_configurations, target_in_mount
+from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.errors import ModelError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.pointing import aim, slide_goal, unwrap
+from rrth_planner.scene import Scene
+from rrth_planner.world import arm_world
+from worlds import (
+    dense_touch,
+    edge_touches,
+    examples,
+    free_configuration,
+    line,
+    MARGIN,
+    random_chain,
+    RAY,
+    table_1_arm,
+    wearer,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+TURN = 2.0 * np.pi
+
+
+def aimed(arm, world, target, q_near, branch, free):
+    """Return the completed configuration and its reach."""
+    q = np.full(arm.dof, np.nan)
+    q[:-2] = free
+    goal = PointingGoal(target)
+    return q, aim(world.robot, world.bounds, target_in_mount(arm, goal), q_near, branch, q)
+
+
+def check_aims(arm, seed, n):
+    """Check n random targets; return how many postures aim, and how many differ by branch."""
+    rng = np.random.default_rng(seed)
+    world = arm_world(arm, Scene(()), 0.0, RAY)
+    n_aiming = n_pairs = 0
+    for _ in range(n):
+        target = rng.uniform(-2.0, 2.0, 3)
+        q_near, free = rng.uniform(*arm.bounds), rng.uniform(*arm.bounds)[:-2]
+        found = []
+        for branch in range(2):
+            q, reach = aimed(arm, world, target, q_near, branch, free)
+            assert np.array_equal(q[:-2], free)
+            if reach < 0.0:
+                assert reach == -1.0
+                continue
+            assert world.is_in_bounds(q)
+            T = tool_pose(arm, q)
+            assert np.abs(T[:3, 3] + reach * T[:3, 2] - target).max() < 1e-9
+            assert pointing_error(arm, q, target) < 1e-9
+            found.append(q)
+        n_aiming += len(found)
+        if len(found) == 2:
+            gap = (found[0] - found[1] + np.pi) % TURN - np.pi
+            assert np.abs(gap).max() > 1e-3
+            n_pairs += 1
+    return n_aiming, n_pairs
+
+
+def test_both_branches_of_the_paper_arm_meet_the_target():
+    n_aiming, n_pairs = check_aims(table_1_arm(), 31, 1000)
+    assert n_aiming > 1900
+    assert n_pairs > 900
+
+
+@examples(150)
+@given(seed=SEEDS)
+def test_any_pan_and_tilt_tail_meets_the_target(seed):
+    arm = random_chain(np.random.default_rng(seed), has_tail=True)
+    check_pointing_arm(arm)
+    check_aims(arm, seed, 10)
+
+
+@pytest.mark.parametrize('tilt', [1.0, -1.0])
+@pytest.mark.parametrize('ray', [1.0, -1.0])
+def test_all_four_hands_of_a_tail_are_aimed(tilt, ray):
+    base = table_1_arm()
+    dh = base.dh.copy()
+    dh[-2, 0], dh[-1, 0] = tilt * np.pi / 2, ray * np.pi / 2
+    arm = type(base)(
+        joint_names=base.joint_names,
+        is_prismatic=base.is_prismatic,
+        dh=dh,
+        bounds=base.bounds,
+        radii=base.radii,
+        T_base_mount=base.T_base_mount,
+    )
+    assert check_aims(arm, 32, 200)[1] > 150
+
+
+def test_a_posture_that_aims_is_found_again_by_one_of_the_branches():
+    rng = np.random.default_rng(33)
+    arm = table_1_arm()
+    world = arm_world(arm, Scene(()), 0.0, RAY)
+    for q in rng.uniform(*arm.bounds, (300, 4)):
+        T = tool_pose(arm, q)
+        target = T[:3, 3] + 1.3 * T[:3, 2]
+        gaps = []
+        for branch in range(2):
+            again, reach = aimed(arm, world, target, q, branch, q[:-2])
+            if reach >= 0.0:
+                gaps.append(np.abs(again - q).max())
+        assert min(gaps) < 1e-9
+
+
+def test_a_target_on_the_pan_axis_is_refused():
+    arm = table_1_arm()
+    world = arm_world(arm, Scene(()), 0.0, RAY)
+    q = np.array([0.2, -0.7, 0.0, 0.0])
+    # The pan axis is that of link 3; the ray passes it at 38 mm.
+    pose = forward_kinematics(arm, q)[2]
+    for beside, is_met in ((0.0, False), (0.0379, False), (0.0381, True)):
+        target = pose[:3, 3] + 0.8 * pose[:3, 2] + beside * pose[:3, 0]
+        _, reach = aimed(arm, world, target, q, 0, q[:-2])
+        assert (reach >= 0.0) == is_met
+
+
+@examples(400)
+@given(
+    angle=st.floats(-50.0, 50.0),
+    lower=st.floats(-7.0, 3.0),
+    width=st.floats(0.01, 14.0),
+    share=st.floats(0.0, 1.0),
+)
+def test_unwrap_gives_the_nearest_equal_angle_within_limits(angle, lower, width, share):
+    upper = lower + width
+    near = lower + share * width
+    got = unwrap(angle, near, lower, upper)
+    candidates = angle + TURN * np.arange(-20, 21)
+    inside = candidates[(candidates >= lower + 1e-9) & (candidates <= upper - 1e-9)]
+    if np.isnan(got):
+        assert len(inside) == 0
+        return
+    assert lower <= got <= upper
+    turns = (got - angle) / TURN
+    assert abs(turns - round(turns)) < 1e-9
+    if len(inside):
+        assert abs(got - near) <= np.abs(inside - near).min() + 1e-9
+
+
+def test_arms_without_a_pan_and_tilt_tail_are_refused():
+    base = table_1_arm()
+
+    def changed(row, column, value):
+        dh = base.dh.copy()
+        dh[row, column] = value
+        return type(base)(
+            joint_names=base.joint_names,
+            is_prismatic=base.is_prismatic,
+            dh=dh,
+            bounds=base.bounds,
+            radii=base.radii,
+            T_base_mount=base.T_base_mount,
+        )
+
+    check_pointing_arm(base)
+    for row, column, value in ((-1, 0, 1.5), (-2, 0, 1.5), (-1, 1, 0.01), (-2, 1, 0.01)):
+        with pytest.raises(ModelError, match='pan and tilt'):
+            check_pointing_arm(changed(row, column, value))
+
+
+def test_free_goals_are_free_aim_and_come_nearest_first():
+    arm, scene = table_1_arm(), wearer()
+    world = arm_world(arm, scene, MARGIN, RAY)
+    rng = np.random.default_rng(34)
+    n_goals = 0
+    for _ in range(10):
+        target = rng.uniform(-1.5, 1.5, 3)
+        q_near = free_configuration(rng, world)
+        goals = goal_configurations(arm, PointingGoal(target), world, q_near, 128)
+        distances = np.linalg.norm(goals.q_goals - q_near, axis=1)
+        assert (np.diff(distances) >= 0.0).all()
+        assert goals.n_aiming >= len(goals.q_goals) + len(goals.q_blocked)
+        for q in goals.q_goals:
+            assert world.is_in_bounds(q)
+            assert pointing_error(arm, q, target) < 1e-9
+            ray = max(RAY, np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
+            assert dense_touch(arm, scene, MARGIN, ray, line(q, q), 1) < 0
+        n_goals += len(goals.q_goals)
+    assert n_goals > 100
+
+
+def test_sliding_never_lengthens_and_the_goal_stays_an_aim():
+    arm, scene = table_1_arm(), wearer()
+    world = arm_world(arm, scene, MARGIN, RAY)
+    rng = np.random.default_rng(35)
+    n_slid = 0
+    for _ in range(150):
+        target = rng.uniform(-1.5, 1.5, 3)
+        goal = PointingGoal(target)
+        q_start = free_configuration(rng, world)
+        goals = goal_configurations(arm, goal, world, q_start, 32).q_goals
+        usable = [q for q in goals if world.is_edge_valid(q_start, q)]
+        if not usable:
+            continue
+        path = np.full((8, 4), np.nan)
+        path[0], path[1] = q_start, usable[-1]
+        before = np.linalg.norm(path[1] - path[0])
+        gain = slide_goal(
+            world.edge_check,
+            world.resolution,
+            world.robot,
+            world.obstacles,
+            world.bounds,
+            target_in_mount(arm, goal),
+            path,
+            2,
+            2e-3,
+        )
+        after = np.linalg.norm(path[1] - path[0])
+        assert gain >= 0.0
+        assert before - after == pytest.approx(gain, abs=1e-12)
+        assert np.array_equal(path[0], q_start)
+        assert np.isnan(path[2:]).all()
+        assert world.is_in_bounds(path[1])
+        assert pointing_error(arm, path[1], target) < 1e-9
+        ray = max(RAY, np.linalg.norm(target - tool_pose(arm, path[1])[:3, 3]))
+        assert dense_touch(arm, scene, MARGIN, ray, line(path[1], path[1]), 1) < 0
+        assert not edge_touches(arm, scene, MARGIN, RAY, path[0], path[1])
+        n_slid += gain > 0.0
+    assert n_slid > 50

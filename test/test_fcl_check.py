@@ -1,0 +1,152 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The second opinion agrees with the kernels and finds what the oracle finds."""
+
+import numpy as np
+import pytest
+from rrth_planner.arm import tool_pose
+from rrth_planner.scene import Box, Scene
+from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.world import arm_world
+from worlds import (
+    dense_touch,
+    free_configuration,
+    random_boxes,
+    random_chain,
+    table_1_arm,
+    varied_body,
+    wearer,
+)
+
+fcl_check = pytest.importorskip('rrth_planner.fcl_check', exc_type=ImportError)
+
+
+def straight(q_from, q_to, duration=1.0):
+    """Return the motion from rest to rest along a line: one quintic."""
+    still = np.zeros((2, len(q_from)))
+    return Trajectory(
+        times=[0.0, duration],
+        positions=np.stack([q_from, q_to]),
+        velocities=still,
+        accelerations=still,
+    )
+
+
+def check_nearest(arm, scene, rng, n):
+    world = arm_world(arm, scene, 0.0, 1.0)
+    n_apart = 0
+    for q in rng.uniform(*arm.bounds, (n, arm.dof)):
+        distances = world.clearances(q)
+        touch = fcl_check.nearest(arm, scene, q, 1.0)
+        least = distances.min()
+        if least > 1e-4:
+            n_apart += 1
+            assert touch.distance == pytest.approx(least, abs=5e-6)
+            # Both offsets of a row have the same name.
+            rows = [name == touch.bar for name in world.bar_names]
+            named = distances[rows, world.box_names.index(touch.box)].min()
+            assert named == pytest.approx(least, abs=1e-5)
+        elif least < -1e-4:
+            assert touch.distance < 1e-5
+    return n_apart
+
+
+def test_nearest_is_the_kernels_least_clearance():
+    rng = np.random.default_rng(21)
+    arm = table_1_arm()
+    assert check_nearest(arm, wearer(), rng, 400) > 200
+    for _ in range(4):
+        assert check_nearest(arm, varied_body(rng), rng, 150) > 50
+
+
+def test_nearest_of_thick_and_sliding_chains_is_the_kernels():
+    rng = np.random.default_rng(22)
+    n_apart = 0
+    for i in range(15):
+        n_apart += check_nearest(random_chain(rng, i % 2 == 0), random_boxes(rng, 3), rng, 30)
+    assert n_apart > 100
+
+
+def test_contacts_deeper_than_a_millimetre_are_found():
+    rng = np.random.default_rng(23)
+    arm = table_1_arm()
+    n_touching = n_free = 0
+    for i in range(60):
+        scene = wearer() if i % 2 else varied_body(rng)
+        world = arm_world(arm, scene, 0.02, 1.0)
+        q_from, q_to = free_configuration(rng, world), free_configuration(rng, world)
+        trajectory = straight(q_from, q_to)
+        dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 4001))
+        curve = np.stack([q_from, q_to - q_from])
+        touch = fcl_check.first_touch(arm, scene, trajectory, 0.02, 1.0, 1.0)
+        # Round corners: what the grown boxes touch only at their edges may pass the margin.
+        if min(world.clearances(q).min() for q in dense[::8]) < -0.0125:
+            assert touch is not None
+            n_touching += 1
+        if dense_touch(arm, scene, 0.02, 1.0, curve, 8000) < 0:
+            assert touch is None
+            n_free += 1
+        if touch is not None:
+            q, _, _ = sample(trajectory, [touch.time])
+            bar, box = world.bar_names.index(touch.bar), world.box_names.index(touch.box)
+            own = arm_world(arm, scene, 0.0, 1.0).clearances(q[0])
+            assert own[bar, box] < 0.02 + 1e-5
+            earlier = dense[: int(touch.time * 4000) - 8 : 8]
+            bare = arm_world(arm, scene, 0.0, 1.0)
+            assert all(bare.clearances(q).min() > 0.019 for q in earlier)
+    assert n_touching > 8
+    assert n_free > 10
+
+
+def plate_beside(arm, q, gap):
+    """Return a plate square to the ray's side, `gap` [m] away from it at q."""
+    T = tool_pose(arm, q)
+    center = T[:3, 3] + 0.5 * T[:3, 2] + (gap + 0.05) * T[:3, 0]
+    return Scene((Box('plate', center, (0.1, 0.2, 0.4), T[:3, :3]),))
+
+
+def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre():
+    arm = table_1_arm()
+    q = np.array([0.3, -1.2, 0.4, 0.7])
+    hold = straight(q, q)
+    for gap in (0.01, 0.02, 0.05):
+        scene = plate_beside(arm, q, gap)
+        assert fcl_check.first_touch(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
+        touch = fcl_check.first_touch(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
+        assert touch is not None
+        assert (touch.time, touch.bar, touch.box) == (0.0, 'pointing ray', 'plate')
+        assert touch.distance == pytest.approx(gap, abs=5e-6)
+
+
+def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over():
+    arm = table_1_arm()
+    q_from, q_to = np.array([-1.5, -0.8, 0.0, 0.5]), np.array([1.5, -0.8, 0.0, 0.5])
+    T = tool_pose(arm, np.array([0.31, -0.8, 0.0, 0.5]))
+    thin = Scene((Box('blade', T[:3, 3] + 0.9 * T[:3, 2], (0.002,) * 3, np.eye(3)),))
+    for duration in (0.3, 1.0, 5.0):
+        touch = fcl_check.first_touch(arm, thin, straight(q_from, q_to, duration), 0.02, 1.0, 1.0)
+        assert touch is not None
+        assert touch.box == 'blade'
+
+
+def test_only_at_the_end_the_ray_counts_out_to_the_target():
+    arm = table_1_arm()
+    q_from, q_to = np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5])
+
+    def far_box(q):
+        T = tool_pose(arm, q)
+        return Scene((Box('far', T[:3, 3] + 1.8 * T[:3, 2], (0.1,) * 3, np.eye(3)),))
+
+    trajectory = straight(q_from, q_to)
+    assert fcl_check.first_touch(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
+    touch = fcl_check.first_touch(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
+    assert touch is not None
+    assert touch.time == trajectory.duration
+    middle = 0.5 * (q_from + q_to)
+    assert fcl_check.first_touch(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
+
+
+def test_nothing_touches_where_there_is_nothing():
+    arm = table_1_arm()
+    trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))
+    assert fcl_check.first_touch(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None

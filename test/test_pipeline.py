@@ -1,0 +1,281 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a body and a target to a motion: what is solved is safe, what is refused had to be."""
+
+import numpy as np
+import pytest
+from rrth_planner.aiming import target_in_mount
+from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.pointing import aim
+from rrth_planner.options import RRTHOptions
+from rrth_planner.oracle import first_contact
+from rrth_planner.scene import Box, Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.trajectory import sample
+from rrth_planner.world import arm_world
+from worlds import (
+    dense_touch,
+    FOLDED,
+    free_configuration,
+    limits,
+    line,
+    MARGIN,
+    RAY,
+    table_1_arm,
+    varied_body,
+    wearer,
+    wearer_world,
+)
+
+pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+OPTIONS = RRTHOptions(club_attempts=2, improve_time=1000.0, time_limit=1000.0, max_samples=4000)
+
+
+def ask(scene, q_start, target, *, seed=1, options=OPTIONS, margin=MARGIN, **more):
+    return pipeline.plan_motion(
+        table_1_arm(),
+        scene,
+        q_start,
+        PointingGoal(target),
+        limits(),
+        options,
+        margin=margin,
+        ray_guard_length=RAY,
+        seed=seed,
+        **more,
+    )
+
+
+@pytest.fixture(scope='module')
+def answers():
+    """Sixty requests round six wearers, and what came of them."""
+    rng = np.random.default_rng(91)
+    arm, results = table_1_arm(), []
+    for i in range(6):
+        scene = wearer() if i == 0 else varied_body(rng)
+        world = arm_world(arm, scene, MARGIN, RAY)
+        for _ in range(10):
+            q_start = free_configuration(rng, world)
+            # In the space before and round the wearer, some of it inside the wearer.
+            target = rng.uniform((-1.0, -1.5, -1.0), (2.0, 1.5, 1.2))
+            results.append((scene, q_start, target, ask(scene, q_start, target)))
+    return results
+
+
+def test_most_requests_are_solved(answers):
+    solved = [plan.status is PlanStatus.SOLVED for *_, plan in answers]
+    assert np.mean(solved) > 0.6
+
+
+def test_what_is_solved_never_touches_and_ends_on_target(answers):
+    arm, bounds = table_1_arm(), limits()
+    for scene, q_start, target, plan in answers:
+        if plan.status is not PlanStatus.SOLVED:
+            continue
+        trajectory = plan.trajectory
+        times = np.append(np.arange(0.0, trajectory.duration, 5e-4), trajectory.duration)
+        q, v, a = sample(trajectory, times)
+        assert first_contact(arm, scene, q, RAY, MARGIN) is None
+        reach = np.linalg.norm(target - tool_pose(arm, q[-1])[:3, 3])
+        assert first_contact(arm, scene, q[-1:], max(RAY, reach), MARGIN) is None
+        assert plan.reach == pytest.approx(reach, abs=1e-9)
+        assert pointing_error(arm, q[-1], target) < 1e-6
+        assert np.array_equal(q[0], q_start)
+        assert not trajectory.velocities[[0, -1]].any()
+        assert not trajectory.accelerations[[0, -1]].any()
+        assert (q >= arm.bounds[0] - 1e-9).all()
+        assert (q <= arm.bounds[1] + 1e-9).all()
+        assert (np.abs(v) <= bounds.velocity * 1.001).all()
+        assert (np.abs(a) <= bounds.acceleration * 1.001).all()
+        # Grown by the margin the oracle saw no contact, so the figure cannot be less.
+        assert plan.clearance >= MARGIN - 1e-6
+        assert 'clearance' in plan.sentence
+        assert f'seed {plan.seed}' in plan.sentence
+
+
+def aiming_postures(arm, scene, target, rng, n):
+    """Return random postures that aim, with their reach."""
+    world = arm_world(arm, scene, MARGIN, RAY)
+    local = target_in_mount(arm, PointingGoal(target))
+    for q_near in rng.uniform(*arm.bounds, (n, arm.dof)):
+        for branch in range(2):
+            q = q_near.copy()
+            reach = aim(world.robot, world.bounds, local, q_near, branch, q)
+            if reach >= 0.0:
+                yield q, reach
+
+
+def test_what_is_refused_had_to_be(answers):
+    rng = np.random.default_rng(92)
+    arm = table_1_arm()
+    n_refused = 0
+    for scene, _, target, plan in answers:
+        if plan.status is PlanStatus.SOLVED:
+            continue
+        n_refused += 1
+        assert plan.trajectory is None
+        assert plan.path is None
+        assert np.isnan(plan.clearance)
+        assert plan.status in (
+            PlanStatus.GOAL_IN_COLLISION,
+            PlanStatus.GOAL_UNREACHABLE,
+            PlanStatus.SAMPLE_LIMIT,
+        ), plan.sentence
+        if plan.status is PlanStatus.GOAL_UNREACHABLE:
+            assert not list(aiming_postures(arm, scene, target, rng, 5000))
+        if plan.status is PlanStatus.GOAL_IN_COLLISION:
+            assert any(f'"{box.name}"' in plan.sentence for box in scene.boxes)
+            for q, reach in aiming_postures(arm, scene, target, rng, 5000):
+                ray = max(RAY, reach)
+                assert dense_touch(arm, scene, MARGIN, ray, line(q, q), 1) >= 0
+    assert n_refused >= 2
+
+
+def test_a_target_in_the_wearer_is_refused_by_name():
+    for box in wearer().boxes:
+        plan = ask(wearer(), FOLDED, box.center)
+        assert plan.status is PlanStatus.GOAL_IN_COLLISION
+        assert f'inside box "{box.name}"' in plan.sentence
+    near = wearer().boxes[0].center + [0.15 + 0.5 * MARGIN, 0.0, 0.0]
+    plan = ask(wearer(), FOLDED, near)
+    assert plan.status is PlanStatus.GOAL_IN_COLLISION
+    assert 'margin' in plan.sentence
+    assert '"torso"' in plan.sentence
+
+
+def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_and_box():
+    # A target walled in on all sides but not inside a box.
+    target = np.array([1.5, -0.1, 0.4])
+    walls = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            size = np.full(3, 0.5)
+            size[axis] = 0.05
+            center = target.copy()
+            center[axis] += 0.2 * sign
+            walls.append(Box(f'wall_{axis}_{sign:g}', center, size, np.eye(3)))
+    scene = Scene((*wearer().boxes, *walls))
+    plan = ask(scene, FOLDED, target)
+    assert plan.status is PlanStatus.GOAL_IN_COLLISION
+    assert 'pointing ray' in plan.sentence
+    assert '"wall_' in plan.sentence
+
+
+def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
+    rng = np.random.default_rng(93)
+    world = wearer_world()
+    bare = wearer_world(margin=0.0)
+    said = set()
+    for _ in range(60):
+        q = rng.uniform(*world.bounds)
+        if world.is_valid(q):
+            continue
+        plan = ask(wearer(), q, [1.5, 0.0, 0.3])
+        assert plan.status is PlanStatus.START_IN_COLLISION
+        bar = next(name for name in world.bar_names if plan.sentence.startswith(name))
+        box = next(name for name in world.box_names if f'"{name}"' in plan.sentence)
+        pair = world.bar_names.index(bar), world.box_names.index(box)
+        assert world.clearances(q)[pair] <= 1e-9
+        is_inside = bare.clearances(q)[pair] < -1e-6
+        if is_inside:
+            assert 'inside' in plan.sentence
+        said.add(is_inside)
+    assert True in said
+
+
+def test_a_start_beyond_a_limit_is_refused_with_joint_and_limits():
+    arm = table_1_arm()
+    for k, name in enumerate(arm.joint_names):
+        for side in range(2):
+            q = FOLDED.copy()
+            q[k] = arm.bounds[side, k] + (0.1 if side else -0.1)
+            plan = ask(wearer(), q, [1.5, 0.0, 0.3])
+            assert plan.status is PlanStatus.START_OUT_OF_BOUNDS
+            assert plan.sentence.startswith(name)
+            for value in (q[k], *arm.bounds[:, k]):
+                assert f'{value:.6g}' in plan.sentence
+            assert 'rad' in plan.sentence
+        q = FOLDED.copy()
+        q[k] = np.nan
+        assert ask(wearer(), q, [1.5, 0.0, 0.3]).status is PlanStatus.START_OUT_OF_BOUNDS
+
+
+def test_an_arm_that_aims_already_holds_still():
+    rng = np.random.default_rng(94)
+    arm, world = table_1_arm(), wearer_world()
+    n = 0
+    while n < 5:
+        q = free_configuration(rng, world)
+        T = tool_pose(arm, q)
+        target = T[:3, 3] + 0.9 * T[:3, 2]
+        if not world.is_valid(q) or world.clearances(q).min() < 0.01:
+            continue
+        n += 1
+        plan = ask(wearer(), q, target)
+        assert plan.status is PlanStatus.SOLVED
+        assert plan.path.length < 1e-6
+        positions, velocities, _ = sample(plan.trajectory, np.linspace(0.0, 1.0, 50))
+        assert np.abs(positions - q).max() < 1e-6
+        assert np.abs(velocities).max() < 1e-3
+
+
+def test_the_same_seed_gives_the_same_bits(answers):
+    n_compared = 0
+    for scene, q_start, target, plan in answers[::6]:
+        again = ask(scene, q_start, target)
+        assert again.status is plan.status
+        if plan.status is PlanStatus.SOLVED:
+            n_compared += 1
+            for name in ('times', 'positions', 'velocities', 'accelerations'):
+                first, second = getattr(plan.trajectory, name), getattr(again.trajectory, name)
+                assert first.tobytes() == second.tobytes()
+            assert again.clearance == plan.clearance
+    assert n_compared > 3
+
+
+def test_a_request_that_is_cancelled_gives_no_motion(answers):
+    solved = [row for row in answers if row[3].status is PlanStatus.SOLVED]
+    blocked = [row for row in solved if len(row[3].path.waypoints) > 2]
+    assert blocked
+    scene, q_start, target, _ = blocked[0]
+    plan = ask(scene, q_start, target, should_stop=lambda: True)
+    assert plan.status is PlanStatus.CANCELLED
+    assert plan.trajectory is None
+
+
+def test_a_request_cancelled_before_it_began_gives_no_motion():
+    # The straight edge to this target is free, so nothing is ever grown.
+    plan = ask(wearer(), FOLDED, [-2.0, -0.3, 0.2], should_stop=lambda: True)
+    assert plan.status is PlanStatus.CANCELLED
+    assert plan.trajectory is None
+
+
+def test_a_start_a_hair_from_the_margin_is_not_blamed_on_the_goal():
+    arm = table_1_arm()
+    q = np.array([0.3, -1.2, 0.4, 0.7])
+    T = tool_pose(arm, q)
+    # A plate beside the ray, 5 micrometres further than the margin.
+    center = T[:3, 3] + 0.5 * T[:3, 2] + (0.05 + MARGIN + 5e-6) * T[:3, 0]
+    scene = Scene((Box('plate', center, (0.1, 0.2, 0.4), T[:3, :3]),))
+    world = arm_world(arm, scene, MARGIN, RAY)
+    assert world.is_valid(q)
+    # Plenty of postures aim at a target on the other side.
+    target = T[:3, 3] - 1.5 * T[:3, 0] + 0.5 * T[:3, 2]
+    plan = ask(scene, q, target)
+    assert plan.status is not PlanStatus.GOAL_IN_COLLISION, plan.sentence
+
+
+def test_nothing_in_the_way_is_no_special_case():
+    plan = ask(Scene(()), FOLDED, [1.0, 0.5, 0.3])
+    assert plan.status is PlanStatus.SOLVED
+    assert plan.clearance == np.inf
+
+
+def test_a_target_beside_the_pan_axis_is_still_reached_from_elsewhere():
+    arm = table_1_arm()
+    pose = forward_kinematics(arm, FOLDED)[2]
+    target = pose[:3, 3] + 0.8 * pose[:3, 2]
+    plan = ask(Scene(()), FOLDED, target)
+    assert plan.status is PlanStatus.SOLVED
+    assert pointing_error(arm, plan.path.waypoints[-1], target) < 1e-6
