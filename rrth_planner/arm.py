@@ -177,8 +177,8 @@ def _link_pose(alpha: float, a: float, theta: Array, d: Array) -> Array:
 
 
 def tool_pose(arm: ArmModel, q: Array) -> Array:
-    """Return the tool's pose in the base frame, its +z the pointing ray, shape (4, 4) [m]."""
-    pose: Array = forward_kinematics(arm, q)[-1]
+    """Return the tool's pose in the base frame, its +z the ray, (..., dof) -> (..., 4, 4) [m]."""
+    pose: Array = forward_kinematics(arm, q)[..., -1, :, :]
     return pose
 
 

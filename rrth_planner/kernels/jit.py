@@ -3,6 +3,7 @@
 """Argument types, column names and the one decorator of the compiled kernels."""
 
 from collections.abc import Callable
+import contextlib
 import hashlib
 import os
 from pathlib import Path
@@ -79,9 +80,24 @@ def _cache_folder() -> Path | None:
 CACHE_FOLDER = _cache_folder()
 
 
+def _stamp() -> Path | None:
+    # numba files what it keeps by the path of the source, so another checkout compiles anew.
+    path = hashlib.sha256(os.path.realpath(__file__).encode()).hexdigest()[:16]
+    return None if CACHE_FOLDER is None else CACHE_FOLDER / f'complete-{path}'
+
+
 def is_compiled() -> bool:
-    """Return whether the cache holds compiled kernels of these sources."""
-    return CACHE_FOLDER is not None and any(CACHE_FOLDER.rglob('*.nbc'))
+    """Return whether the planner's kernels have all been compiled, and kept, before."""
+    stamp = _stamp()
+    return stamp is not None and stamp.exists()
+
+
+def mark_compiled() -> None:
+    """Keep in mind that the planner's kernels are all compiled."""
+    stamp = _stamp()
+    if stamp is not None:
+        with contextlib.suppress(OSError):
+            stamp.touch()
 
 
 def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:

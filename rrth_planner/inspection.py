@@ -1,0 +1,133 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A second opinion on a motion before it is executed, from nothing that planned it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.errors import RrthError
+from rrth_planner.oracle import first_contact, frames, least_clearance, quintic_states
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import MotionLimits, Trajectory
+
+# Time between two instants at which a controller's states are looked at [s].
+PERIOD = 0.0005
+# Only every so many of them are asked for their clearance, which costs more.
+CLEARANCE_STRIDE = 8
+CONTACT_SLACK = 1e-6
+LIMIT_EXCESS = 0.01
+REST = 1e-6
+BOUND_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inspection:
+    """
+    The figures of a motion that was found safe.
+
+    Parameters
+    ----------
+    length : float
+        Of its path in joint space [rad].
+    duration : float
+        [s].
+    clearance : float
+        Least distance of the arm and its guarded ray from the wearer [m].
+    pointing_error : float
+        How far the ray passes by the target at the end [m].
+
+    """
+
+    length: float
+    duration: float
+    clearance: float
+    pointing_error: float
+
+
+class UnsafeMotionError(RrthError):
+    """A motion that must not be executed."""
+
+
+def inspect_motion(
+    arm: ArmModel,
+    scene: Scene,
+    trajectory: Trajectory,
+    limits: MotionLimits,
+    *,
+    q_present: Array,
+    target: Array,
+    margin: float,
+    ray_guard_length: float,
+    start_tolerance: float = 1e-4,
+    pointing_tolerance: float = 1e-3,
+) -> Inspection:
+    """
+    Return the figures of a motion, as a quintic-interpolating controller executes it.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    trajectory : Trajectory
+    limits : MotionLimits
+        Velocities and accelerations are held to them, with 1 % of grace.
+    q_present : ndarray, shape (dof,)
+        Where the arm is now [rad].
+    target : ndarray, shape (3,)
+        In the base frame [m].
+    margin, ray_guard_length : float
+        Clearance from every box, and how much of the ray keeps it in motion [m]; at the end the
+        ray keeps it as far as the target.
+    start_tolerance, pointing_tolerance : float
+        Greatest distance from the present state [rad], and from the target [m].
+
+    Raises
+    ------
+    UnsafeMotionError
+        The first thing that is wrong, with figures and units.
+
+    """
+    gap = float(np.abs(trajectory.positions[0] - q_present).max())
+    if not gap <= start_tolerance:
+        raise UnsafeMotionError(f'the motion begins {gap:.2e} away from the arm [rad]')
+    times, q, v, a = quintic_states(
+        trajectory.times,
+        trajectory.positions,
+        trajectory.velocities,
+        trajectory.accelerations,
+        PERIOD,
+    )
+    for what, unit, value in (('velocity', 'rad/s', v), ('acceleration', 'rad/s^2', a)):
+        for end in (0, -1):
+            if not np.abs(value[end]).max() <= REST:
+                raise UnsafeMotionError(
+                    f'{what} {value[end].tolist()} at an end, expected 0 [{unit}]'
+                )
+        limit = (1.0 + LIMIT_EXCESS) * getattr(limits, what)
+        if not (np.abs(value) <= limit).all():
+            worst = float((np.abs(value) / getattr(limits, what)).max())
+            raise UnsafeMotionError(f'{what} reaches {worst:.3f} times its limit, expected 1 [-]')
+    if not ((q >= arm.bounds[0] - BOUND_TOLERANCE) & (q <= arm.bounds[1] + BOUND_TOLERANCE)).all():
+        raise UnsafeMotionError('a joint leaves its range')
+    tool = frames(arm, q[-1:])[0, -1]
+    reach = float(np.linalg.norm(target - tool[:3, 3]))
+    error = float(np.linalg.norm(tool[:3, 3] + reach * tool[:3, 2] - target))
+    if not error <= pointing_tolerance:
+        raise UnsafeMotionError(f'the ray passes {1e3 * error:.2f} mm by the target')
+    for instants, ray in ((q, ray_guard_length), (q[-1:], reach)):
+        contact = first_contact(arm, scene, instants, ray, margin - CONTACT_SLACK)
+        if contact is not None:
+            when = times[-1] if len(instants) == 1 else times[contact.index]
+            raise UnsafeMotionError(
+                f'bar {contact.bar} of the arm comes closer than {margin} m to {contact.box} at '
+                f'{when:.3f} s'
+            )
+    return Inspection(
+        length=float(np.linalg.norm(np.diff(q, axis=0), axis=1).sum()),
+        duration=trajectory.duration,
+        clearance=least_clearance(arm, scene, q[::CLEARANCE_STRIDE], ray_guard_length),
+        pointing_error=error,
+    )

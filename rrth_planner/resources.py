@@ -1,0 +1,78 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Files that come with the package, found in a source tree and when installed."""
+
+from pathlib import Path
+import sys
+from typing import Any
+
+from rrth_planner.arm import arm_from_mapping, ArmModel
+from rrth_planner.errors import ModelError
+import yaml
+
+
+def resource_path(name: str) -> Path:
+    """
+    Return where a file of the package is.
+
+    Parameters
+    ----------
+    name : str
+        Relative to the project's root, as `config/arm.yaml`.
+
+    Raises
+    ------
+    ModelError
+        It is neither beside the package nor in the share folder of an installation.
+
+    """
+    folders = [Path(__file__).parent.parent, *_share_folders()]
+    for folder in folders:
+        if (folder / name).is_file():
+            return folder / name
+    raise ModelError(f'file {name}: not found, expected in one of {[str(f) for f in folders]}')
+
+
+def load_yaml(path: str | Path) -> Any:
+    """Return what a YAML file holds, or raise ModelError when it cannot be read."""
+    try:
+        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as problem:
+        reason = ' '.join(str(problem).split())
+        raise ModelError(f'file {path}: {reason}; expected a readable YAML file') from problem
+
+
+def load_arm(path: str | Path | None = None) -> ArmModel:
+    """
+    Return the arm that a YAML file describes, laid out as `config/arm.yaml`.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+        None or empty: the packaged arm.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, or describes no arm.
+
+    """
+    file = Path(path) if path else resource_path('config/arm.yaml')
+    try:
+        return arm_from_mapping(load_yaml(file))
+    except ModelError as problem:
+        if str(file) in str(problem):
+            raise
+        raise ModelError(f'file {file}: {problem}') from problem
+
+
+def _share_folders() -> list[Path]:
+    folders = [Path(sys.prefix) / 'share' / 'rrth_planner']
+    try:
+        # Only where ROS 2 is: the core also works without.
+        from ament_index_python.packages import get_package_share_directory
+
+        folders.insert(0, Path(get_package_share_directory('rrth_planner')))
+    except (ImportError, LookupError, OSError):
+        pass
+    return folders

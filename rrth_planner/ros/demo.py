@@ -1,0 +1,189 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The demo: planner and playback as processes, three targets, each motion judged and drawn."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack
+from functools import partial
+import os
+from pathlib import Path
+import signal
+import sys
+from typing import Any, NoReturn
+
+from geometry_msgs.msg import PointStamped
+import numpy as np
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from rrth_planner.arm import pointing_error
+from rrth_planner.errors import RrthError
+from rrth_planner.inspection import inspect_motion
+from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.ros.child_process import ChildProcess
+from rrth_planner.ros.demo_client import DemoClient, DemoError
+from rrth_planner.ros.message_files import message_from_file
+from rrth_planner.ros.messages import goal_from_msg, scene_of, WearerBody
+from rrth_planner.trajectory import MotionLimits
+from rrth_planner.viewers.plots import Motion, motion_figure
+from visualization_msgs.msg import MarkerArray
+
+POINTING_TOLERANCE = 1e-3
+DOTS_PER_INCH = 110
+HEADER = (
+    f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"aims past":>12}'
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demo and return the exit code."""
+    options = _parse(arguments)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _end)
+    try:
+        _run(options)
+    except (RrthError, OSError) as problem:
+        print(f'demo failed: {" ".join(str(problem).split())}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('demo interrupted', file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='demo',
+        description='Plan and play motions round a wearer, check them independently, draw them.',
+    )
+    parser.add_argument(
+        '--output', type=Path, default=Path('demo.png'), help='picture to write (%(default)s)'
+    )
+    parser.add_argument('--seed', type=int, default=1, help='of the planner; -1: fresh')
+    parser.add_argument(
+        '--timeout', type=float, default=180.0, help='longest wait for anything [s] (%(default)s)'
+    )
+    parser.add_argument(
+        '--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)'
+    )
+    parser.add_argument(
+        '--targets',
+        nargs='+',
+        default=['front', 'left', 'high'],
+        metavar='NAME',
+        help='msg_examples/target_NAME.yaml each (front left high)',
+    )
+    return parser.parse_args(arguments)
+
+
+def _run(options: argparse.Namespace) -> None:
+    if not options.output.absolute().parent.is_dir():
+        raise DemoError(f'--output {options.output}: its folder does not exist')
+    # Neither other robots nor other demos shall hear this one.
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    planner_file = resource_path('config/planner.yaml')
+    settings = load_yaml(planner_file)['/**']['ros__parameters']
+    body = _example(options.body, MarkerArray)
+    targets = {name: _example(f'target_{name}', PointStamped) for name in options.targets}
+
+    domain = os.environ['ROS_DOMAIN_ID']
+    print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
+    print('Only the first time, compiling the planner may take a minute.', flush=True)
+    with ExitStack() as stack:
+        children = [
+            stack.enter_context(
+                ChildProcess(
+                    f'rrth_planner.ros.{name}_node',
+                    ['--ros-args', '--params-file', str(file), *extra],
+                    partial(_show, name),
+                )
+            )
+            for name, file, extra in (
+                ('planner', planner_file, ['-p', f'seed:={options.seed}']),
+                ('playback', resource_path('config/playback.yaml'), []),
+            )
+        ]
+
+        def check() -> None:
+            for child in children:
+                child.check()
+
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        client = DemoClient(load_arm(settings.get('arm')), options.timeout, check)
+        stack.callback(client.destroy_node)
+        client.wait_for_nodes()
+        client.tell_body(body)
+        lines, figure = _visit(client, settings, body, targets)
+        figure.savefig(options.output, dpi=DOTS_PER_INCH)
+    print('\n' + '\n'.join([HEADER, *lines]))
+    print(f'\nEvery motion was judged safe by an independent check. Picture: {options.output}')
+
+
+def _visit(
+    client: DemoClient,
+    settings: dict[str, Any],
+    body: MarkerArray,
+    targets: dict[str, PointStamped],
+) -> tuple[list[str], Any]:
+    """Return a line of the table for each target, and the figure of all motions."""
+    frame, margin = settings['base_frame'], settings['margin']
+    arm, scene = load_arm(settings.get('arm')), scene_of(WearerBody().apply(body, 0.0, frame))
+    ray_guard_length = settings['ray_guard_length']
+    limits = MotionLimits(
+        velocity=np.broadcast_to(settings['max_velocity'], (arm.dof,)),
+        acceleration=np.broadcast_to(settings['max_acceleration'], (arm.dof,)),
+        jerk=np.broadcast_to(settings['max_jerk'], (arm.dof,)),
+    )
+    motions, lines = [], []
+    for name, message in targets.items():
+        target = goal_from_msg(message, frame).target
+        client.tell_target(message)
+        q_present = client.positions()
+        trajectory, planning_time = client.ask_for_motion()
+        found = inspect_motion(
+            arm,
+            scene,
+            trajectory,
+            limits,
+            q_present=q_present,
+            target=target,
+            margin=margin,
+            ray_guard_length=ray_guard_length,
+        )
+        client.wait_for_arrival(trajectory)
+        error = pointing_error(arm, client.positions(), target)
+        if not error <= POINTING_TOLERANCE:
+            raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
+        lines.append(
+            f'{name:10}{planning_time:9.1f} ms{found.length:7.2f} rad{found.duration:9.2f} s'
+            f'{found.clearance:10.3f} m{1e3 * error:9.3f} mm'
+        )
+        motions.append(
+            Motion(
+                label=name,
+                trajectory=trajectory,
+                target=target,
+                caption=f'{found.length:.2f} rad in {found.duration:.2f} s, '
+                f'{1e3 * found.clearance:.0f} mm clear, planned in {planning_time:.0f} ms',
+            )
+        )
+    return lines, motion_figure(arm, scene, motions, limits, ray_guard_length)
+
+
+def _show(name: str, line: str) -> None:
+    print(f'  {name:9}| {line}', flush=True)
+
+
+def _example(name: str, message_type: Any) -> Any:
+    return message_from_file(resource_path(f'msg_examples/{name}.yaml'), message_type)
+
+
+def _end(*_: Any) -> NoReturn:
+    """Turn a signal into an interrupt, so that the processes are ended."""
+    raise KeyboardInterrupt
+
+
+if __name__ == '__main__':
+    sys.exit(main())

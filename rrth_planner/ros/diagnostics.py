@@ -1,0 +1,115 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the planner is doing, as diagnostics."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rrth_planner.ros.error_codes import answer, ErrorCode
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.parameters import PlannerParameters
+
+STATUS_NAME = 'rrth_planner: planning'
+
+
+@dataclass(frozen=True, slots=True)
+class PlanReport:
+    """
+    The figures of the requests so far, and of the last one.
+
+    Parameters
+    ----------
+    n_requests, n_solved : int
+    code : ErrorCode or None
+        Of the last request; None before the first.
+    sentence : str
+    seed : int
+    planning_time : float
+        Of the plan itself [s].
+    response_time : float
+        From the request, its turn included, to the published trajectory [s].
+    duration : float
+        Of the motion [s].
+    length : float
+        Of the path [rad].
+    clearance : float
+        Least one [m].
+
+    """
+
+    n_requests: int = 0
+    n_solved: int = 0
+    code: ErrorCode | None = None
+    sentence: str = ''
+    seed: int = -1
+    planning_time: float = float('nan')
+    response_time: float = float('nan')
+    duration: float = float('nan')
+    length: float = float('nan')
+    clearance: float = float('nan')
+
+
+def diagnostics_msg(
+    stamp: Any, now: float, heard: Inputs, parameters: PlannerParameters, report: PlanReport
+) -> DiagnosticArray:
+    """
+    Return the diagnostics of the planner.
+
+    Parameters
+    ----------
+    stamp : builtin_interfaces.msg.Time
+        Of the message.
+    now : float
+        The same time, for the ages [s].
+    heard : Inputs
+    parameters : PlannerParameters
+        For the timeouts.
+    report : PlanReport
+
+    """
+    level, message = _summary(now, heard, parameters, report)
+    values = {
+        'last code': '' if report.code is None else f'{report.code.name} ({report.code.value})',
+        'last sentence': report.sentence,
+        'requests': str(report.n_requests),
+        'solved': str(report.n_solved),
+        'seed': str(report.seed),
+        'planning time [ms]': f'{report.planning_time * 1e3:.3f}',
+        'request to trajectory [ms]': f'{report.response_time * 1e3:.3f}',
+        'duration [s]': f'{report.duration:.3f}',
+        'path length [rad]': f'{report.length:.4f}',
+        'least clearance [m]': f'{report.clearance:.4f}',
+        'boxes': str(heard.body.value.at(now).n_boxes),
+    }
+    for name, topic in heard.all.items():
+        values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
+        values[f'refused messages, {name}'] = str(topic.n_refused)
+        values[f'last refusal, {name}'] = str(topic.refusal or '')
+    status = DiagnosticStatus(
+        level=level, name=STATUS_NAME, hardware_id='rrth_planner', message=message
+    )
+    status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+    msg = DiagnosticArray(status=[status])
+    msg.header.stamp = stamp
+    return msg
+
+
+def _summary(
+    now: float, heard: Inputs, parameters: PlannerParameters, report: PlanReport
+) -> tuple[bytes, str]:
+    if report.code is ErrorCode.FAILURE:
+        return DiagnosticStatus.ERROR, answer(report.code, report.sentence)
+    timeouts = ((heard.body, parameters.body_timeout), (heard.joints, parameters.joint_timeout))
+    for topic, timeout in timeouts:
+        if timeout > 0.0 and topic.received is not None and topic.age(now) > timeout:
+            return DiagnosticStatus.STALE, f'{topic.topic} is {topic.age(now):.3f} s old'
+    refused = [topic for topic in heard.all.values() if topic.is_last_refused]
+    if refused:
+        return DiagnosticStatus.WARN, f'{refused[0].topic} refused: {refused[0].refusal}'
+    missing = [topic.topic for topic in heard.all.values() if topic.received is None]
+    if missing:
+        return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
+    if report.code not in (None, ErrorCode.SUCCESS):
+        return DiagnosticStatus.WARN, answer(report.code, report.sentence)
+    return DiagnosticStatus.OK, report.sentence or 'ready'

@@ -1,0 +1,86 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of messages: the base frame, and whatever TF knows where tf2_ros is installed."""
+
+from collections.abc import Callable
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.time import Time
+from rrth_planner.arrays import Array
+from rrth_planner.errors import MessageError
+from rrth_planner.rotation import pose_matrix
+
+try:
+    import tf2_ros
+except ImportError:  # not among the wheels: only the base frame is known then
+    tf2_ros = None
+
+Lookup = Callable[[str], Array]
+
+
+class FrameError(MessageError):
+    """A frame that cannot be transformed to the base frame."""
+
+
+def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
+    """
+    Return the pose of a message's frame in the base frame, shape (4, 4) [m].
+
+    Parameters
+    ----------
+    frame : str
+        Of the header; empty stands for the base frame.
+    base_frame : str
+        The planner's frame.
+    lookup : callable or None
+        frame -> pose in the base frame; None: no other frame is known.
+
+    Raises
+    ------
+    FrameError
+        The frame is another one, and unknown.
+
+    """
+    if frame in ('', base_frame):
+        return np.eye(4)
+    if lookup is None:
+        raise FrameError(f'frame "{frame}", expected "{base_frame}" or an empty frame')
+    return lookup(frame)
+
+
+class Frames:
+    """The frames that TF knows, seen from the base frame."""
+
+    def __init__(self, node: Node, base_frame: str) -> None:
+        """Listen to TF where tf2_ros is installed."""
+        self._base_frame = base_frame
+        self._buffer = None
+        if tf2_ros is not None:
+            self._buffer = tf2_ros.Buffer(node=node)
+            self._listener = tf2_ros.TransformListener(self._buffer, node)
+
+    def lookup(self, frame: str) -> Array:
+        """
+        Return the latest pose of a frame in the base frame, shape (4, 4) [m].
+
+        Raises
+        ------
+        FrameError
+            No transform is known.
+
+        """
+        if self._buffer is None:
+            raise FrameError(
+                f'frame "{frame}", expected "{self._base_frame}" or an empty frame: '
+                'tf2_ros is not installed, so no other frame is known'
+            )
+        try:
+            stamped = self._buffer.lookup_transform(self._base_frame, frame, Time())
+        except tf2_ros.TransformException as problem:
+            raise FrameError(
+                f'frame "{frame}", expected a frame that TF can transform to '
+                f'"{self._base_frame}": {problem}'
+            ) from problem
+        t, r = stamped.transform.translation, stamped.transform.rotation
+        return pose_matrix((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))

@@ -1,0 +1,183 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner has heard: the last good body, target and joint positions, and refusals."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from rrth_planner.arrays import Array
+from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.error_codes import ErrorCode
+from rrth_planner.ros.messages import FrameError, scene_of, WearerBody
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.scene import Scene
+
+T = TypeVar('T')
+
+
+class RequestError(RrthError):
+    """A request that ends before it is planned, with the code of its answer."""
+
+    def __init__(self, code: ErrorCode, sentence: str) -> None:
+        """Keep the code beside the sentence."""
+        super().__init__(sentence)
+        self.code = code
+
+
+class Input(Generic[T]):
+    """
+    The last good value of one topic; a refused message changes nothing but the counts.
+
+    Parameters
+    ----------
+    topic : str
+        Its resolved name, for sentences.
+    empty : object
+        The value before the first message.
+
+    """
+
+    def __init__(self, topic: str, empty: T) -> None:
+        """Begin with nothing heard."""
+        self.topic = topic
+        self.value = empty
+        self.received: float | None = None
+        self.n_refused = 0
+        self.refusal: MessageError | None = None
+        self.is_last_refused = False
+
+    def accept(self, read: Callable[[], T], now: float) -> bool:
+        """Take what `read` returns, heard at a time [s]; return False when it refuses."""
+        try:
+            self.value = read()
+        except MessageError as problem:
+            self.n_refused += 1
+            self.refusal = problem
+            self.is_last_refused = True
+            return False
+        self.received = now
+        self.is_last_refused = False
+        return True
+
+    def age(self, now: float) -> float:
+        """Return the time since the last good message; inf before it [s]."""
+        return float('inf') if self.received is None else max(0.0, now - self.received)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanInputs:
+    """What one plan begins with: copies, which later messages do not change."""
+
+    scene: Scene
+    goal: PointingGoal
+    q_start: Array
+
+
+class Inputs:
+    """The three topics that a plan needs."""
+
+    def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
+        """Begin with nothing heard."""
+        self.body = Input(body_topic, WearerBody())
+        self.target: Input[PointingGoal | None] = Input(target_topic, None)
+        self.joints: Input[Array | None] = Input(joint_topic, None)
+
+    @property
+    def all(self) -> dict[str, Input[Any]]:
+        """The topics by the names that diagnostics give them."""
+        return {'body': self.body, 'target': self.target, 'joints': self.joints}
+
+    def at(
+        self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
+    ) -> PlanInputs:
+        """
+        Return what a plan that begins now goes by.
+
+        Parameters
+        ----------
+        now : float
+            [s].
+        parameters : PlannerParameters
+            For their timeouts.
+        goal : PointingGoal, optional
+            Of the request; without, the last target.
+
+        Raises
+        ------
+        RequestError
+            Something is missing, too old or, as the last target, refused.
+
+        """
+        scene = self._scene(now, parameters)
+        if goal is None:
+            goal = self._goal()
+        q_start = _require(
+            self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
+        )
+        _require_fresh(
+            self.joints,
+            now,
+            parameters.joint_timeout,
+            'joint_timeout',
+            ErrorCode.ROBOT_STATE_STALE,
+        )
+        return PlanInputs(scene, goal, q_start)
+
+    def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
+        _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
+        body = self.body.value.at(now)
+        if body.n_boxes == 0:
+            raise RequestError(
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+                f'the body on {self.body.topic} is empty: every box was deleted or its lifetime '
+                'has passed; expected at least one box of the wearer, since no motion is planned '
+                'blindly',
+            )
+        _require_fresh(
+            self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE
+        )
+        return scene_of(body)
+
+    def _goal(self) -> PointingGoal:
+        refusal = self.target.refusal
+        if self.target.is_last_refused and refusal is not None:
+            # Pointing at the target before it is not what was asked for.
+            code = (
+                ErrorCode.FRAME_TRANSFORM_FAILURE
+                if isinstance(refusal, FrameError)
+                else ErrorCode.INVALID_GOAL_CONSTRAINTS
+            )
+            raise RequestError(
+                code, f'the last message on {self.target.topic} was refused: {refusal}'
+            )
+        return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
+
+
+def _require(heard: Input[Any], what: str, expected: str) -> Any:
+    if heard.received is not None:
+        return heard.value
+    if heard.refusal is None:
+        raise RequestError(
+            ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+            f'no {what} yet on {heard.topic}, expected {expected}',
+        )
+    is_frame = isinstance(heard.refusal, FrameError)
+    raise RequestError(
+        ErrorCode.FRAME_TRANSFORM_FAILURE if is_frame else ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} refused messages: '
+        f'{heard.refusal}',
+    )
+
+
+def _require_fresh(
+    heard: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
+) -> None:
+    age = heard.age(now)
+    if timeout > 0.0 and age > timeout:
+        raise RequestError(
+            code,
+            f'the last good message on {heard.topic} is {age:.3f} s old, expected at most '
+            f'{timeout:g} s ({name})',
+        )

@@ -1,0 +1,110 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Keep the planner's inputs up to date with the three topics that it hears."""
+
+from collections.abc import Callable
+import time
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+from rclpy.node import Node
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.frames import Frames
+from rrth_planner.ros.inputs import Input, Inputs
+from rrth_planner.ros.messages import configuration_from_msg, goal_from_msg, has_joint_of
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.subscriptions import OpenSubscription
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker, MarkerArray
+
+# Refusals of one topic are warned about at most this often [s].
+WARNING_PERIOD = 5.0
+
+
+class Listener:
+    """
+    Read messages into the inputs; a refused one changes nothing, and is warned about.
+
+    Parameters
+    ----------
+    node : Node
+    parameters : PlannerParameters
+        For what never changes: the arm and the base frame.
+    inputs : Inputs
+        Kept up to date.
+    on_change : callable
+        Called when a topic is heard for the first time, is refused, or is good again.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: PlannerParameters,
+        inputs: Inputs,
+        on_change: Callable[[], None],
+    ) -> None:
+        """Begin to listen."""
+        self._node = node
+        self._joint_names = parameters.arm.joint_names
+        self._base_frame = parameters.base_frame
+        self._on_change = on_change
+        self._frames = Frames(node, parameters.base_frame)
+        self._warned: dict[str, float] = {}
+        self._has_warned_of_empty_frame: set[str] = set()
+        self._inputs = inputs
+        self._subscriptions = [
+            OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body),
+            OpenSubscription(node, PointStamped, 'target', self._on_target),
+            OpenSubscription(node, JointState, 'joint_states', self._on_joints),
+        ]
+
+    def goal(self, msg: PointStamped) -> PointingGoal:
+        """Return the goal of a request's own target, or raise MessageError."""
+        return goal_from_msg(msg, self._base_frame, self._frames.lookup)
+
+    def _on_body(self, msg: MarkerArray) -> None:
+        now, body = self._now(), self._inputs.body
+        if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
+            self._warn_of_empty_frame(body)
+        self._take(
+            body, lambda: body.value.apply(msg, now, self._base_frame, self._frames.lookup), now
+        )
+
+    def _on_target(self, msg: PointStamped) -> None:
+        if not msg.header.frame_id:
+            self._warn_of_empty_frame(self._inputs.target)
+        self._take(self._inputs.target, lambda: self.goal(msg), self._now())
+
+    def _on_joints(self, msg: JointState) -> None:
+        # Other machines share this topic; a message without any joint of ours is none of ours.
+        if has_joint_of(msg, self._joint_names):
+            self._take(
+                self._inputs.joints,
+                lambda: configuration_from_msg(msg, self._joint_names),
+                self._now(),
+            )
+
+    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> None:
+        was_good = heard.received is not None and not heard.is_last_refused
+        is_good = heard.accept(read, now)
+        if not is_good:
+            self._warn(heard)
+        if is_good != was_good:
+            self._on_change()
+
+    def _warn(self, heard: Input[Any]) -> None:
+        present = time.monotonic()
+        if present - self._warned.get(heard.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[heard.topic] = present
+            self._node.get_logger().warning(f'{heard.topic} refused: {heard.refusal}')
+
+    def _warn_of_empty_frame(self, heard: Input[Any]) -> None:
+        if heard.topic not in self._has_warned_of_empty_frame:
+            self._has_warned_of_empty_frame.add(heard.topic)
+            self._node.get_logger().warning(
+                f'{heard.topic}: empty frame, taken as "{self._base_frame}"'
+            )
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9

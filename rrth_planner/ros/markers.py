@@ -1,0 +1,102 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What RViz shows of a plan: the body with its margin, the arm, its ray and the tool's path."""
+
+from collections.abc import Iterable
+
+from geometry_msgs.msg import Point
+from nav_msgs.msg import Path
+import numpy as np
+from rrth_planner.arm import ArmModel, forward_kinematics
+from rrth_planner.arrays import Array
+from rrth_planner.rotation import quaternion_xyzw
+from rrth_planner.scene import Box, Scene
+from rrth_planner.trajectory import Trajectory
+from visualization_msgs.msg import Marker, MarkerArray
+
+Color = tuple[float, float, float, float]
+
+BODY: Color = (0.85, 0.65, 0.55, 0.35)
+START: Color = (0.45, 0.45, 0.50, 1.0)
+GOAL: Color = (0.10, 0.35, 0.75, 1.0)
+RAY: Color = (0.90, 0.15, 0.15, 0.9)
+TOOL_PATH: Color = (0.15, 0.60, 0.30, 1.0)
+BAR_WIDTH, LINE_WIDTH = 0.02, 0.006
+
+
+def plan_markers(
+    arm: ArmModel,
+    scene: Scene,
+    margin: float,
+    trajectory: Trajectory,
+    target: Array,
+    tool_path: Path,
+) -> MarkerArray:
+    """
+    Return all markers of a plan; the first one clears those of the plan before.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+    margin : float
+        Boxes are shown grown by it on every side [m].
+    trajectory : Trajectory
+    target : ndarray, shape (3,)
+        In the base frame [m].
+    tool_path : Path
+        Its frame is that of the markers.
+
+    """
+    frame = tool_path.header.frame_id
+    q_start, q_goal = trajectory.positions[0], trajectory.positions[-1]
+    tool = forward_kinematics(arm, q_goal)[-1, :3, 3]
+    steps = [pose.pose.position for pose in tool_path.poses]
+    return MarkerArray(
+        markers=[
+            Marker(action=Marker.DELETEALL),
+            *(_cube(frame, k, box, margin) for k, box in enumerate(scene.boxes)),
+            _line(frame, 'arm_start', _points(_bars(arm, q_start)), BAR_WIDTH, START),
+            _line(frame, 'arm_goal', _points(_bars(arm, q_goal)), BAR_WIDTH, GOAL),
+            _line(frame, 'ray', _points((tool, target)), LINE_WIDTH, RAY),
+            _line(frame, 'tool_path', steps, LINE_WIDTH, TOOL_PATH),
+        ]
+    )
+
+
+def _bars(arm: ArmModel, q: Array) -> list[Array]:
+    """Return the corners of the arm's bars in the base frame, from the mount outwards [m]."""
+    corners = [arm.T_base_mount[:3, 3]]
+    for i, T in enumerate(forward_kinematics(arm, q)):
+        slide = q[i] if i < arm.dof and arm.is_prismatic[i] else 0.0
+        for corner in (T[:3, 3] - (arm.dh[i, 3] + slide) * T[:3, 2], T[:3, 3]):
+            if np.abs(corner - corners[-1]).max() > 1e-9:
+                corners.append(corner)
+    return corners
+
+
+def _points(positions: Iterable[Array]) -> list[Point]:
+    return [Point(x=float(x), y=float(y), z=float(z)) for x, y, z in positions]
+
+
+def _marker(frame: str, ns: str, index: int, kind: int, color: Color) -> Marker:
+    marker = Marker(ns=ns, id=index, type=kind, action=Marker.ADD)
+    marker.header.frame_id = frame
+    marker.color.r, marker.color.g, marker.color.b, marker.color.a = color
+    return marker
+
+
+def _line(frame: str, ns: str, points: list[Point], width: float, color: Color) -> Marker:
+    marker = _marker(frame, ns, 0, Marker.LINE_STRIP, color)
+    marker.scale.x = width
+    marker.points = points
+    return marker
+
+
+def _cube(frame: str, index: int, box: Box, margin: float) -> Marker:
+    marker = _marker(frame, 'body', index, Marker.CUBE, BODY)
+    p, o, s = marker.pose.position, marker.pose.orientation, marker.scale
+    p.x, p.y, p.z = box.center.tolist()
+    o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
+    s.x, s.y, s.z = (box.size + 2.0 * margin).tolist()
+    return marker

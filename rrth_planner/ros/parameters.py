@@ -1,0 +1,213 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner may be told: fields of the core's options as ROS parameters, and back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.errors import OptionsError, RrthError
+from rrth_planner.options import RRTHOptions
+from rrth_planner.resources import load_arm
+from rrth_planner.trajectory import MotionLimits
+
+ALGORITHMS = {'rrt_h': RRTHOptions}
+LONGEST_TIMEOUT = 86400.0
+LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
+LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One parameter: its name, default, range (None: no range), unit and meaning."""
+
+    name: str
+    default: Any
+    low: float | None
+    high: float | None
+    unit: str
+    description: str
+    is_read_only: bool = False
+
+    @property
+    def descriptor(self) -> ParameterDescriptor:
+        """What `ros2 param describe` shows; a step other than 0 would refuse values."""
+        msg = ParameterDescriptor(
+            description=f'{self.description} [{self.unit}]', read_only=self.is_read_only
+        )
+        if self.low is None or self.high is None:
+            return msg
+        if isinstance(self.default, int):
+            msg.integer_range = [IntegerRange(from_value=self.low, to_value=self.high)]
+        else:
+            msg.floating_point_range = [
+                FloatingPointRange(from_value=float(self.low), to_value=float(self.high))
+            ]
+        return msg
+
+
+ARM = Setting(
+    'arm',
+    '',
+    None,
+    None,
+    'path of a YAML file',
+    'the arm, as config/arm.yaml; empty: that one',
+    True,
+)
+
+
+def settings(dof: int) -> tuple[Setting, ...]:
+    """Return all parameters but `arm`, for an arm of so many joints."""
+    each = f'of each of the {dof} joints, or one value for all'
+    limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
+    timeout = (0.0, LONGEST_TIMEOUT, 's')
+    return (
+        Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the wearer', True),
+        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'how to search'),
+        Setting('seed', -1, -1, 2**31 - 1, '-', 'of the random draws; -1: fresh each time'),
+        Setting('margin', 0.02, 0.0, 1.0, 'm', 'clearance kept from every box'),
+        Setting(
+            'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
+        ),
+        Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
+        Setting(
+            'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
+        ),
+        Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
+        Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
+        *(
+            Setting(
+                f.name,
+                f.default,
+                f.metadata['low'],
+                f.metadata['high'],
+                f.metadata['unit'],
+                f.metadata['description'],
+            )
+            for f in fields(RRTHOptions)
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlannerParameters:
+    """
+    All parameters as the core wants them, checked; a plan keeps the ones that it began with.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    base_frame : str
+    seed : int
+        -1: fresh each time.
+    margin, ray_guard_length : float
+        [m].
+    body_timeout, joint_timeout : float
+        [s]; 0: never.
+    limits : MotionLimits
+    options : RRTHOptions
+
+    """
+
+    arm: ArmModel
+    base_frame: str
+    seed: int
+    margin: float
+    ray_guard_length: float
+    body_timeout: float
+    joint_timeout: float
+    limits: MotionLimits
+    options: RRTHOptions
+
+
+def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
+    """
+    Return the parameters that values by name describe.
+
+    Raises
+    ------
+    OptionsError
+        The first value that is refused: its name, what was given, what is expected, the unit.
+
+    """
+    if values['algorithm'] not in ALGORITHMS:
+        raise OptionsError(
+            f'algorithm: "{values["algorithm"]}", expected one that is available: '
+            f'{", ".join(ALGORITHMS)}'
+        )
+    if not values['base_frame']:
+        raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
+    return PlannerParameters(
+        arm=arm,
+        base_frame=values['base_frame'],
+        seed=values['seed'],
+        margin=values['margin'],
+        ray_guard_length=values['ray_guard_length'],
+        body_timeout=values['body_timeout'],
+        joint_timeout=values['joint_timeout'],
+        limits=MotionLimits(
+            velocity=_of_each_joint('max_velocity', values, arm.dof),
+            acceleration=_of_each_joint('max_acceleration', values, arm.dof),
+            jerk=_of_each_joint('max_jerk', values, arm.dof),
+        ),
+        options=RRTHOptions(**{f.name: values[f.name] for f in fields(RRTHOptions)}),
+    )
+
+
+def declare_parameters(node: Node) -> PlannerParameters:
+    """
+    Declare all parameters on a node, and let it refuse bad values from now on.
+
+    Raises
+    ------
+    RrthError
+        A value that the node was started with is refused, or describes no arm.
+
+    """
+    node.declare_parameter(ARM.name, ARM.default, ARM.descriptor)
+    arm = load_arm(node.get_parameter(ARM.name).value)
+    for setting in settings(arm.dof):
+        node.declare_parameter(setting.name, setting.default, setting.descriptor)
+
+    def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
+        values = _values(node, arm) | {change.name: change.value for change in changes}
+        try:
+            parameters_from_values(values, arm)
+        except RrthError as problem:
+            return SetParametersResult(successful=False, reason=str(problem))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(refuse_bad)
+    return current_parameters(node, arm)
+
+
+def current_parameters(node: Node, arm: ArmModel) -> PlannerParameters:
+    """Return what the parameters of a node are now."""
+    return parameters_from_values(_values(node, arm), arm)
+
+
+def _values(node: Node, arm: ArmModel) -> dict[str, Any]:
+    return {setting.name: node.get_parameter(setting.name).value for setting in settings(arm.dof)}
+
+
+def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
+    given = list(values[name])
+    if len(given) not in (1, dof) or not all(LOWEST_LIMIT <= v <= HIGHEST_LIMIT for v in given):
+        raise OptionsError(
+            f'{name}: {given}, expected {dof} values, or one for all joints, from '
+            f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{LIMIT_UNITS[name]}]'
+        )
+    return np.array(given if len(given) == dof else given * dof)

@@ -1,0 +1,137 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Requests one after the other, in a thread of their own, so that the node hears meanwhile."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+import time
+import traceback
+from typing import Any
+
+from nav_msgs.msg import Path
+from rclpy.node import Node
+from rclpy.task import Future
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.diagnostics import PlanReport
+from rrth_planner.ros.error_codes import ErrorCode
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.publishers import PlanPublishers
+from rrth_planner.ros.reporter import Reporter
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """What a request is answered: was a motion published, the text, the tool's path."""
+
+    is_solved: bool
+    text: str
+    tool_path: Path
+
+
+class PlanQueue:
+    """
+    Plan and publish for one request at a time; the others wait their turn.
+
+    Parameters
+    ----------
+    node : Node
+    heard : Inputs
+    reporter : Reporter
+        Its parameters, as they are when a request's turn begins, are those of the plan.
+    plan_request : callable
+        `requests.plan_request`, which is loaded late.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        heard: Inputs,
+        reporter: Reporter,
+        plan_request: Callable[..., Any],
+    ) -> None:
+        """Start with nothing to do."""
+        self._node, self._heard, self._reporter = node, heard, reporter
+        self._plan_request = plan_request
+        self._publishers = PlanPublishers(node)
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
+        self._n_cancels = 0
+        self._n_open = 0
+
+    async def respond(self, goal: PointingGoal | None) -> Response:
+        """Return the response to a request for a goal, or for the last target, after its turn."""
+        future = Future()
+        begin, n_cancels = time.perf_counter(), self._n_cancels
+
+        def work() -> None:
+            try:
+                future.set_result(self._work(goal, begin, lambda: self._n_cancels != n_cancels))
+            except BaseException as problem:
+                future.set_exception(problem)
+            executor = self._node.executor
+            if executor is not None:
+                executor.wake()
+
+        self._n_open += 1
+        try:
+            self._worker.submit(work)
+            return await future
+        finally:
+            self._n_open -= 1
+
+    def cancel(self) -> int:
+        """End the request in progress and those that wait; return how many these are."""
+        self._n_cancels += 1
+        return self._n_open
+
+    def close(self) -> None:
+        """End everything; no request may follow."""
+        self.cancel()
+        self._worker.shutdown(wait=True, cancel_futures=True)
+
+    def _work(
+        self, goal: PointingGoal | None, begin: float, should_stop: Callable[[], bool]
+    ) -> Response:
+        """Plan, publish and conclude; called in the worker's thread."""
+        figures, path, outcome = PlanReport(), Path(), None
+        parameters = self._reporter.parameters
+        try:
+            outcome = self._plan_request(self._heard, parameters, self._now, should_stop, goal)
+            code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
+            if plan is not None:
+                figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
+            if outcome.trajectory is not None:
+                self._publishers.publish_motion(outcome.trajectory, parameters)
+                figures = replace(
+                    figures,
+                    response_time=time.perf_counter() - begin,
+                    duration=plan.trajectory.duration,
+                    length=plan.path.length,
+                    clearance=plan.clearance,
+                )
+        except Exception as problem:
+            # Whatever it is, the caller gets an answer, and the node lives on.
+            self._node.get_logger().error(traceback.format_exc())
+            code, sentence, outcome = ErrorCode.FAILURE, _in_a_sentence(problem), None
+        if outcome is not None and outcome.trajectory is not None:
+            path = self._show(outcome, parameters)
+        text = self._reporter.conclude(code, sentence, figures)
+        return Response(code is ErrorCode.SUCCESS, text, path)
+
+    def _show(self, outcome: Any, parameters: Any) -> Path:
+        """Publish what shows a motion; a failure of this does not unsay the motion."""
+        try:
+            return self._publishers.publish_view(
+                outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
+            )
+        except Exception:
+            self._node.get_logger().error(traceback.format_exc())
+            return Path()
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9
+
+
+def _in_a_sentence(problem: Exception) -> str:
+    return f'planning failed unexpectedly: {type(problem).__name__}: {problem}'

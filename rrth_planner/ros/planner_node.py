@@ -1,0 +1,171 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planner as a ROS 2 node: what it offers, and how it starts and ends."""
+
+from collections.abc import Callable
+import signal
+import sys
+import time
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+from nav_msgs.srv import GetPlan
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+from rrth_planner.errors import MessageError, ModelError, RrthError
+from rrth_planner.ros.diagnostics import PlanReport
+from rrth_planner.ros.error_codes import answer, ErrorCode
+from rrth_planner.ros.frames import FrameError
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.listener import Listener
+from rrth_planner.ros.parameters import current_parameters, declare_parameters
+from rrth_planner.ros.plan_queue import PlanQueue
+from rrth_planner.ros.reporter import Reporter
+from std_srvs.srv import Trigger
+
+NAME = 'rrth_planner'
+BEGIN = time.monotonic()
+
+
+class PlannerNode(Node):
+    """Plan a motion that points the arm at a target, from what was heard last, on request."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        """
+        Listen, compile or load the planner, and only then offer the services.
+
+        Raises
+        ------
+        RrthError
+            A parameter that is refused, an arm that cannot be planned for, no python-fcl.
+
+        """
+        super().__init__(NAME, **kwargs)
+        parameters = declare_parameters(self)
+        heard = Inputs(
+            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        )
+        self._reporter = Reporter(self, heard, parameters)
+        self.add_post_set_parameters_callback(self._on_parameters)
+        self._listener = Listener(self, parameters, heard, self._reporter.publish)
+        self._queue = PlanQueue(self, heard, self._reporter, self._load_planner())
+        group = ReentrantCallbackGroup()
+        self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)
+        self.create_service(GetPlan, '~/get_plan', self._on_get_plan, callback_group=group)
+        self.create_service(Trigger, '~/cancel', self._on_cancel, callback_group=group)
+        self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
+
+    def close(self) -> None:
+        """End the plan in progress, those that wait, and the worker."""
+        self._queue.close()
+
+    def _load_planner(self) -> Callable[..., Any]:
+        """Return what plans, compiled; imported here, since that may take up to a minute."""
+        try:
+            import fcl  # noqa: F401
+        except ImportError as problem:
+            raise ModelError(
+                f'python-fcl: {problem}, expected an installed one for the second check of every '
+                'motion (pip install python-fcl)'
+            ) from problem
+        from rrth_planner.kernels.jit import is_compiled
+
+        if not is_compiled():
+            self.get_logger().info(
+                'compiling kernels, once for this machine: takes up to a minute'
+            )
+        from rrth_planner.pipeline import warm_up
+        from rrth_planner.ros.requests import plan_request
+
+        warm_up(self._reporter.parameters.arm)
+        return plan_request
+
+    def _on_parameters(self, _: Any) -> None:
+        self._reporter.parameters = current_parameters(self, self._reporter.parameters.arm)
+
+    async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        found = await self._queue.respond(None)
+        response.success, response.message = found.is_solved, found.text
+        return response
+
+    async def _on_get_plan(
+        self, request: GetPlan.Request, response: GetPlan.Response
+    ) -> GetPlan.Response:
+        try:
+            if request.start.header.frame_id:
+                raise MessageError(
+                    f'start: frame "{request.start.header.frame_id}", expected an empty start, '
+                    'since a plan begins where the arm is'
+                )
+            goal = self._listener.goal(
+                PointStamped(header=request.goal.header, point=request.goal.pose.position)
+            )
+        except MessageError as problem:
+            is_frame = isinstance(problem, FrameError)
+            code = (
+                ErrorCode.FRAME_TRANSFORM_FAILURE
+                if is_frame
+                else ErrorCode.INVALID_GOAL_CONSTRAINTS
+            )
+            self._reporter.conclude(code, f'request of get_plan: {problem}', PlanReport())
+            return response
+        found = await self._queue.respond(goal)
+        response.plan = found.tool_path
+        return response
+
+    def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        response.message = answer(
+            ErrorCode.SUCCESS, f'requests that are ended by this: {self._queue.cancel()}'
+        )
+        return response
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    # Until the node spins nobody would wake up for ROS's own handlers.
+    _on_signals(_exit_at_once)
+    node = None
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = PlannerNode()
+        _on_signals(_leave_to_ros)
+        install_signal_handlers(SignalHandlerOptions.ALL)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (RrthError, ParameterException, RuntimeError) as problem:
+        if node is not None:
+            raise
+        get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
+        return 1
+    finally:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _on_signals(handler: Callable[..., None]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+
+
+def _exit_at_once(*_: Any) -> None:
+    raise SystemExit(0)
+
+
+def _leave_to_ros(*_: Any) -> None:
+    """Do nothing: ROS's own handler, which comes first, ends the spinning."""
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,148 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node `arm_playback`: an arm that moves exactly as it is told, for trials without one."""
+
+import sys
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rrth_planner.acceptance import accept
+from rrth_planner.arm import tool_pose
+from rrth_planner.errors import RrthError
+from rrth_planner.playback import standing, stop
+from rrth_planner.ros.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages import joint_trajectory_from_msg, pose_to_msg
+from rrth_planner.ros.playback_parameters import (
+    declare_playback_parameters,
+    initial_positions,
+    playback_rules,
+)
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+
+class PlaybackNode(Node):
+    """Follows the trajectories it is sent, and says where the arm is."""
+
+    def __init__(self, **options: Any) -> None:
+        """Declare parameters and interfaces; bad values raise, naming the parameter."""
+        super().__init__('arm_playback', **options)
+        self._arm = declare_playback_parameters(self)
+        self._base_frame: str = self.get_parameter('base_frame').value
+        self._playback = standing(initial_positions(self, self._arm))
+        # A step of the system's time must not move the arm.
+        is_simulated = self.get_parameter('use_sim_time').value
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._motion_clock: Clock = self.get_clock() if is_simulated else steady
+        self._latest = self._now()
+        reliable = QoSProfile(
+            depth=1,
+            reliability=ReliabilityPolicy.RELIABLE,
+            # A latched motion of the past must not start by itself.
+            durability=DurabilityPolicy.VOLATILE,
+        )
+        self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
+        self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
+        self.create_subscription(
+            JointTrajectory, 'joint_trajectory', self._on_trajectory, reliable
+        )
+        self.create_service(Trigger, '~/stop', self._on_stop)
+        self.create_timer(
+            1.0 / self.get_parameter('rate').value, self._publish, clock=self._motion_clock
+        )
+
+    def _now(self) -> float:
+        """Return the time on the clock of the motion [s]."""
+        return float(self._motion_clock.now().nanoseconds / NANOSECONDS)
+
+    def _advance(self) -> float:
+        """Return the time now [s]; a simulated clock that was set back leaves the arm in place."""
+        now = self._now()
+        if now < self._latest:
+            self._playback = standing(self._playback.state_at(self._latest)[0])
+        self._latest = now
+        return now
+
+    def _publish(self) -> None:
+        q, v, _ = self._playback.state_at(self._advance())
+        stamp = self.get_clock().now().to_msg()
+        state = JointState(
+            name=list(self._arm.joint_names), position=q.tolist(), velocity=v.tolist()
+        )
+        state.header.stamp = stamp
+        self._joint_states.publish(state)
+        pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
+        pose.header.stamp = stamp
+        self._tool_pose.publish(pose)
+
+    def _on_trajectory(self, msg: JointTrajectory) -> None:
+        time = self._advance()
+        ros_time = self.get_clock().now().nanoseconds / NANOSECONDS
+        stamp = seconds_of(msg.header.stamp)
+        try:
+            trajectory = joint_trajectory_from_msg(msg, self._arm.joint_names, ros_time)
+            self._playback = accept(
+                self._playback,
+                trajectory,
+                self._arm,
+                playback_rules(self, self._arm),
+                start_time=time if stamp == 0.0 else time + stamp - ros_time,
+                time=time,
+            )
+        except RrthError as problem:
+            stays = 'keeps to its motion' if time < self._playback.end_time else 'stays'
+            self.get_logger().warning(f'joint_trajectory refused, the arm {stays}: {problem}')
+            return
+        self.get_logger().info(
+            f'follows a motion: {len(trajectory.times)} points, at rest in '
+            f'{self._playback.end_time - time:.2f} s'
+        )
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        time = self._advance()
+        self._playback = stop(
+            self._playback, playback_rules(self, self._arm).max_acceleration, time
+        )
+        left = self._playback.end_time - time
+        response.success = True
+        response.message = (
+            f'SUCCESS (1): brakes along its path, at rest in {left:.2f} s'
+            if left > 0.0
+            else 'SUCCESS (1): at rest already'
+        )
+        self.get_logger().info(f'stop: {response.message}')
+        return response
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until it is told to end; return the exit code."""
+    node = None
+    try:
+        rclpy.init(args=args)
+        node = PlaybackNode()
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (RrthError, ParameterException) as problem:
+        print(f'arm_playback: {" ".join(str(problem).split())}', file=sys.stderr)
+        return 1
+    except Exception:
+        # A signal between two statements of a callback leaves publishers without a context.
+        if rclpy.ok():
+            raise
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

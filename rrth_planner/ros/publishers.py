@@ -1,0 +1,49 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner publishes: the motion first, then what shows it."""
+
+from nav_msgs.msg import Path
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rrth_planner.arrays import Array
+from rrth_planner.ros.markers import plan_markers
+from rrth_planner.ros.messages import joint_trajectory_to_msg, tool_path_to_msg
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import Trajectory
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+TOOL_PATH_POSES = 25
+LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class PlanPublishers:
+    """The topics that the planner publishes; late subscribers get the last plan too."""
+
+    def __init__(self, node: Node) -> None:
+        """Advertise them."""
+        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+        self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
+        self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
+
+    def publish_motion(self, trajectory: Trajectory, parameters: PlannerParameters) -> None:
+        """Publish a motion for the arm to begin at once."""
+        self._trajectory.publish(
+            joint_trajectory_to_msg(trajectory, parameters.arm.joint_names, parameters.base_frame)
+        )
+
+    def publish_view(
+        self, trajectory: Trajectory, parameters: PlannerParameters, scene: Scene, target: Array
+    ) -> Path:
+        """Publish what shows a motion, and return the tool's path."""
+        path = tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
+        self._tool_path.publish(path)
+        self._markers.publish(
+            plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
+        )
+        return path

@@ -1,0 +1,174 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm round its wearer in space, seen from where the wearer hides least of it."""
+
+from itertools import product
+from typing import Any
+
+from matplotlib.colors import to_rgb
+from matplotlib.ticker import MultipleLocator
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+import numpy as np
+from rrth_planner.arm import ArmModel, forward_kinematics
+from rrth_planner.arrays import Array
+from rrth_planner.scene import Box, Scene
+from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.viewers.line_of_sight import best_view, cut, is_hidden
+
+START, GOAL, PATH = '#3b6fb6', '#d1495b', '#7b3fa0'
+CLOTH, SKIN = '#8fa3bf', '#e3b898'
+# Behind the wearer's boxes, between, and in front of them.
+HIDDEN, BODY, SEEN = 1.0, 2.0, 3.0
+LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
+N_POSTURES = 16
+# How large the space is drawn, and the width of the picture over its height.
+ZOOM, SHAPE = 0.93, 1.35
+
+
+def arm_points(arm: ArmModel, q: Array) -> Array:
+    """Return the corners of the arm from the mount to the tool, (2 dof + 3, 3) [m]."""
+    poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
+    points = [poses[0, :3, 3]]
+    for i in range(1, len(poses)):
+        points.append(poses[i - 1, :3, 3] + arm.dh[i - 1, 1] * poses[i - 1, :3, 0])
+        points.append(poses[i, :3, 3])
+    return np.array(points)
+
+
+def draw_motion(
+    axes: Any,
+    arm: ArmModel,
+    scene: Scene,
+    trajectory: Trajectory,
+    target: Array,
+    ray_guard_length: float,
+) -> None:
+    """
+    Draw the wearer, the arm on its way, the pointing ray, the tool's path and the target.
+
+    Parameters
+    ----------
+    axes : Axes3D
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    trajectory : Trajectory
+    target : ndarray, shape (3,)
+        In the base frame [m].
+    ray_guard_length : float
+        How much of the ray is drawn where it does not point at the target yet [m].
+
+    """
+    q = sample(trajectory, np.linspace(0.0, trajectory.duration, N_POSTURES))[0]
+    postures = np.array([arm_points(arm, row) for row in q])
+    q_dense = sample(trajectory, np.linspace(0.0, trajectory.duration, 200))[0]
+    poses = np.array([forward_kinematics(arm, row)[-1] for row in q_dense])
+    tool_path, start_z = poses[:, :3, 3], poses[0, :3, 2]
+    ray = np.array([postures[-1, -1], target])
+    first_ray = np.array([postures[0, -1], postures[0, -1] + ray_guard_length * start_z])
+
+    towards = best_view(scene, postures, ray)
+    _frame(axes, scene, np.concatenate([*postures, ray, first_ray]), towards)
+    for box in scene.boxes:
+        _draw_box(axes, box, towards)
+    blend = np.linspace(0.0, 1.0, N_POSTURES)[:, None]
+    colours = (1.0 - blend) * to_rgb(START) + blend * to_rgb(GOAL)
+    for posture, colour in zip(postures[1:-1], colours[1:-1], strict=True):
+        _draw_line(axes, scene, towards, posture, colour, 1.6, 0.30)
+    _draw_line(axes, scene, towards, tool_path, PATH, 1.8, 0.95)
+    _draw_line(axes, scene, towards, first_ray, START, 1.2, 0.7)
+    _draw_line(axes, scene, towards, ray, GOAL, 1.8, 0.95)
+    for posture, colour, name, offset in (
+        (postures[0], START, 'start', -0.14),
+        (postures[-1], GOAL, 'goal', 0.07),
+    ):
+        _draw_line(axes, scene, towards, posture, colour, 5.0, 1.0)
+        axes.plot(*posture.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=SEEN)
+        axes.text(*posture[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
+    axes.plot(
+        *target[:, None],
+        ls='',
+        marker='*',
+        ms=17,
+        color='#f2b705',
+        mec='#5c4600',
+        zorder=9,
+        clip_on=False,
+    )
+    axes.text(*target + [0.0, 0.0, 0.12], 'target', fontsize=9, ha='center', zorder=9)
+
+
+def _draw_line(
+    axes: Any,
+    scene: Scene,
+    towards: Array,
+    points: Array,
+    colour: Any,
+    width: float,
+    alpha: float,
+) -> None:
+    pieces = cut(points)
+    hidden = is_hidden(scene, pieces.mean(axis=1), towards)
+    for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], SEEN)):
+        if len(part):
+            lines = Line3DCollection(
+                part, colors=[colour], linewidths=width, alpha=alpha, zorder=depth
+            )
+            lines.set_capstyle('round')
+            axes.add_collection3d(lines)
+
+
+def _draw_box(axes: Any, box: Box, towards: Array) -> None:
+    colour = SKIN if any(part in box.name for part in ('head', 'forearm', 'hand')) else CLOTH
+    faces, shades = [], []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            normal = side * box.rotation[:, axis]
+            if normal @ towards <= 0.0:
+                continue
+            u, v = (0.5 * box.size[k] * box.rotation[:, k] for k in range(3) if k != axis)
+            middle = box.center + 0.5 * box.size[axis] * normal
+            faces.append([middle - u - v, middle + u - v, middle + u + v, middle - u + v])
+            shades.append(np.array(to_rgb(colour)) * (0.72 + 0.28 * max(0.0, normal @ LIGHT)))
+    # Nearer boxes are drawn later.
+    depth = BODY + 0.9 * np.tanh(0.2 * float(box.center @ towards))
+    axes.add_collection3d(
+        Poly3DCollection(
+            faces,
+            facecolors=shades,
+            edgecolors='#5b6472',
+            linewidths=0.5,
+            alpha=0.82,
+            zorder=depth,
+        )
+    )
+
+
+def _frame(axes: Any, scene: Scene, points: Array, towards: Array) -> None:
+    corners = [
+        box.center + box.rotation @ (0.5 * box.size * np.array(signs))
+        for box in scene.boxes
+        for signs in product((-1.0, 1.0), repeat=3)
+    ]
+    everything = np.concatenate([points, np.array(corners).reshape(-1, 3)])
+    low, high = everything.min(axis=0) - 0.05, everything.max(axis=0) + 0.05
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    # Fill the picture: matplotlib keeps the diagonal of the space, whatever its shape.
+    right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
+    up = np.cross(towards, right)
+    width, height = (high - low) @ abs(right), (high - low) @ abs(up)
+    zoom = ZOOM * np.linalg.norm(high - low) / max(height, width / SHAPE)
+    axes.set_box_aspect(high - low, zoom=zoom)
+    axes.set_proj_type('persp', focal_length=0.9)
+    axes.computed_zorder = False
+    elevation = np.degrees(np.arcsin(towards[2]))
+    azimuth = np.degrees(np.arctan2(towards[1], towards[0]))
+    axes.view_init(elev=elevation, azim=azimuth)
+    axes.set_xlabel('x forward [m]', fontsize=8)
+    axes.set_ylabel('y left [m]', fontsize=8)
+    axes.set_zlabel('z up [m]', fontsize=8)
+    axes.tick_params(labelsize=7, pad=0)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_pane_color((0.965, 0.97, 0.98, 1.0))
+        axis._axinfo['grid'].update(color='#dfe3e8', linewidth=0.6)
+        axis.set_major_locator(MultipleLocator(0.5))

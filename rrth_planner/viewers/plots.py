@@ -1,0 +1,147 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of motions: the arm round its wearer, and what the joints do, a row a motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.viewers.arm_view import draw_motion
+
+JOINT_COLOURS = ('#1b6ca8', '#d1495b', '#2f9e6e', '#c98a1b', '#7a4fa3', '#4c5560')
+LIMIT, DASHES = '#30343b', (0, (5, 3))
+ROW_SIZE = (13.0, 5.4)
+TIME_STEP = 0.005
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Motion:
+    """
+    One motion to be drawn.
+
+    Parameters
+    ----------
+    label : str
+        What the target is called.
+    trajectory : Trajectory
+    target : ndarray, shape (3,)
+        In the base frame [m].
+    caption : str
+        A line of figures below the label; may be empty.
+
+    """
+
+    label: str
+    trajectory: Trajectory
+    target: Array
+    caption: str = ''
+
+
+def motion_figure(
+    arm: ArmModel,
+    scene: Scene,
+    motions: Sequence[Motion],
+    limits: MotionLimits,
+    ray_guard_length: float,
+) -> Figure:
+    """
+    Return a figure of motions: left the arm round its wearer, right the curves of the joints.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    motions : sequence of Motion
+        At least one; each has a row.
+    limits : MotionLimits
+        Drawn as dashed lines.
+    ray_guard_length : float
+        How much of the pointing ray was guarded in motion [m].
+
+    """
+    n = len(motions)
+    figure = Figure(figsize=(ROW_SIZE[0], ROW_SIZE[1] * n), facecolor='white')
+    FigureCanvasAgg(figure)
+    height = figure.get_figheight()
+    rows = figure.add_gridspec(
+        n,
+        2,
+        width_ratios=(1.3, 1.0),
+        left=0.0,
+        right=0.985,
+        top=1.0 - 0.75 / height,
+        bottom=0.6 / height,
+        wspace=0.1,
+        hspace=0.3,
+    )
+    key = 'blue: start    red: goal    violet: path of the tool    thin: pointing ray'
+    figure.text(0.03, 1.0 - 0.32 / height, key, fontsize=9, color=LIMIT)
+    for row, motion in enumerate(motions):
+        view = figure.add_subplot(rows[row, 0], projection='3d')
+        draw_motion(view, arm, scene, motion.trajectory, motion.target, ray_guard_length)
+        curves = rows[row, 1].subgridspec(2, 1, height_ratios=(1.15, 1.0), hspace=0.12)
+        position = figure.add_subplot(curves[0])
+        velocity = figure.add_subplot(curves[1], sharex=position)
+        _draw_curves(position, velocity, arm, motion.trajectory, limits)
+        position.tick_params(labelbottom=False)
+        title = f'Pointing at "{motion.label}"'
+        position.set_title(
+            f'{title}\n{motion.caption}' if motion.caption else title,
+            loc='left',
+            fontsize=11,
+            fontweight='bold',
+        )
+    return figure
+
+
+def _draw_curves(
+    position: Axes, velocity: Axes, arm: ArmModel, trajectory: Trajectory, limits: MotionLimits
+) -> None:
+    n_samples = max(2, int(trajectory.duration / TIME_STEP) + 1)
+    times = np.linspace(0.0, trajectory.duration, n_samples)
+    q, v, _ = sample(trajectory, times)
+    for i, name in enumerate(arm.joint_names):
+        colour = JOINT_COLOURS[i % len(JOINT_COLOURS)]
+        position.plot(times, q[:, i], color=colour, lw=2.0, label=name.replace('_', ' '))
+        velocity.plot(times, v[:, i], color=colour, lw=2.0)
+    unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
+    position.plot([], [], color=LIMIT, lw=1.0, ls=DASHES, label='limits')
+    for value in np.unique(arm.bounds.round(6)):
+        _draw_limit(position, float(value))
+    for value in np.unique(np.concatenate([-limits.velocity, limits.velocity]).round(6)):
+        _draw_limit(velocity, float(value))
+    position.set_ylabel(f'position [{unit}]')
+    velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
+    velocity.set_xlabel('time [s]')
+    position.legend(
+        loc='lower left',
+        bbox_to_anchor=(0.0, 0.0),
+        ncols=arm.dof + 1,
+        fontsize=8,
+        frameon=False,
+        handlelength=1.4,
+        columnspacing=1.2,
+    )
+    low, high = float(arm.bounds[0].min()), float(arm.bounds[1].max())
+    position.set_ylim(low - 0.22 * (high - low), high + 0.08 * (high - low))
+    fastest = 1.15 * float(limits.velocity.max())
+    velocity.set_ylim(-fastest, fastest)
+    for axes in (position, velocity):
+        axes.set_xlim(0.0, max(trajectory.duration, TIME_STEP))
+        axes.grid(color='#e4e6ea', lw=0.8)
+        axes.set_axisbelow(True)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+
+
+def _draw_limit(axes: Any, value: float) -> None:
+    axes.axhline(value, color=LIMIT, lw=1.0, ls=DASHES, alpha=0.75)

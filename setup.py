@@ -1,0 +1,42 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = 'rrth_planner'
+share = f'share/{package_name}'
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test', 'test.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
+        (share, ['package.xml']),
+        (f'{share}/launch', sorted(glob('launch/*.py'))),
+        (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
+    ],
+    python_requires='>=3.10',
+    # Names only: the versions come from rosdep or from requirements/.
+    install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
+    extras_require={
+        'node': ['python-fcl', 'ruckig', 'matplotlib'],
+        'test': ['pytest', 'hypothesis'],
+    },
+    # The kernels' compiled cache is kept by source file, so these must be real files.
+    zip_safe=False,
+    maintainer='The rrth_planner authors',
+    maintainer_email='rrth_planner@example.org',
+    description='Motion planner for a body-worn pointing arm.',
+    license='Apache-2.0',
+    entry_points={
+        'console_scripts': [
+            'planner_node = rrth_planner.ros.planner_node:main',
+            'playback_node = rrth_planner.ros.playback_node:main',
+            'demo = rrth_planner.ros.demo:main',
+        ],
+    },
+)

@@ -1,0 +1,11 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+
+import os
+
+# A domain for each worker, before anything imports rclpy. Workers share the parent, so their
+# domains are neighbours; 1 to 100 is the range whose ports are safe on every system.
+_worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
+_run = os.getppid() if 'PYTEST_XDIST_WORKER' in os.environ else os.getpid()
+os.environ['ROS_DOMAIN_ID'] = str(1 + (7 * _run + int(_worker.removeprefix('gw'))) % 100)
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'

@@ -1,0 +1,372 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to the core's types and back: round trips, and a sentence for each refusal."""
+
+from itertools import pairwise
+
+from hypothesis import given, settings, strategies as st
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import Point  # noqa: E402
+from rrth_planner.arm import tool_pose  # noqa: E402
+from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.ros import bodies  # noqa: E402
+from rrth_planner.ros.error_codes import answer, CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.ros.messages import (  # noqa: E402
+    configuration_from_msg,
+    FrameError,
+    goal_from_msg,
+    has_joint_of,
+    joint_trajectory_from_msg,
+    joint_trajectory_to_msg,
+    scene_of,
+    tool_path_to_msg,
+    WearerBody,
+)
+from rrth_planner.rotation import pose_matrix, rotation_matrix  # noqa: E402
+from rrth_planner.status import PlanStatus  # noqa: E402
+from rrth_planner.trajectory import Trajectory  # noqa: E402
+from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
+from visualization_msgs.msg import Marker  # noqa: E402
+
+NAN, INF = float('nan'), float('inf')
+
+
+def body_of(*markers, now=0.0):
+    return WearerBody().apply(array(*markers), now, 'torso')
+
+
+def names(body):
+    return [b.name for b in scene_of(body).boxes]
+
+
+def test_a_cube_becomes_the_same_box():
+    marker = box(center=(1.0, 2.0, 3.0), size=(0.1, 0.2, 0.3))
+    o = marker.pose.orientation
+    o.x, o.y, o.z, o.w = 0.5, 0.5, 0.5, 0.5
+    (b,) = scene_of(body_of(marker)).boxes
+    assert b.name == 'torso/0'
+    np.testing.assert_array_equal(b.center, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(b.size, [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(b.rotation, rotation_matrix([0.5] * 4), atol=1e-15)
+
+
+def test_a_marker_is_called_by_its_text_or_its_id():
+    assert names(body_of(box(text='left hand'), box('', 7))) == ['left hand', '7']
+
+
+def test_a_cube_list_has_a_box_at_each_point():
+    marker = box(center=(1.0, 0.0, 0.0), size=(0.1, 0.1, 0.1))
+    marker.type = Marker.CUBE_LIST
+    marker.points = [Point(x=1.0), Point(y=2.0)]
+    o = marker.pose.orientation
+    o.z, o.w = np.sqrt(0.5), np.sqrt(0.5)
+    body = body_of(marker)
+    assert names(body) == ['torso/0[0]', 'torso/0[1]']
+    centers = [b.center for b in scene_of(body).boxes]
+    np.testing.assert_allclose(centers, [[1.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
+
+
+def test_markers_act_in_their_order_as_in_rviz():
+    body = body_of(box('a'), box('a', 1), box('b'), box('a', size=(1.0, 1.0, 1.0)))
+    assert names(body) == ['a/0', 'a/1', 'b/0']
+    assert scene_of(body).boxes[0].size[0] == 1.0
+    body = body.apply(array(command(Marker.DELETE, 'a', 1)), 0.0, 'torso')
+    assert names(body) == ['a/0', 'b/0']
+    assert names(body.apply(array(command(Marker.DELETE, 'x', 1)), 0.0, 'torso')) == names(body)
+    assert names(body.apply(array(command(Marker.DELETEALL, 'a')), 0.0, 'torso')) == ['b/0']
+    replaced = body.apply(array(command(Marker.DELETEALL), box('c')), 0.0, 'torso')
+    assert names(replaced) == ['c/0']
+    assert names(body.apply(array(box('c'), command(Marker.DELETEALL)), 0.0, 'torso')) == []
+
+
+def test_a_lifetime_counts_from_reception_and_is_renewed():
+    marker = box()
+    marker.lifetime.nanosec = 500_000_000
+    body = body_of(marker, box('head'), now=10.0)
+    assert names(body.at(10.4)) == ['torso/0', 'head/0']
+    assert names(body.at(10.5)) == ['head/0']
+    assert names(body.apply(array(marker), 10.4, 'torso').at(10.8)) == ['torso/0', 'head/0']
+
+
+def test_an_invisible_box_is_an_obstacle():
+    marker = box()
+    marker.color.a = 0.0
+    assert body_of(marker).n_boxes == 1
+
+
+def test_an_empty_frame_is_the_base_frame_and_delete_needs_none():
+    assert body_of(box(frame='')).n_boxes == 1
+    other = command(Marker.DELETE, 'torso')
+    other.header.frame_id = 'camera'
+    assert body_of(box(), other).n_boxes == 0
+
+
+def test_a_known_frame_is_transformed():
+    T = pose_matrix([1.0, 2.0, 3.0], [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+    body = WearerBody().apply(
+        array(box(center=(1.0, 0.0, 0.0), frame='camera')), 0.0, 'torso', lambda _: T
+    )
+    np.testing.assert_allclose(scene_of(body).boxes[0].center, [1.0, 3.0, 3.0], atol=1e-12)
+    np.testing.assert_allclose(scene_of(body).boxes[0].rotation, T[:3, :3], atol=1e-12)
+    goal = goal_from_msg(target(1.0, 0.0, 0.0, 'camera'), 'torso', lambda _: T)
+    np.testing.assert_allclose(goal.target, [1.0, 3.0, 3.0], atol=1e-12)
+
+
+def change(path, value):
+    def apply(marker):
+        *parents, last = path.split('.')
+        thing = marker
+        for parent in parents:
+            thing = getattr(thing, parent)
+        setattr(thing, last, value)
+
+    return apply
+
+
+BAD_MARKERS = [
+    (change('pose.position.x', NAN), r'pose.position: \[nan, 0.0, 0.0\], expected finite.*\[m\]'),
+    (change('pose.position.y', INF), r'expected finite numbers \[m\]'),
+    (change('scale.x', NAN), r'scale: .*expected finite numbers \[m\]'),
+    (change('scale.x', 0.0), r'scale: \[0.0, .*expected three lengths > 0 \[m\]'),
+    (change('scale.z', -0.1), r'expected three lengths > 0 \[m\]'),
+    (change('scale.y', 1e5), r'expected lengths up to 10000 \[m\]'),
+    (change('pose.position.y', 1e5), r'expected lengths up to 10000 \[m\]'),
+    (change('pose.orientation.w', 0.0), r'of length 0, expected a quaternion'),
+    (change('pose.orientation.w', 1.1), r'of length 1.1, expected a quaternion'),
+    (change('pose.orientation.w', NAN), r'pose.orientation: .*expected finite numbers'),
+    (change('type', Marker.SPHERE), r'type 2, expected 1 \(CUBE\) or 6 \(CUBE_LIST\)'),
+    (change('type', Marker.CUBE_LIST), r'points: 0, expected 1 to 10000'),
+    (change('action', 1), r'action 1, expected 0 \(ADD\), 2 \(DELETE\) or 3 \(DELETEALL\)'),
+    (change('lifetime.sec', -1), r'lifetime: -1.0, expected 0 \(for ever\) or more \[s\]'),
+    (change('header.frame_id', 'camera'), r'frame "camera", expected "torso" or an empty frame'),
+]
+
+
+@pytest.mark.parametrize(('spoil', 'sentence'), BAD_MARKERS)
+def test_an_array_with_a_bad_marker_is_refused_whole(spoil, sentence):
+    body = body_of(box('old'))
+    bad = box('hand', 3)
+    spoil(bad)
+    with pytest.raises(MessageError, match=r'marker 1 \("hand/3"\): ' + '.*' + sentence):
+        body.apply(array(box('new'), bad, box('newer')), 0.0, 'torso')
+    assert names(body) == ['old/0']
+
+
+def test_an_unknown_frame_is_an_error_of_its_own():
+    with pytest.raises(FrameError, match='frame "camera", expected "torso"'):
+        body_of(box(frame='camera'))
+    with pytest.raises(FrameError, match='frame "camera", expected "torso"'):
+        goal_from_msg(target(frame='camera'), 'torso')
+
+
+def test_more_boxes_than_the_limit_are_refused(monkeypatch):
+    monkeypatch.setattr(bodies, 'MOST_BOXES', 3)
+    body = body_of(*(box(index=i) for i in range(3)))
+    with pytest.raises(MessageError, match='4 boxes, expected at most 3 in all'):
+        body.apply(array(box(index=3)), 0.0, 'torso')
+    many = box()
+    many.type, many.points = Marker.CUBE_LIST, [Point()] * 4
+    with pytest.raises(MessageError, match='points: 4, expected 1 to 3'):
+        body_of(many)
+
+
+@given(st.lists(st.floats(-10, 10), min_size=4, max_size=4), st.floats(0.991, 1.009))
+def test_a_quaternion_of_nearly_unit_length_is_normalised(q, length):
+    norm = np.linalg.norm(q)
+    if norm < 1e-3:
+        return
+    marker = box()
+    o = marker.pose.orientation
+    o.x, o.y, o.z, o.w = (length * np.array(q) / norm).tolist()
+    r = scene_of(body_of(marker)).boxes[0].rotation
+    np.testing.assert_allclose(r @ r.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(r, rotation_matrix(q), atol=1e-12)
+
+
+OPERATIONS = st.tuples(
+    st.sampled_from([Marker.ADD, Marker.DELETE, Marker.DELETEALL]),
+    st.sampled_from(['', 'a', 'b']),
+    st.integers(0, 2),
+)
+
+
+@given(st.lists(st.lists(OPERATIONS, max_size=6), max_size=4))
+def test_any_markers_leave_what_a_dictionary_would(arrays):
+    body, expected = WearerBody(), set()
+    for operations in arrays:
+        for action, ns, index in operations:
+            if action == Marker.ADD:
+                expected.add((ns, index))
+            elif action == Marker.DELETE:
+                expected.discard((ns, index))
+            else:
+                expected = {key for key in expected if ns and key[0] != ns}
+        markers = [
+            box(ns, index) if action == Marker.ADD else command(action, ns, index)
+            for action, ns, index in operations
+        ]
+        body = body.apply(array(*markers), 0.0, 'torso')
+    assert {key for key, _ in body.parts} == expected
+
+
+@pytest.mark.parametrize(
+    ('msg', 'sentence'),
+    [
+        (target(NAN), r'point: \[nan, 0.1, 0.3\], expected finite numbers \[m\]'),
+        (target(1e6), r'expected coordinates up to 10000 \[m\]'),
+    ],
+)
+def test_a_bad_target_is_refused(msg, sentence):
+    with pytest.raises(MessageError, match=sentence):
+        goal_from_msg(msg, 'torso')
+
+
+def test_joints_are_found_by_name_and_others_ignored():
+    msg = joints([9.0, *FOLDED[::-1], NAN], ['wheel', *JOINTS[::-1], 'hand'])
+    np.testing.assert_array_equal(configuration_from_msg(msg, JOINTS), FOLDED)
+    assert has_joint_of(msg, JOINTS)
+    assert not has_joint_of(joints([1.0], ['wheel']), JOINTS)
+
+
+@pytest.mark.parametrize(
+    ('msg', 'sentence'),
+    [
+        (joints(FOLDED[:3], JOINTS[:3]), r"no \['joint_4'\] in .*expected all of"),
+        (joints(FOLDED[:3]), r'position: 3 values for 4 names, expected one a name \[rad\]'),
+        (joints([0.0, NAN, 0.0, 0.0]), r'expected finite numbers \[rad\]'),
+        (
+            joints([*FOLDED, 0.0], [*JOINTS, 'joint_2']),
+            r"\['joint_2'\] twice .*each joint once",
+        ),
+    ],
+)
+def test_bad_joint_positions_are_refused(msg, sentence):
+    with pytest.raises(MessageError, match=sentence):
+        configuration_from_msg(msg, JOINTS)
+
+
+def motion(times=(0.0, 0.5, 1.25)):
+    n = len(times)
+    v = np.linspace(0.1, 0.4, 4) * np.ones((n, 1))
+    v[0] = v[-1] = 0.0
+    return Trajectory(
+        times=times, positions=np.arange(4.0 * n).reshape(n, 4), velocities=v, accelerations=2 * v
+    )
+
+
+def test_a_trajectory_survives_the_way_to_a_message_and_back():
+    msg = joint_trajectory_to_msg(motion(), JOINTS, 'torso')
+    assert msg.header.frame_id == 'torso'
+    assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == (0, 0)
+    back = joint_trajectory_from_msg(msg, JOINTS)
+    for name in ('times', 'positions', 'velocities', 'accelerations'):
+        np.testing.assert_array_equal(getattr(back, name), getattr(motion(), name))
+
+
+@settings(max_examples=50)
+@given(st.lists(st.floats(1e-6, 10.0), min_size=1, max_size=30))
+def test_times_are_rounded_to_nanoseconds_and_increase(steps):
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    msg = joint_trajectory_to_msg(motion(times), JOINTS, 'torso')
+    ns = [p.time_from_start.sec * 10**9 + p.time_from_start.nanosec for p in msg.points]
+    assert all(a < b for a, b in pairwise(ns))
+    np.testing.assert_allclose(np.array(ns) * 1e-9, times, atol=1e-9)
+
+
+def test_residues_at_the_ends_become_exact_zeros():
+    v = np.full((2, 4), 4e-7)
+    moving = Trajectory(times=[0, 1], positions=np.zeros((2, 4)), velocities=v, accelerations=-v)
+    for point in joint_trajectory_to_msg(moving, JOINTS, 'torso').points:
+        assert list(point.velocities) == list(point.accelerations) == [0.0] * 4
+    moving = Trajectory(times=[0, 1], positions=v, velocities=v + 1e-3, accelerations=v)
+    with pytest.raises(MessageError, match=r'velocity of the last point: .*expected 0 \[rad/s\]'):
+        joint_trajectory_to_msg(moving, JOINTS, 'torso')
+
+
+def test_points_closer_than_a_nanosecond_are_refused():
+    with pytest.raises(MessageError, match='expected strictly increasing times'):
+        joint_trajectory_to_msg(motion((0.0, 1.0, 1.0 + 1e-10)), JOINTS, 'torso')
+
+
+def test_joints_in_another_order_are_sorted():
+    msg = joint_trajectory_to_msg(motion(), JOINTS[::-1], 'torso')
+    back = joint_trajectory_from_msg(msg, JOINTS)
+    np.testing.assert_array_equal(back.positions, motion().positions[:, ::-1])
+
+
+def points(index, field, value):
+    def apply(msg):
+        setattr(msg.points[index], field, value)
+
+    return apply
+
+
+def first_time(sec, nanosec):
+    def apply(msg):
+        msg.points[0].time_from_start.sec = sec
+        msg.points[0].time_from_start.nanosec = nanosec
+
+    return apply
+
+
+def same_time(msg):
+    msg.points[2].time_from_start = msg.points[1].time_from_start
+
+
+def stamped(msg):
+    msg.header.stamp.sec = 90
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'sentence'),
+    [
+        (change('joint_names', JOINTS[:3]), 'joint_names: .*expected each of .* once'),
+        (change('joint_names', []), r'joint_names: \[\], expected each of'),
+        (change('joint_names', [*JOINTS[:3], 'wheel']), 'expected each of'),
+        (change('joint_names', [*JOINTS[:3], 'joint_1']), 'expected each of'),
+        (change('points', []), 'points: none, expected at least one'),
+        (points(2, 'velocities', [1e-6, 0.0, 0.0, 0.0]), r'last point: .*expected 0 \[rad/s\]'),
+        (stamped, r'header.stamp: 90.0 .*expected 0 or an end after the present time 100.0 \[s\]'),
+        (same_time, r'points\[2\].time_from_start: 0.5 after 0.5, .*increasing times \[s\]'),
+        (first_time(0, 1), r'points\[0\].time_from_start: 1e-09, expected 0'),
+        (first_time(-1, 0), r'points\[0\].time_from_start: -1.0, expected 0'),
+        (points(1, 'positions', [0.0] * 3), r'points\[1\].positions: 3 values, expected 4'),
+        (points(1, 'positions', []), r'points\[1\].positions: 0 values, expected 4'),
+        (points(1, 'velocities', []), r'points\[1\].velocities: 0 values, .*\[rad/s\]'),
+        (points(1, 'accelerations', []), r'accelerations: 0 values, .*\[rad/s\^2\]'),
+        (points(1, 'effort', [0.0] * 4), 'effort: given, expected none'),
+        (points(1, 'positions', [NAN, 0.0, 0.0, 0.0]), r'expected finite numbers \[rad\]'),
+        (points(0, 'velocities', [INF, 0.0, 0.0, 0.0]), r'expected finite numbers \[rad/s\]'),
+    ],
+)
+def test_a_trajectory_that_no_controller_would_take_is_refused(spoil, sentence):
+    msg = joint_trajectory_to_msg(motion(), JOINTS, 'torso')
+    spoil(msg)
+    with pytest.raises(MessageError, match=sentence):
+        joint_trajectory_from_msg(msg, JOINTS, now=100.0)
+
+
+def test_the_tool_path_runs_from_the_first_to_the_last_pose():
+    arm = load_arm()
+    q = np.clip(motion().positions, *arm.bounds)
+    t = motion()
+    moved = Trajectory(
+        times=t.times, positions=q, velocities=t.velocities, accelerations=t.accelerations
+    )
+    path = tool_path_to_msg(arm, moved, 'torso', 7)
+    assert len(path.poses) == 7
+    assert path.header.frame_id == 'torso'
+    for pose, end in ((path.poses[0], q[0]), (path.poses[-1], q[-1])):
+        p, o = pose.pose.position, pose.pose.orientation
+        T = pose_matrix([p.x, p.y, p.z], [o.x, o.y, o.z, o.w])
+        np.testing.assert_allclose(T, tool_pose(arm, end), atol=1e-9)
+
+
+def test_each_status_has_a_code():
+    assert set(CODE_OF_STATUS) == set(PlanStatus)
+    assert answer(ErrorCode.TIMED_OUT, 'too late') == 'TIMED_OUT (-6): too late'

@@ -1,0 +1,158 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planner's parameters: defaults, descriptions, and a sentence for each refusal."""
+
+from dataclasses import fields
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.exceptions import (  # noqa: E402
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+)
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rrth_planner.errors import ModelError, OptionsError  # noqa: E402
+from rrth_planner.options import RRTHOptions  # noqa: E402
+from rrth_planner.resources import load_arm, load_yaml, resource_path  # noqa: E402
+from rrth_planner.ros.parameters import (  # noqa: E402
+    ARM,
+    current_parameters,
+    declare_parameters,
+    settings,
+)
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+NAN = float('nan')
+
+
+@pytest.fixture(name='started')
+def _started():
+    nodes = []
+
+    def start(**overrides):
+        given = [Parameter(name=name, value=value) for name, value in overrides.items()]
+        nodes.append(Node('rrth_planner', parameter_overrides=given))
+        return nodes[-1], declare_parameters(nodes[-1])
+
+    yield start
+    for node in nodes:
+        node.destroy_node()
+
+
+def test_the_defaults_are_those_of_the_core(started):
+    _, parameters = started()
+    assert parameters.options == RRTHOptions()
+    assert (parameters.base_frame, parameters.seed) == ('torso', -1)
+    assert (parameters.margin, parameters.ray_guard_length) == (0.02, 1.0)
+    assert parameters.limits.velocity.tolist() == [1.5] * 4
+    assert parameters.limits.acceleration.tolist() == [4.0] * 4
+    assert parameters.limits.jerk.tolist() == [40.0] * 4
+
+
+def test_the_packaged_file_holds_every_parameter_with_its_default():
+    file = load_yaml(resource_path('config/planner.yaml'))['/**']['ros__parameters']
+    assert file == {s.name: s.default for s in (ARM, *settings(4))}
+
+
+def test_every_parameter_says_its_unit_and_range(started):
+    node, _ = started()
+    for setting in (ARM, *settings(4)):
+        descriptor = node.describe_parameter(setting.name)
+        assert descriptor.description.endswith(f'[{setting.unit}]')
+        (numeric,) = [
+            *descriptor.floating_point_range,
+            *descriptor.integer_range,
+            *([] if setting.low is not None else [None]),
+        ]
+        assert numeric is None or (numeric.from_value, numeric.to_value, numeric.step) == (
+            setting.low,
+            setting.high,
+            0,
+        )
+
+
+def test_a_single_value_counts_for_every_joint(started):
+    _, parameters = started(max_velocity=[0.5], max_jerk=[1.0, 2.0, 3.0, 4.0])
+    assert parameters.limits.velocity.tolist() == [0.5] * 4
+    assert parameters.limits.jerk.tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_change_is_there_for_the_next_plan(started):
+    node, before = started()
+    assert node.set_parameters([Parameter(name='margin', value=0.05)])[0].successful
+    assert current_parameters(node, before.arm).margin == 0.05
+    assert before.margin == 0.02
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'sentence'),
+    [
+        ('margin', 3.0, 'margin out of range'),
+        ('margin', NAN, 'margin out of range'),
+        ('seed', -2, 'seed out of range'),
+        ('step_size', 0.0, 'step_size out of range'),
+        ('max_velocity', [1.0, 2.0], 'max_velocity: [1.0, 2.0], expected 4 values, or one'),
+        ('max_velocity', [NAN], 'max_velocity: [nan], expected 4 values'),
+        ('max_acceleration', [0.0] * 4, '1e+06 [rad/s^2]'),
+        ('max_jerk', [-1.0], '[rad/s^3]'),
+        ('algorithm', 'rrt_star', 'algorithm: "rrt_star", expected one that is available: rrt_h'),
+        ('time_limit', 'soon', 'Wrong parameter type'),
+        ('arm', 'other.yaml', 'read-only'),
+        ('base_frame', 'camera', 'read-only'),
+    ],
+)
+def test_a_bad_value_is_refused_and_changes_nothing(started, name, value, sentence):
+    node, _ = started()
+    before = node.get_parameter(name).value
+    (result,) = node.set_parameters([Parameter(name=name, value=value)])
+    assert not result.successful
+    assert sentence in result.reason
+    assert '\n' not in result.reason
+    assert node.get_parameter(name).value == before
+
+
+def test_an_empty_array_is_refused(started):
+    node, _ = started()
+    empty = Parameter('max_jerk', Parameter.Type.DOUBLE_ARRAY, [])
+    (result,) = node.set_parameters([empty])
+    assert result.reason.startswith('max_jerk: [], expected 4 values, or one for all joints')
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'error'),
+    [
+        ('margin', 3.0, InvalidParameterValueException),
+        ('margin', 3, InvalidParameterTypeException),
+        ('max_jerk', [1.0, 2.0], OptionsError),
+        ('algorithm', 'a_star', OptionsError),
+        ('base_frame', '', OptionsError),
+        ('arm', '/nowhere/arm.yaml', ModelError),
+    ],
+)
+def test_a_bad_override_is_refused_at_the_start(started, name, value, error):
+    with pytest.raises(error, match=name):
+        started(**{name: value})
+
+
+def test_every_option_of_the_core_is_a_parameter():
+    assert {f.name for f in fields(RRTHOptions)} <= {s.name for s in settings(4)}
+
+
+def test_an_arm_of_ones_own_is_loaded(started, tmp_path):
+    text = resource_path('config/arm.yaml').read_text().replace('joint_', 'axis_')
+    (tmp_path / 'arm.yaml').write_text(text)
+    _, parameters = started(arm=str(tmp_path / 'arm.yaml'))
+    assert parameters.arm.joint_names == ('axis_1', 'axis_2', 'axis_3', 'axis_4')
+
+
+def test_files_that_are_no_arm_are_refused_by_name(tmp_path):
+    (tmp_path / 'bad.yaml').write_text('joints: [')
+    (tmp_path / 'empty.yaml').write_text('')
+    for name in ('bad.yaml', 'empty.yaml', 'none.yaml'):
+        with pytest.raises(ModelError, match=f'{name}.*expected'):
+            load_arm(tmp_path / name)
+    with pytest.raises(ModelError, match=r'config/other.yaml: not found, expected in one of'):
+        resource_path('config/other.yaml')

@@ -1,0 +1,506 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planner's node, called as a stranger would call it."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from geometry_msgs.msg import PointStamped  # noqa: E402
+from nav_msgs.msg import Path  # noqa: E402
+from nav_msgs.srv import GetPlan  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.qos import (  # noqa: E402
+    DurabilityPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+import samples  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+array, box, command, fenced = samples.array, samples.box, samples.command, samples.fenced
+FOLDED, JOINTS, joints = samples.FOLDED, samples.JOINTS, samples.joints
+target, wearer = samples.target, samples.wearer
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+NAN = float('nan')
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+VOLATILE = QoSProfile(depth=10)
+BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+# With these the search for a way out of the fence goes on and on.
+ENDLESS = {'time_limit': 600.0, 'max_samples': 10**7}
+TOPICS = {
+    'body_boxes': (MarkerArray, wearer),
+    'target': (PointStamped, target),
+    'joint_states': (JointState, joints),
+}
+
+
+class Stranger:
+    """A node that talks with the planner of its namespace."""
+
+    def __init__(self, namespace, wait_until):
+        self.node = Node('stranger', namespace=namespace)
+        self.wait_until = wait_until
+        self.heard = {}
+        self.publishers = {}
+        for name, msg_type in (
+            ('joint_trajectory', JointTrajectory),
+            ('rrth_planner/tool_path', Path),
+            ('rrth_planner/markers', MarkerArray),
+        ):
+            self.hear(name, msg_type, LATCHED)
+        self.hear('/diagnostics', DiagnosticArray, 10)
+        self.services = {
+            name: self.node.create_client(kind, f'rrth_planner/{name}')
+            for name, kind in (('plan', Trigger), ('get_plan', GetPlan), ('cancel', Trigger))
+        }
+
+    def hear(self, name, msg_type, profile):
+        self.heard[name] = []
+        self.node.create_subscription(msg_type, name, self.heard[name].append, profile)
+
+    def say(self, topic, msg, profile=LATCHED):
+        publisher = self.node.create_publisher(type(msg), topic, profile)
+        self.publishers[topic] = publisher
+        publisher.publish(msg)
+
+    def ask(self, name, request=None):
+        client = self.services[name]
+        self.wait_until(client.service_is_ready)
+        return client.call_async(client.srv_type.Request() if request is None else request)
+
+    def answer(self, name='plan', request=None):
+        future = self.ask(name, request)
+        self.wait_until(future.done)
+        return future.result()
+
+    def value(self, key):
+        """Return a value of the last diagnostics; they are of all namespaces in a process."""
+        arrays = self.heard['/diagnostics']
+        if not arrays:
+            return None
+        return {v.key: v.value for v in arrays[-1].status[0].values}[key]
+
+
+@pytest.fixture(name='start')
+def _start(spinning, wait_until, request):
+    running = []
+    namespace = f'/test_{abs(hash(request.node.name)) % 10**9}'
+
+    def start(**parameters):
+        given = [Parameter(name=name, value=value) for name, value in parameters.items()]
+        planner = PlannerNode(namespace=namespace, parameter_overrides=given)
+        stranger = Stranger(namespace, wait_until)
+        contexts = [spinning(planner), spinning(stranger.node)]
+        for context in contexts:
+            context.__enter__()
+        running.append((planner, stranger, contexts))
+        return planner, stranger
+
+    yield start
+    for planner, stranger, contexts in running:
+        planner.close()
+        for context in contexts:
+            context.__exit__(None, None, None)
+        planner.destroy_node()
+        stranger.node.destroy_node()
+
+
+def inputs_of(planner):
+    return planner._listener._inputs
+
+
+def say_all(planner, stranger, but=(), **messages):
+    """Publish all inputs, but some, and wait until they have come in."""
+    topics = [name for name in TOPICS if name not in but]
+    for name in topics:
+        stranger.say(name, messages.get(name, TOPICS[name][1]()))
+    inputs = inputs_of(planner)
+    of_topic = dict(zip(TOPICS, (inputs.body, inputs.target, inputs.joints), strict=True))
+    stranger.wait_until(
+        lambda: all(of_topic[n].received is not None or of_topic[n].refusal for n in topics)
+    )
+
+
+def test_a_plan_is_published_and_then_answered(start):
+    planner, stranger = start(seed=3)
+    say_all(planner, stranger)
+    response = stranger.answer()
+    assert response.success
+    assert response.message.startswith('SUCCESS (1): ')
+    for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
+        assert word in response.message
+    for topic in ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers'):
+        stranger.wait_until(lambda topic=topic: stranger.heard[topic])
+    (msg,) = stranger.heard['joint_trajectory']
+    assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == (0, 0)
+    assert msg.header.frame_id == 'torso'
+    trajectory = joint_trajectory_from_msg(msg, JOINTS)
+    np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
+    for values in (trajectory.velocities, trajectory.accelerations):
+        assert not values[[0, -1]].any()
+    assert pointing_error(load_arm(), trajectory.positions[-1], np.array([1.5, 0.1, 0.3])) < 1e-6
+    assert len(stranger.heard['rrth_planner/tool_path'][0].poses) > 1
+    shown = {m.ns for m in stranger.heard['rrth_planner/markers'][0].markers}
+    assert shown == {'', 'body', 'arm_start', 'arm_goal', 'ray', 'tool_path'}
+
+
+def test_get_plan_takes_its_target_and_returns_the_path_of_the_tool(start):
+    planner, stranger = start()
+    say_all(planner, stranger, but=('target',))
+    request = GetPlan.Request()
+    request.goal.pose.position.x, request.goal.pose.position.z = 1.5, 0.3
+    path = stranger.answer('get_plan', request).plan
+    assert path.header.frame_id == 'torso'
+    assert len(path.poses) > 1
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+
+
+@pytest.mark.parametrize(
+    ('field', 'value', 'code'),
+    [
+        ('start.header.frame_id', 'torso', 'INVALID_GOAL_CONSTRAINTS (-16)'),
+        ('goal.header.frame_id', 'camera', 'FRAME_TRANSFORM_FAILURE (-21)'),
+        ('goal.pose.position.x', NAN, 'INVALID_GOAL_CONSTRAINTS (-16)'),
+        ('goal.pose.position.x', 0.01, 'GOAL_IN_COLLISION (-12)'),
+    ],
+)
+def test_get_plan_answers_a_bad_request_with_an_empty_path(start, field, value, code):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    request = GetPlan.Request()
+    request.goal.pose.position.z = 0.01
+    thing, *names = request, *field.split('.')
+    for name in names[:-1]:
+        thing = getattr(thing, name)
+    setattr(thing, names[-1], value)
+    assert not stranger.answer('get_plan', request).plan.poses
+    stranger.wait_until(lambda: stranger.value('last code') == code)
+    assert not stranger.heard['joint_trajectory']
+
+
+@pytest.mark.parametrize('missing', TOPICS)
+def test_without_an_input_the_answer_names_its_topic(start, missing):
+    planner, stranger = start()
+    say_all(planner, stranger, but=(missing,))
+    response = stranger.answer()
+    assert not response.success
+    assert response.message.startswith('UNABLE_TO_AQUIRE_SENSOR_DATA (-5): no ')
+    assert f'/{missing}, expected' in response.message
+    assert not stranger.heard['joint_trajectory']
+
+
+@pytest.mark.parametrize(
+    ('messages', 'answer'),
+    [
+        ({'body_boxes': array(command(Marker.DELETEALL))}, 'UNABLE_TO_AQUIRE_SENSOR_DATA (-5): '),
+        (
+            {'body_boxes': array(box('pack', center=(-0.3, -0.1, 0.3), text='back pack'))},
+            'START_STATE_IN_COLLISION (-10): ',
+        ),
+        ({'joint_states': joints([0.0, 1.0, 0.0, 0.0])}, 'START_STATE_INVALID (-26): joint_2'),
+        ({'target': target(0.0, 0.0, 0.0)}, 'GOAL_IN_COLLISION (-12): '),
+        (
+            {'target': target(frame='camera')},
+            'FRAME_TRANSFORM_FAILURE (-21): ',
+        ),
+        ({'target': target(NAN)}, 'INVALID_GOAL_CONSTRAINTS (-16): '),
+        (
+            {'body_boxes': array(box(frame='camera'))},
+            'FRAME_TRANSFORM_FAILURE (-21): ',
+        ),
+        (
+            {'body_boxes': array(box(size=(0.0, 1.0, 1.0)))},
+            'UNABLE_TO_AQUIRE_SENSOR_DATA (-5): no good body yet',
+        ),
+        (
+            {'joint_states': joints(FOLDED[:3], JOINTS[:3])},
+            'UNABLE_TO_AQUIRE_SENSOR_DATA (-5): no good joint positions yet',
+        ),
+    ],
+)
+def test_each_obstacle_to_planning_has_its_code(start, messages, answer):
+    planner, stranger = start()
+    say_all(planner, stranger, **messages)
+    response = stranger.answer()
+    assert not response.success
+    assert response.message.startswith(answer)
+    stranger.wait_until(lambda: stranger.value('last code') == answer.split(':')[0])
+    assert not stranger.heard['joint_trajectory']
+
+
+@pytest.mark.parametrize(
+    ('timeout', 'answer'),
+    [('body_timeout', 'SENSOR_INFO_STALE (-24)'), ('joint_timeout', 'ROBOT_STATE_STALE (-23)')],
+)
+def test_old_inputs_are_refused_with_their_age(start, timeout, answer):
+    planner, stranger = start(**{timeout: 1e-6})
+    say_all(planner, stranger)
+    message = stranger.answer().message
+    assert message.startswith(answer)
+    assert f's old, expected at most 1e-06 s ({timeout})' in message
+
+
+@pytest.mark.parametrize(
+    ('option', 'value', 'answer'),
+    [('max_samples', 100, 'PLANNING_FAILED (-1): '), ('time_limit', 0.05, 'TIMED_OUT (-6): ')],
+)
+def test_the_search_may_run_out_of_samples_or_time(start, option, value, answer):
+    planner, stranger = start(**{**ENDLESS, option: value})
+    say_all(planner, stranger, body_boxes=fenced())
+    assert stranger.answer().message.startswith(answer)
+
+
+def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
+    planner, stranger = start(**ENDLESS)
+    say_all(planner, stranger, body_boxes=fenced())
+    running, waiting = stranger.ask('plan'), stranger.ask('plan')
+    wait_until(lambda: planner._queue._n_open == 2)
+    assert stranger.answer('cancel').message == 'SUCCESS (1): requests that are ended by this: 2'
+    wait_until(lambda: running.done() and waiting.done())
+    for future in (running, waiting):
+        assert future.result().message.startswith('PREEMPTED (-7): ')
+    assert not stranger.heard['joint_trajectory']
+    stranger.publishers['body_boxes'].publish(wearer())
+    wait_until(lambda: inputs_of(planner).body.value.n_boxes == 2)
+    assert stranger.answer().success
+
+
+def test_messages_are_heard_and_callers_wait_while_it_plans(start, wait_until):
+    planner, stranger = start(**ENDLESS)
+    say_all(planner, stranger, body_boxes=fenced())
+    first = stranger.ask('plan')
+    wait_until(lambda: planner._queue._n_open == 1)
+    for k in range(20):
+        stranger.publishers['target'].publish(target(1.4, 0.01 * k, 0.2))
+        wait_until(lambda k=k: inputs_of(planner).target.value.target[1] == 0.01 * k)
+    stranger.publishers['body_boxes'].publish(wearer())
+    wait_until(lambda: inputs_of(planner).body.value.n_boxes == 2)
+    assert not first.done()
+    stranger.answer('cancel')
+    futures = [stranger.ask('plan') for _ in range(3)]
+    wait_until(lambda: first.done() and all(f.done() for f in futures))
+    assert not first.result().success
+    assert all(f.result().success for f in futures)
+
+
+def test_whatever_goes_wrong_is_answered(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+
+    def fail(*_, **__):
+        raise ZeroDivisionError('of a test')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, 'plan_motion', fail)
+        message = stranger.answer().message
+    assert message == (
+        'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test'
+    )
+    assert not stranger.heard['joint_trajectory']
+    assert stranger.answer().success
+
+
+@pytest.mark.parametrize(
+    ('topic', 'msg', 'sentence'),
+    [
+        (
+            'body_boxes',
+            array(box('arm', center=(0.1, 0.1, 0.45), size=(3.0, 3.0, 3.0))),
+            'the wearer moved',
+        ),
+        ('joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000 rad'),
+    ],
+)
+def test_a_plan_for_what_is_no_longer_there_is_not_published(
+    start, monkeypatch, wait_until, topic, msg, sentence
+):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+
+    def plan_while_things_move(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        body, positions = inputs.body.value, inputs.joints.value
+        stranger.publishers[topic].publish(msg)
+        wait_until(lambda: inputs.body.value is not body or inputs.joints.value is not positions)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_things_move)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
+    assert sentence in message
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_the_same_seed_gives_the_same_trajectory(start):
+    planner, stranger = start(seed=7, improve_time=0.0)
+    say_all(planner, stranger)
+    assert stranger.answer().success
+    assert stranger.answer().success
+    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 2)
+    one, other = stranger.heard['joint_trajectory']
+    assert one == other
+
+
+@pytest.mark.parametrize('profile', [LATCHED, VOLATILE, BEST_EFFORT])
+def test_publishers_of_every_quality_are_heard_once(start, profile):
+    planner, stranger = start()
+    for name, (_, make) in TOPICS.items():
+        stranger.say(name, make(), profile)
+        publisher = stranger.publishers[name]
+        stranger.wait_until(lambda p=publisher: p.get_subscription_count() > 0)
+    inputs = inputs_of(planner)
+    if profile is not LATCHED:
+        for name, (_, make) in TOPICS.items():
+            stranger.publishers[name].publish(make())
+    stranger.wait_until(lambda: all(i.received is not None for i in inputs.all.values()))
+
+
+def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until):
+    early = Node('early', namespace='/latched')
+    publishers = [
+        (early.create_publisher(kind, name, LATCHED), make)
+        for name, (kind, make) in TOPICS.items()
+    ]
+    for publisher, make in publishers:
+        publisher.publish(make())
+    planner = PlannerNode(namespace='/latched')
+    with spinning(early), spinning(planner):
+        wait_until(lambda: all(i.received is not None for i in inputs_of(planner).all.values()))
+    planner.close()
+    planner.destroy_node()
+    early.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('topic', 'msg', 'sentence'),
+    [
+        ('body_boxes', array(box(center=(NAN, 0.0, 0.0))), 'expected finite numbers [m]'),
+        ('body_boxes', array(box(size=(-1.0, 1.0, 1.0))), 'expected three lengths > 0 [m]'),
+        ('body_boxes', array(box('ok'), box(frame='camera')), 'marker 1 ("torso/0"): frame'),
+        ('joint_states', joints(FOLDED[:3], JOINTS[:3]), "no ['joint_4']"),
+        ('joint_states', joints([NAN] * 4), 'expected finite numbers [rad]'),
+    ],
+)
+def test_a_refused_message_is_reported_and_changes_nothing(start, topic, msg, sentence):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs = inputs_of(planner)
+    before = (inputs.body.value, inputs.joints.value)
+    stranger.publishers[topic].publish(msg)
+    name = {'body_boxes': 'body', 'joint_states': 'joints'}[topic]
+    stranger.wait_until(lambda: stranger.value(f'refused messages, {name}') == '1')
+    assert sentence in stranger.value(f'last refusal, {name}')
+    assert (inputs.body.value, inputs.joints.value) == before
+    assert stranger.answer().success
+
+
+def test_a_refused_target_is_not_replaced_by_the_one_before(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    stranger.publishers['target'].publish(target(frame='camera'))
+    stranger.wait_until(lambda: inputs_of(planner).target.n_refused == 1)
+    assert stranger.answer().message.startswith('FRAME_TRANSFORM_FAILURE (-21): the last message')
+    stranger.publishers['target'].publish(target())
+    stranger.wait_until(lambda: not inputs_of(planner).target.is_last_refused)
+    assert stranger.answer().success
+
+
+def test_joint_states_of_other_machines_are_ignored(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    stranger.publishers['joint_states'].publish(joints([NAN], ['wheel']))
+    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
+    heard = inputs_of(planner).joints
+    stranger.wait_until(lambda: heard.value[0] == 0.1)
+    assert heard.n_refused == 0
+
+
+@pytest.fixture(name='process')
+def _process():
+    processes = []
+
+    def run(*arguments):
+        processes.append(
+            subprocess.Popen(
+                [sys.executable, '-m', 'rrth_planner.ros.planner_node', *arguments],
+                stderr=subprocess.PIPE,
+                text=True,
+                env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+            )
+        )
+        return processes[-1]
+
+    yield run
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_process_even_while_it_plans(process, spinning, wait_until, number):
+    namespace = f'/process_{number}'
+    options = [word for k, v in ENDLESS.items() for word in ('-p', f'{k}:={v}')]
+    running = process('--ros-args', '-r', f'__ns:={namespace}', *options)
+    stranger = Stranger(namespace, wait_until)
+    with spinning(stranger.node):
+        for name, (_, make) in TOPICS.items():
+            stranger.say(name, fenced() if name == 'body_boxes' else make())
+        wait_until(stranger.services['plan'].service_is_ready, 120.0)
+        wait_until(
+            lambda: all(
+                stranger.value(f'age of {n} [s]') not in (None, 'inf')
+                for n in ('body', 'target', 'joints')
+            )
+        )
+        asked = stranger.ask('plan')
+        # The request is on its way before this answer, and requests are taken in turn.
+        stranger.answer('get_plan', GetPlan.Request(start=_framed()))
+        assert not asked.done()
+        running.send_signal(number)
+        _, errors = running.communicate(timeout=30)
+    stranger.node.destroy_node()
+    assert running.returncode == 0, errors
+    assert 'Traceback' not in errors
+
+
+def _framed():
+    request = GetPlan.Request()
+    request.start.header.frame_id = 'nowhere'
+    return request.start
+
+
+@pytest.mark.parametrize(
+    ('argument', 'sentence'),
+    [
+        ('margin:=3.0', 'margin out of range'),
+        ('margin:=3', "Trying to set parameter 'margin' to '3' of type 'INTEGER'"),
+        ('max_jerk:=[1.0, 2.0]', 'max_jerk: [1.0, 2.0], expected 4 values'),
+    ],
+)
+def test_a_bad_parameter_ends_the_start_with_one_line(process, argument, sentence):
+    running = process('--ros-args', '-p', argument)
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 1
+    (line,) = errors.strip().splitlines()
+    assert sentence in line

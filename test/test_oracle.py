@@ -1,0 +1,60 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The judge is judged: by points along the bar, and by the polynomials it solves for."""
+
+from hypothesis import assume, given, settings, strategies as st
+import numpy as np
+from rrth_planner.arm import forward_kinematics
+from rrth_planner.oracle import bar_box_touch, bars, frames, quintic_states
+from rrth_planner.resources import load_arm
+from rrth_planner.rotation import rotation_matrix
+from rrth_planner.trajectory import sample, Trajectory
+
+ARM = load_arm()
+COORDINATES = st.tuples(*[st.floats(-1.0, 1.0)] * 3)
+QUATERNIONS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    a=COORDINATES,
+    b=COORDINATES,
+    center=COORDINATES,
+    half=st.tuples(*[st.floats(0.01, 0.8)] * 3),
+    quaternion=QUATERNIONS,
+)
+def test_a_bar_meets_a_box_where_one_of_its_points_is_inside(a, b, center, half, quaternion):
+    rotation, half = rotation_matrix(quaternion), np.array(half)
+    t = np.linspace(0.0, 1.0, 4001)[:, None]
+    points = np.array(a) + t * np.subtract(b, a)
+    # The largest coordinate over its half size: below 1 is inside.
+    depth = (np.abs((points - center) @ rotation) - half).max(axis=1).min()
+    # Between two points the bar may still enter by less than their distance.
+    assume(not -1e-9 < depth < np.linalg.norm(np.subtract(b, a)) / 4000 + 1e-9)
+    touches = bar_box_touch(np.array([a, b]), np.array(center), rotation, half)
+    assert bool(touches) == (depth < 0.0)
+
+
+def test_frames_are_those_of_the_arm():
+    q = np.random.default_rng(0).uniform(ARM.bounds[0], ARM.bounds[1], (50, 4))
+    for one, poses in zip(q, frames(ARM, q), strict=True):
+        np.testing.assert_allclose(poses, forward_kinematics(ARM, one), atol=1e-12)
+
+
+def test_bars_hang_together_and_end_in_the_ray():
+    q = np.random.default_rng(1).uniform(ARM.bounds[0], ARM.bounds[1], (50, 4))
+    ends = bars(ARM, q, 1.5)
+    np.testing.assert_allclose(ends[:, 1:, 0], ends[:, :-1, 1], atol=1e-12)
+    T = frames(ARM, q)[:, -1]
+    np.testing.assert_allclose(ends[:, -1, 1], T[:, :3, 3] + 1.5 * T[:, :3, 2], atol=1e-12)
+
+
+def test_states_of_a_controller_are_samples_of_the_trajectory():
+    rng = np.random.default_rng(2)
+    times = np.cumsum(np.append(0.0, rng.uniform(0.05, 1.0, 6)))
+    p, v, a = rng.normal(size=(3, 7, 4))
+    trajectory = Trajectory(times=times, positions=p, velocities=v, accelerations=a)
+    grid, *states = quintic_states(times, p, v, a, 0.003)
+    for one, other in zip(states, sample(trajectory, grid), strict=True):
+        # At the points both pieces give position, velocity and acceleration.
+        np.testing.assert_allclose(one, other, atol=1e-6)

@@ -1,0 +1,78 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The picture of motions renders, and its axes say what they show."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('matplotlib')
+
+from rrth_planner.arm import forward_kinematics, tool_pose  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.scene import Box, Scene  # noqa: E402
+from rrth_planner.trajectory import MotionLimits, Trajectory  # noqa: E402
+from rrth_planner.viewers.arm_view import arm_points  # noqa: E402
+from rrth_planner.viewers.plots import Motion, motion_figure  # noqa: E402
+
+ARM = load_arm()
+LIMITS = MotionLimits(velocity=[1.5] * 4, acceleration=[4.0] * 4, jerk=[40.0] * 4)
+SCENE = Scene(
+    (
+        Box('torso', [0.0, 0.0, 0.0], [0.3, 0.46, 0.6], np.eye(3)),
+        Box('head', [0.02, 0.0, 0.45], [0.26, 0.24, 0.3], np.eye(3)),
+    )
+)
+FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])
+
+
+def picture(n_motions):
+    """Return a figure of some motions, drawn."""
+    T = tool_pose(ARM, FOLDED - 0.4)
+    trajectory = Trajectory(
+        times=[0.0, 1.0],
+        positions=[FOLDED, FOLDED - 0.4],
+        velocities=np.zeros((2, 4)),
+        accelerations=np.zeros((2, 4)),
+    )
+    motion = Motion(
+        label='lamp',
+        trajectory=trajectory,
+        target=T[:3, 3] + T[:3, 2],
+        caption='0.80 rad in 1.00 s',
+    )
+    figure = motion_figure(ARM, SCENE, [motion] * n_motions, LIMITS, 1.0)
+    figure.canvas.draw()
+    return figure
+
+
+@pytest.mark.parametrize('n_motions', [1, 3])
+def test_each_motion_has_a_view_and_two_plots_whose_axes_carry_units(n_motions):
+    axes = picture(n_motions).axes
+    assert len(axes) == 3 * n_motions
+    for row in range(n_motions):
+        view, position, velocity = axes[3 * row :][:3]
+        for label in (view.get_xlabel(), view.get_ylabel(), view.get_zlabel()):
+            assert label.endswith('[m]')
+        assert position.get_ylabel() == 'position [rad]'
+        assert velocity.get_ylabel() == 'velocity [rad/s]'
+        assert velocity.get_xlabel() == 'time [s]'
+        assert 'lamp' in position.get_title(loc='left')
+        names = [text.get_text() for text in position.get_legend().get_texts()]
+        assert names == ['joint 1', 'joint 2', 'joint 3', 'joint 4', 'limits']
+
+
+def test_the_picture_is_not_blank():
+    pixels = np.asarray(picture(1).canvas.buffer_rgba())[..., :3]
+    assert (pixels < 250).any(axis=2).mean() > 0.02
+    left, right = np.array_split(pixels, 2, axis=1)
+    assert left.std() > 5.0
+    assert right.std() > 5.0
+
+
+def test_the_drawn_arm_goes_from_the_mount_through_all_frames():
+    points, poses = arm_points(ARM, FOLDED), forward_kinematics(ARM, FOLDED)
+    np.testing.assert_array_equal(points[0], ARM.T_base_mount[:3, 3])
+    np.testing.assert_array_equal(points[2::2], poses[:, :3, 3])
+    corners = points[1::2]
+    lengths = np.linalg.norm(points[2::2] - corners, axis=1)
+    np.testing.assert_allclose(lengths, np.abs(ARM.dh[:, 3]), atol=1e-12)

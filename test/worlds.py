@@ -1,0 +1,324 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Arms, wearers and a fast dense oracle that the tests share; nothing random without an rng."""
+
+from hypothesis import HealthCheck, settings
+from numba import njit
+import numpy as np
+from rrth_planner.arm import arm_from_mapping, ArmModel
+from rrth_planner.kernels import kinematics
+from rrth_planner.oracle import bars
+from rrth_planner.reach import bar_ends
+from rrth_planner.rotation import rotation_matrix
+from rrth_planner.scene import Box, Scene
+from rrth_planner.trajectory import MotionLimits
+from rrth_planner.world import arm_world, World
+
+MARGIN, RAY = 0.02, 1.0
+HALF_TURN, QUARTER = np.pi, 0.5 * np.pi
+
+# Table 1 of Zou et al. 2024: alpha, a, offset, d, lower, upper.
+ROWS = (
+    (-QUARTER, 0.0, -QUARTER, 0.126, -HALF_TURN, HALF_TURN),
+    (QUARTER, 0.0, -QUARTER, 0.0, -HALF_TURN, 0.0),
+    (QUARTER, 0.0, QUARTER, 0.386, -HALF_TURN, HALF_TURN),
+    (QUARTER, 0.0, 0.0, 0.038, -HALF_TURN, HALF_TURN),
+)
+# Name, centre, full size [m], quaternion (x, y, z, w).
+UPRIGHT, FLEXED = (0.0, 0.0, 0.0, 1.0), (0.0, -0.17364817766693033, 0.0, 0.984807753012208)
+WEARER = (
+    ('torso', (0.0, 0.0, 0.0), (0.3, 0.46, 0.6), UPRIGHT),
+    ('head', (0.02, 0.0, 0.45), (0.26, 0.24, 0.3), UPRIGHT),
+    ('upper_arm_right', (0.0, -0.31, 0.08), (0.16, 0.16, 0.38), UPRIGHT),
+    ('upper_arm_left', (0.0, 0.31, 0.08), (0.16, 0.16, 0.38), UPRIGHT),
+    ('forearm_right', (0.17, -0.27, -0.06), (0.4, 0.13, 0.13), FLEXED),
+    ('forearm_left', (0.17, 0.27, -0.06), (0.4, 0.13, 0.13), FLEXED),
+    ('thigh_right', (0.04, -0.12, -0.58), (0.22, 0.21, 0.56), UPRIGHT),
+    ('thigh_left', (0.04, 0.12, -0.58), (0.22, 0.21, 0.56), UPRIGHT),
+)
+# Behind the back, the tool down.
+FOLDED = np.array([0.0, -0.35, QUARTER, QUARTER])
+
+
+def examples(n):
+    """Return the settings of a property test: n cases, the same ones on every run."""
+    return settings(
+        max_examples=n,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+
+
+def table_1_mapping():
+    """Return the arm of the paper as `config/arm.yaml` describes it."""
+    return {
+        'joints': [
+            {
+                'name': f'joint_{i + 1}',
+                'type': 'revolute',
+                'alpha': alpha,
+                'a': a,
+                'offset': offset,
+                'd': d,
+                'lower': lower,
+                'upper': upper,
+                'radius': 0.0,
+            }
+            for i, (alpha, a, offset, d, lower, upper) in enumerate(ROWS)
+        ],
+        'tool': {'alpha': -QUARTER, 'a': 0.0, 'offset': 0.0, 'radius': 0.0},
+        'mount': {'position': [-0.24, -0.1, 0.36], 'quaternion_xyzw': [0.5, 0.5, 0.5, 0.5]},
+    }
+
+
+def table_1_arm(radius=0.0):
+    """Return the arm of the paper, all its bars of one radius [m]."""
+    data = table_1_mapping()
+    for row in (*data['joints'], data['tool']):
+        row['radius'] = radius
+    return arm_from_mapping(data)
+
+
+def wearer():
+    """Return the standing wearer, forearms forward."""
+    return Scene(tuple(Box(n, c, s, rotation_matrix(quat)) for n, c, s, quat in WEARER))
+
+
+def limits(dof=4):
+    """Return the default limits of every joint."""
+    return MotionLimits(
+        velocity=np.full(dof, 1.5), acceleration=np.full(dof, 4.0), jerk=np.full(dof, 40.0)
+    )
+
+
+def turn(axis, angle):
+    """Return the rotation about x, y or z (0, 1, 2) by an angle [rad], shape (3, 3)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i] = R[j, j] = np.cos(angle)
+    R[j, i] = np.sin(angle)
+    R[i, j] = -np.sin(angle)
+    return R
+
+
+def random_rotation(rng):
+    """Return a uniform random rotation, shape (3, 3)."""
+    return rotation_matrix(rng.standard_normal(4))
+
+
+def varied_body(rng):
+    """Return a wearer of another build and posture, who leaves the arm room to move."""
+    while True:
+        scene = _random_body(rng)
+        world = arm_world(table_1_arm(), scene, 2 * MARGIN, RAY)
+        if np.mean([world.is_valid(q) for q in rng.uniform(*world.bounds, (100, 4))]) > 0.2:
+            return scene
+
+
+def _random_body(rng):
+    """Return a wearer with limbs raised and bent, the head turned."""
+    boxes = []
+
+    def add(name, center, size, rotation):
+        center = np.asarray(center) + rng.uniform(-0.01, 0.01, 3)
+        boxes.append(Box(name, center, np.asarray(size) * rng.uniform(0.9, 1.15, 3), rotation))
+
+    add('torso', (0.0, 0.0, 0.0), (0.3, 0.46, 0.6), turn(2, rng.uniform(-0.1, 0.1)))
+    nod = turn(2, rng.uniform(-1.0, 1.0)) @ turn(1, rng.uniform(-0.3, 0.5))
+    add('head', (0.02, 0.0, 0.45), (0.26, 0.24, 0.3), nod)
+    for side, word in ((-1.0, 'right'), (1.0, 'left')):
+        shoulder = np.array([0.0, side * 0.3, 0.24])
+        # At rest the limb hangs along -z; raised forward about -y, sideways about x.
+        upper = turn(0, side * rng.uniform(0.0, 1.4)) @ turn(1, -rng.uniform(-0.3, 2.6))
+        elbow = shoulder - 0.32 * upper[:, 2]
+        add(f'upper_arm_{word}', shoulder - 0.16 * upper[:, 2], (0.16, 0.16, 0.38), upper)
+        fore = upper @ turn(1, -rng.uniform(0.1, 2.2))
+        add(f'forearm_{word}', elbow - 0.17 * fore[:, 2], (0.13, 0.13, 0.4), fore)
+        thigh = turn(1, -rng.uniform(0.0, 1.5))
+        hip = np.array([0.04, side * 0.12, -0.3])
+        add(f'thigh_{word}', hip - 0.28 * thigh[:, 2], (0.22, 0.21, 0.56), thigh)
+    return Scene(tuple(boxes))
+
+
+def random_boxes(rng, n, spread=1.0, largest=0.4):
+    """Return n boxes anywhere, at any angle."""
+    return Scene(
+        tuple(
+            Box(
+                f'box_{i}',
+                rng.uniform(-spread, spread, 3),
+                rng.uniform(0.05, largest, 3),
+                random_rotation(rng),
+            )
+            for i in range(n)
+        )
+    )
+
+
+def random_chain(rng, has_tail):
+    """Return an arm of 3 to 7 joints, at times one of them prismatic; a pan-tilt tail or none."""
+    dof = int(rng.integers(3, 8))
+    angles = np.array([0.0, QUARTER, -QUARTER, HALF_TURN])
+    dh = np.zeros((dof + 1, 4))
+    dh[:, 0] = np.where(
+        rng.random(dof + 1) < 0.6, rng.choice(angles, dof + 1), rng.uniform(-3.0, 3.0, dof + 1)
+    )
+    dh[:, 1] = np.where(rng.random(dof + 1) < 0.5, 0.0, rng.uniform(-0.3, 0.3, dof + 1))
+    dh[:, 2] = rng.uniform(-3.0, 3.0, dof + 1)
+    dh[:-1, 3] = np.where(rng.random(dof) < 0.4, 0.0, rng.uniform(-0.4, 0.4, dof))
+    if has_tail:
+        dh[-2:, 0] = rng.choice([QUARTER, -QUARTER], 2)
+        dh[-2:, 1] = 0.0
+    is_prismatic = np.zeros(dof, dtype=bool)
+    if rng.random() < 0.6:
+        is_prismatic[rng.integers(0, dof - 2 if has_tail else dof)] = True
+    lower = np.where(is_prismatic, rng.uniform(-0.3, 0.1, dof), rng.uniform(-3.5, -1.0, dof))
+    upper = np.where(is_prismatic, lower + rng.uniform(0.1, 0.5, dof), rng.uniform(1.0, 3.5, dof))
+    T = np.eye(4)
+    T[:3, :3] = random_rotation(rng)
+    T[:3, 3] = rng.uniform(-0.5, 0.5, 3)
+    return ArmModel(
+        joint_names=tuple(f'j{i}' for i in range(dof)),
+        is_prismatic=tuple(is_prismatic),
+        dh=dh,
+        bounds=np.stack([lower, upper]),
+        radii=rng.uniform(0.0, 0.05, dof + 1) if rng.random() < 0.5 else np.zeros(dof + 1),
+        T_base_mount=T,
+    )
+
+
+def wearer_world(margin=MARGIN, ray=RAY, radius=0.0):
+    """Return the world of the paper's arm round the standing wearer."""
+    return arm_world(table_1_arm(radius), wearer(), margin, ray)
+
+
+def free_configuration(rng, world: World):
+    """Return a random valid configuration."""
+    for _ in range(10000):
+        q = rng.uniform(*world.bounds)
+        if world.is_valid(q):
+            return q
+    raise AssertionError('a world without a free configuration')
+
+
+def kernel_bars(arm, world, q, ray):
+    """Return the bars as the kernel sees them, in the base frame, (n_bars, 2, 3) [m]."""
+    n = len(world.bar_names)
+    points = np.full((1, 3 * (n + 1)), np.nan)
+    kinematics.chain_points(world.robot, q, ray, points, 0)
+    ends = points.reshape(n + 1, 3) @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
+    return np.stack([ends[:-1], ends[1:]], axis=1)
+
+
+def oracle_bars(arm, q, ray):
+    """Return the bars that have a length as the oracle sees them, (n, n_bars, 2, 3) [m]."""
+    labels = [
+        (row, end)
+        for row in range(arm.dof + 1)
+        for end in 'ad'
+        if row > 0 or (end == 'd' and arm.is_prismatic[0])
+    ]
+    wanted = [labels.index(label) for label in bar_ends(arm)]
+    return bars(arm, np.atleast_2d(q), ray)[:, wanted]
+
+
+def line(q_from, q_to):
+    """Return the straight motion as polynomial coefficients, lowest first, (2, dof)."""
+    return np.stack([q_from, q_to - q_from])
+
+
+def bezier_quintic(control):
+    """Return the polynomial of a Bezier curve of degree five; control, result (6, dof)."""
+    to_powers = np.array(
+        [
+            [1, 0, 0, 0, 0, 0],
+            [-5, 5, 0, 0, 0, 0],
+            [10, -20, 10, 0, 0, 0],
+            [-10, 30, -30, 10, 0, 0],
+            [5, -20, 30, -20, 5, 0],
+            [-1, 5, -10, 10, -5, 1],
+        ],
+        dtype=float,
+    )
+    return np.ascontiguousarray(to_powers @ control)
+
+
+@njit
+def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halves):
+    """Walk a curve instant by instant: products of frames, bars clipped by slabs."""
+    dof = curve.shape[1]
+    for k in range(n):
+        u = k / (n - 1) if n > 1 else 0.0
+        R, p = T0[:3, :3].copy(), T0[:3, 3].copy()
+        for i in range(dof + 1):
+            value = 0.0
+            if i < dof:
+                for power in range(curve.shape[0] - 1, -1, -1):
+                    value = value * u + curve[power, i]
+            alpha, a, theta, d = dh[i]
+            if i == dof:
+                d = ray
+            elif slides[i]:
+                d += value
+            else:
+                theta += value
+            ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
+            corner, turned = np.empty(3), np.empty((3, 3))
+            end = np.empty(3)
+            for r in range(3):
+                corner[r] = p[r] + a * R[r, 0]
+                y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
+                turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
+                turned[r, 2] = z
+                end[r] = corner[r] + d * z
+            for side in range(2):
+                length = a if side == 0 else d
+                is_mount = i == 0 and (side == 0 or not slides[0])
+                # An offset without length is no bar, whatever its radius.
+                is_bar = length != 0.0 or (side == 1 and (i == dof or slides[i]))
+                if is_mount or not is_bar:
+                    continue
+                first, last = (p, corner) if side == 0 else (corner, end)
+                for j in range(centers.shape[0]):
+                    enter, leave = 0.0, 1.0
+                    for axis in range(3):
+                        at, step = 0.0, 0.0
+                        for r in range(3):
+                            at += (first[r] - centers[j, r]) * rotations[j, r, axis]
+                            step += (last[r] - first[r]) * rotations[j, r, axis]
+                        half = halves[j, axis] + radii[i]
+                        if step == 0.0:
+                            if abs(at) > half:
+                                enter = 2.0
+                        else:
+                            s, t = (-half - at) / step, (half - at) / step
+                            enter, leave = max(enter, min(s, t)), min(leave, max(s, t))
+                    if enter <= leave:
+                        return k
+            R, p = turned, end
+    return -1
+
+
+def dense_touch(arm, scene, margin, ray, curve, n):
+    """Return the first of n instants at which a polynomial motion touches a box, or -1."""
+    boxes = scene.boxes
+    return _first_touch(
+        arm.dh,
+        np.array(arm.is_prismatic),
+        arm.T_base_mount,
+        ray,
+        arm.radii,
+        np.ascontiguousarray(curve),
+        n,
+        np.array([box.center for box in boxes]).reshape(-1, 3),
+        np.array([box.rotation for box in boxes]).reshape(-1, 3, 3),
+        np.array([0.5 * box.size + margin for box in boxes]).reshape(-1, 3),
+    )
+
+
+def edge_touches(arm, scene, margin, ray, q_from, q_to, spacing=5e-4):
+    """Return whether an edge looked at every `spacing` [rad] touches a box."""
+    n = int(np.linalg.norm(q_to - q_from) / spacing) + 2
+    return dense_touch(arm, scene, margin, ray, line(q_from, q_to), n) >= 0
