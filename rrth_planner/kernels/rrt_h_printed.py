@@ -42,7 +42,10 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, c
         for t in range(1, m + 1):
             for k in range(dof):
                 q[k] = path[i + 1, k] + t / m * (path[i + 2, k] - path[i + 1, k])
-            if first_contact(is_edge_free, resolution, robot, obstacles, path[i], q, checks) <= 1.0:
+            if (
+                first_contact(is_edge_free, resolution, robot, obstacles, path[i], q, checks)
+                <= 1.0
+            ):
                 blocked = t
                 break
         if blocked == 0:
@@ -100,14 +103,11 @@ def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, ch
     return n
 
 
-@kernel(
-    int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, float64, float64)
-)
+@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
 def shorten(is_edge_free, resolution, robot, obstacles, path, n, targets, checks, least):
     """Do steps 1, 2 and 3 once each, in place; return the number of waypoints."""
-    arguments = (is_edge_free, resolution, robot, obstacles)
-    n = pull_forward(*arguments, path, n, targets, checks)
+    n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
-    n = pull_forward(*arguments, path, n, targets, checks)
+    n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
-    return cut_corners(*arguments, path, n, targets, checks, least)
+    return cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, checks, least)
