@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of the planners, one class an algorithm."""
+"""The options of the planners, one class an algorithm: the class is the choice."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -16,11 +16,9 @@ def _option(default: Any, low: float, high: float, unit: str, text: str) -> Any:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RRTHOptions:
+class TreeOptions:
     """
-    RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways.
-
-    Every field carries its range, unit and meaning in its metadata.
+    What all planners have in common; every field carries range, unit and meaning as metadata.
 
     Raises
     ------
@@ -29,23 +27,14 @@ class RRTHOptions:
 
     """
 
-    step_size: float = _option(1.5, 0.01, 10.0, 'rad', 'longest extension of a tree')
-    goal_bias: float = _option(0.05, 0.0, 1.0, '-', 'chance that a draw is a goal posture')
-    corner_spacing: float = _option(
-        0.01, 1e-4, 1.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
+    step_size: float = _option(1.5, 0.01, 1000.0, 'rad', 'longest extension of a tree')
+    clearance_gain: float = _option(
+        0.0, 0.0, 1000.0, '-', 'step as a multiple of the free radius; 0: always step_size'
     )
+    goal_bias: float = _option(0.05, 0.0, 1.0, '-', 'chance that a draw is a goal posture')
+    is_bidirectional: bool = _option(True, 0, 1, '-', 'grow a tree from the goals too')
     max_samples: int = _option(20000, 1, 10**7, '-', 'draws of one growth before it gives up')
     time_limit: float = _option(2.0, 1e-3, 3600.0, 's', 'planning fails after this time')
-    improve_time: float = _option(
-        0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
-    )
-    club_attempts: int = _option(
-        6, 0, 10**4, '-', 'further growths with the path club after the first path'
-    )
-    club_radius: float = _option(0.5, 0.0, 100.0, 'rad', 'range in which club points count')
-    club_count: int = _option(2, 0, 10**6, '-', 'a new point with more club points is rejected')
-    club_probability: float = _option(0.9, 0.0, 1.0, '-', 'chance of that rejection')
-    club_budget: int = _option(400, 1, 10**7, '-', 'draws of one growth with the path club')
 
     def __post_init__(self) -> None:
         """Validate each field against its own metadata."""
@@ -56,3 +45,63 @@ class RRTHOptions:
                     f'{f.name}: {value}, expected {meta["low"]:g} to {meta["high"]:g} '
                     f'[{meta["unit"]}]'
                 )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RRTOptions(TreeOptions):
+    """RRT (LaValle 1998), or RRT-Connect (Kuffner and LaValle 2000): the first path."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RRTStarOptions(TreeOptions):
+    """RRT* (Karaman and Frazzoli 2011): the best path after `max_samples` draws."""
+
+    improve_time: float = _option(
+        0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
+    )
+    rewire_factor: float = _option(
+        1.1, 0.01, 100.0, '-', 'radius of the neighbourhood over the least that is optimal'
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InformedRRTStarOptions(RRTStarOptions):
+    """Informed RRT* (Gammell et al. 2014)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RRTStarSmartOptions(RRTStarOptions):
+    """RRT*-Smart (Nasir et al. 2013)."""
+
+    biasing_ratio: int = _option(2, 1, 10**6, '-', 'every so many draws one is near a beacon')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RRTHOptions(TreeOptions):
+    """RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways."""
+
+    corner_spacing: float = _option(
+        0.01, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
+    )
+    improve_time: float = _option(
+        0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
+    )
+    club_attempts: int = _option(
+        6, 0, 10**4, '-', 'further growths with the path club after the first path'
+    )
+    club_radius: float = _option(0.5, 0.0, 1000.0, 'rad', 'range in which club points count')
+    club_count: int = _option(2, 0, 10**6, '-', 'a new point with more club points is rejected')
+    club_probability: float = _option(0.9, 0.0, 1.0, '-', 'chance of that rejection')
+    club_budget: int = _option(400, 1, 10**7, '-', 'draws of one growth with the path club')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintedRRTHOptions(RRTHOptions):
+    """
+    RRT-H with the three steps as printed, to check the paper by; its paths may touch.
+
+    P_T and P_C are the points of section 2: along the segment, and along the lines to it.
+    """
+
+    target_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_T')
+    check_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_C')

@@ -15,7 +15,7 @@ from rrth_planner.certificate import certify, least_clearance
 from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
-from rrth_planner.options import RRTHOptions
+from rrth_planner.options import RRTHOptions, TreeOptions
 from rrth_planner.path import Path
 from rrth_planner.planner import plan, PlanResult
 from rrth_planner.refusal import goal_refusal, Refusal, start_refusal, target_refusal
@@ -74,7 +74,7 @@ def plan_motion(
     q_start: Array,
     goal: PointingGoal,
     limits: MotionLimits,
-    options: RRTHOptions,
+    options: TreeOptions,
     *,
     margin: float,
     ray_guard_length: float,
@@ -94,7 +94,8 @@ def plan_motion(
         Where the arm is, at rest [rad].
     goal : PointingGoal
     limits : MotionLimits
-    options : RRTHOptions
+    options : TreeOptions
+        Their class is the choice of the algorithm.
     margin : float
         Clearance kept from every box [m].
     ray_guard_length : float
@@ -152,7 +153,7 @@ def _find_path(
     goal: PointingGoal,
     world: World,
     q_start: Array,
-    options: RRTHOptions,
+    options: TreeOptions,
     seed: int,
     should_stop: Callable[[], bool],
     begin: float,

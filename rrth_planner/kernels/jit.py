@@ -18,6 +18,7 @@ from numba.experimental.function_type import _get_wrapper_address
 # a signature tells inputs (VEC, MAT) from outputs (OUT_...).
 VEC = types.Array(float64, 1, 'C', readonly=True)
 MAT = types.Array(float64, 2, 'C', readonly=True)
+READ_INTS = types.Array(int64, 1, 'C', readonly=True)
 OUT_VEC = types.Array(float64, 1, 'C')
 OUT_MAT = types.Array(float64, 2, 'C')
 OUT_CUBE = types.Array(float64, 3, 'C')

@@ -18,11 +18,26 @@ from rclpy.parameter import Parameter
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError, RrthError
-from rrth_planner.options import RRTHOptions
+from rrth_planner.options import (
+    InformedRRTStarOptions,
+    RRTHOptions,
+    RRTOptions,
+    RRTStarOptions,
+    RRTStarSmartOptions,
+    TreeOptions,
+)
 from rrth_planner.resources import load_arm
 from rrth_planner.trajectory import MotionLimits
 
-ALGORITHMS = {'rrt_h': RRTHOptions}
+ALGORITHMS: dict[str, type[TreeOptions]] = {
+    'rrt_h': RRTHOptions,
+    'rrt': RRTOptions,
+    'rrt_star': RRTStarOptions,
+    'informed_rrt_star': InformedRRTStarOptions,
+    'rrt_star_smart': RRTStarSmartOptions,
+}
+# The options of all algorithms by name; the same name means the same in each.
+OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 LONGEST_TIMEOUT = 86400.0
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
 LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
@@ -97,7 +112,7 @@ def settings(dof: int) -> tuple[Setting, ...]:
                 f.metadata['unit'],
                 f.metadata['description'],
             )
-            for f in fields(RRTHOptions)
+            for f in OPTIONS.values()
         ),
     )
 
@@ -118,7 +133,8 @@ class PlannerParameters:
     body_timeout, joint_timeout : float
         [s]; 0: never.
     limits : MotionLimits
-    options : RRTHOptions
+    options : TreeOptions
+        Their class is the algorithm.
 
     """
 
@@ -130,7 +146,7 @@ class PlannerParameters:
     body_timeout: float
     joint_timeout: float
     limits: MotionLimits
-    options: RRTHOptions
+    options: TreeOptions
 
 
 def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
@@ -148,6 +164,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
             f'algorithm: "{values["algorithm"]}", expected one that is available: '
             f'{", ".join(ALGORITHMS)}'
         )
+    algorithm = ALGORITHMS[values['algorithm']]
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
     return PlannerParameters(
@@ -163,7 +180,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
             acceleration=_of_each_joint('max_acceleration', values, arm.dof),
             jerk=_of_each_joint('max_jerk', values, arm.dof),
         ),
-        options=RRTHOptions(**{f.name: values[f.name] for f in fields(RRTHOptions)}),
+        options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
     )
 
 

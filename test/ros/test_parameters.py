@@ -98,7 +98,7 @@ def test_a_change_is_there_for_the_next_plan(started):
         ('max_velocity', [NAN], 'max_velocity: [nan], expected 4 values'),
         ('max_acceleration', [0.0] * 4, '1e+06 [rad/s^2]'),
         ('max_jerk', [-1.0], '[rad/s^3]'),
-        ('algorithm', 'rrt_star', 'algorithm: "rrt_star", expected one that is available: rrt_h'),
+        ('algorithm', 'prm', 'algorithm: "prm", expected one that is available: rrt_h, rrt,'),
         ('time_limit', 'soon', 'Wrong parameter type'),
         ('arm', 'other.yaml', 'read-only'),
         ('base_frame', 'camera', 'read-only'),

@@ -1,0 +1,145 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Maps of axis-aligned boxes, in the plane or in any dimension, for a point to move among."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import SceneError
+from rrth_planner.kernels import jit, map_validity
+from rrth_planner.problem import PlanningProblem
+from rrth_planner.world import World
+
+EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
+SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)
+FREE_RADIUS = jit.first_class(map_validity.free_radius)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BoxMap:
+    """
+    A start, a goal and the boxes between them; touching a box is allowed, entering it is not.
+
+    Parameters
+    ----------
+    name : str
+    bounds : array_like, shape (2, dof)
+        Lower and upper corner of the map. A box that touches it goes on beyond: the border is
+        no way round.
+    obstacles : array_like, shape (m, 2, dof)
+        Lower and upper corner of each box.
+    start, goal : array_like, shape (dof,)
+
+    Raises
+    ------
+    SceneError
+        A box without inside, a start or goal outside the map or inside a box.
+
+    """
+
+    name: str
+    bounds: Array
+    obstacles: Array
+    start: Array
+    goal: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        dof = np.shape(self.bounds)[-1]
+        obstacles = np.reshape(self.obstacles, (-1, 2, dof)) if len(self.obstacles) == 0 else None
+        for field, value, shape in (
+            ('bounds', self.bounds, (2, dof)),
+            ('obstacles', self.obstacles if obstacles is None else obstacles, (None, 2, dof)),
+            ('start', self.start, (dof,)),
+            ('goal', self.goal, (dof,)),
+        ):
+            label = f'map "{self.name}": {field}'
+            object.__setattr__(self, field, frozen_array(value, shape, label, 'map', SceneError))
+        low, high = self.bounds
+        if not (low < high).all():
+            raise SceneError(
+                f'map "{self.name}": bounds {self.bounds.tolist()}, expected lower < upper'
+            )
+        for i, (lower, upper) in enumerate(self.obstacles):
+            if not (lower < upper).all():
+                raise SceneError(
+                    f'map "{self.name}": obstacle {i} from {lower.tolist()} to {upper.tolist()}, '
+                    'expected a positive size along every axis'
+                )
+        for field in ('start', 'goal'):
+            q = getattr(self, field)
+            if not ((q >= low) & (q <= high)).all():
+                raise SceneError(
+                    f'map "{self.name}": {field} {q.tolist()}, expected within '
+                    f'{low.tolist()} to {high.tolist()}'
+                )
+            inside = ((q > self.obstacles[:, 0]) & (q < self.obstacles[:, 1])).all(axis=1)
+            if inside.any():
+                raise SceneError(
+                    f'map "{self.name}": {field} {q.tolist()} is inside obstacle '
+                    f'{int(np.argmax(inside))}, expected a free point'
+                )
+
+
+def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:
+    """
+    Return the map that a mapping describes, laid out as the files in `config/maps`.
+
+    In the plane a row of `rectangles` is xmin, ymin, xmax, ymax; in general a row of `boxes` is
+    the lower corner, then the upper one, and `bounds` alike.
+
+    Raises
+    ------
+    SceneError
+        Something is missing, has another name or describes no map.
+
+    """
+    try:
+        start = np.asarray(data['start'], dtype=float)
+        rows = data['rectangles'] if 'rectangles' in data else data['boxes']
+        return BoxMap(
+            name=str(data.get('name', name)),
+            bounds=np.asarray(data['bounds'], dtype=float).reshape(2, len(start)),
+            obstacles=np.asarray(rows, dtype=float).reshape(-1, 2, len(start)),
+            start=start,
+            goal=np.asarray(data['goal'], dtype=float),
+        )
+    except KeyError as missing:
+        raise SceneError(
+            f'map "{name}": no {missing}, expected bounds, rectangles or boxes, start and goal'
+        ) from None
+    except (TypeError, ValueError, AttributeError) as problem:
+        raise SceneError(
+            f'map "{name}": {problem}; expected numbers laid out as in config/maps'
+        ) from problem
+
+
+def map_world(box_map: BoxMap) -> World:
+    """Return the world of a point on a map; its edge check is exact."""
+    low, high = box_map.bounds
+    beyond = high - low
+    lower, upper = np.array(box_map.obstacles[:, 0]), np.array(box_map.obstacles[:, 1])
+    lower = np.where(lower <= low, lower - beyond, lower)
+    upper = np.where(upper >= high, upper + beyond, upper)
+    return World(
+        bounds=box_map.bounds,
+        robot=np.zeros((1, 1)),
+        obstacles=np.hstack([lower, upper]),
+        edge_check=EDGE_CHECK,
+        free_radius=FREE_RADIUS,
+        resolution=1.0,
+        bar_names=('point',),
+        box_names=tuple(f'obstacle {i}' for i in range(len(lower))),
+    )
+
+
+def map_problem(box_map: BoxMap, world: World | None = None) -> PlanningProblem:
+    """Return the planning problem of a map, in its own world or in another one made from it."""
+    return PlanningProblem(
+        world=map_world(box_map) if world is None else world,
+        q_start=box_map.start,
+        q_goals=box_map.goal[None, :],
+    )

@@ -1,0 +1,54 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Other ways to check an edge: at a spacing, or at the paper's check points."""
+
+from dataclasses import replace
+
+from rrth_planner.box_map import EDGE_CHECK as MAP_CHECK, SAMPLED_CHECK as SAMPLED_MAP_CHECK
+from rrth_planner.errors import OptionsError
+from rrth_planner.kernels import arm_sampling, jit
+from rrth_planner.world import World
+
+SAMPLED_ARM_CHECK = jit.first_class(arm_sampling.is_edge_free_sampled)
+POINTS_ARM_CHECK = jit.first_class(arm_sampling.is_edge_free_at_points)
+
+
+def sampled(world: World, resolution: float) -> World:
+    """
+    Return the same world, edges checked exactly but only at a spacing.
+
+    What lies between two checks is not seen: 98 of 100 shortened arm paths accepted at 0.02 rad
+    touch a box. For comparisons, never for a person.
+
+    Parameters
+    ----------
+    world : World
+    resolution : float
+        Spacing of the checks along an edge [rad].
+
+    """
+    check = SAMPLED_MAP_CHECK if world.edge_check is MAP_CHECK else SAMPLED_ARM_CHECK
+    return replace(world, edge_check=check, resolution=_spacing(resolution))
+
+
+def by_check_points(world: World, resolution: float) -> World:
+    """
+    Return the same world, checked as the paper does: points inside cuboids (its eqs. 1 and 2).
+
+    On a map the point itself is the only check point; an arm has ten on each bar and on the ray.
+
+    Parameters
+    ----------
+    world : World
+    resolution : float
+        Spacing of the checks along an edge [rad].
+
+    """
+    check = SAMPLED_MAP_CHECK if world.edge_check is MAP_CHECK else POINTS_ARM_CHECK
+    return replace(world, edge_check=check, resolution=_spacing(resolution))
+
+
+def _spacing(resolution: float) -> float:
+    if not resolution > 0.0:
+        raise OptionsError(f'resolution: {resolution}, expected a spacing > 0 [rad]')
+    return resolution

@@ -1,0 +1,37 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The clock and the cancel flag of one plan."""
+
+from collections.abc import Callable
+import time
+
+from rrth_planner.status import PlanStatus
+
+
+class Deadline:
+    """
+    Says how long a plan has been running, and when it must end.
+
+    Parameters
+    ----------
+    time_limit : float
+        [s], from now.
+    should_stop : callable
+        True cancels.
+
+    """
+
+    def __init__(self, time_limit: float, should_stop: Callable[[], bool]) -> None:
+        """Start the clock."""
+        self._start = time.perf_counter()
+        self._time_limit, self._should_stop = time_limit, should_stop
+
+    def elapsed(self) -> float:
+        """Return the time since the plan began [s]."""
+        return time.perf_counter() - self._start
+
+    def status(self) -> PlanStatus | None:
+        """Return why planning must end now, or None."""
+        if self._should_stop():
+            return PlanStatus.CANCELLED
+        return PlanStatus.TIMEOUT if self.elapsed() > self._time_limit else None

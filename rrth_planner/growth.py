@@ -1,0 +1,179 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Growth to a first path: RRT with one tree or two, and what RRT-H builds on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.deadline import Deadline
+from rrth_planner.kernels import reuse, rrt, tree
+from rrth_planner.options import RRTHOptions, TreeOptions
+from rrth_planner.path import Path
+from rrth_planner.problem import PlanningProblem
+from rrth_planner.result import PlanResult, Tree
+from rrth_planner.status import PlanStatus
+
+MAX_WAYPOINTS = 4096
+# Draws between two looks at the clock.
+BATCH = 100
+# Nodes that a tree has room for, at most.
+MAX_NODES = 200_000
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Growth:
+    """
+    What one growth brought.
+
+    Parameters
+    ----------
+    waypoints : ndarray or None
+        The first path, shape (n, dof) [rad].
+    n_samples : int
+        Draws that it took.
+    stopped : PlanStatus or None
+        Why growth had to stop, if it had.
+    trees : tuple of Tree
+
+    """
+
+    waypoints: Array | None
+    n_samples: int
+    stopped: PlanStatus | None
+    trees: tuple[Tree, ...]
+
+
+def search(
+    problem: PlanningProblem,
+    options: TreeOptions,
+    rng: np.random.Generator,
+    deadline: Deadline,
+    previous: tuple[Tree, ...],
+) -> PlanResult:
+    """Return the first path that RRT finds, unshortened."""
+    grown = grow(problem, problem.q_goals, options, rng, deadline, previous=previous)
+    if grown.waypoints is None:
+        return PlanResult(
+            status=grown.stopped or PlanStatus.SAMPLE_LIMIT,
+            path=None,
+            trees=grown.trees,
+            n_samples=grown.n_samples,
+            planning_time=deadline.elapsed(),
+            is_reproducible=grown.stopped is None,
+        )
+    path = Path(grown.waypoints)
+    return PlanResult(
+        status=PlanStatus.SOLVED,
+        path=path,
+        raw_path=path,
+        trees=grown.trees,
+        cost_history=(path.length,),
+        sample_history=(grown.n_samples,),
+        time_history=(deadline.elapsed(),),
+        n_samples=grown.n_samples,
+        planning_time=deadline.elapsed(),
+    )
+
+
+def grow(
+    problem: PlanningProblem,
+    roots: Array,
+    options: TreeOptions,
+    rng: np.random.Generator,
+    deadline: Deadline,
+    *,
+    previous: tuple[Tree, ...] = (),
+    club: Array | None = None,
+    best_cost: float = np.inf,
+    budget: int | None = None,
+) -> Growth:
+    """
+    Return a first path from the start to one of the roots, if the budget suffices.
+
+    Parameters
+    ----------
+    problem : PlanningProblem
+    roots : ndarray, shape (n, dof)
+        Goals to aim for [rad].
+    options : TreeOptions
+    rng : numpy.random.Generator
+    deadline : Deadline
+    previous : tuple of Tree
+        Trees of an earlier plan: what is still free of them is where growth begins.
+    club : ndarray, shape (m, dof)
+        Points to keep away from [rad]; the options are then RRTHOptions.
+    best_cost : float
+        Only draws that could lead to a shorter path are made [rad].
+    budget : int
+        Draws at most; by default `max_samples`.
+
+    """
+    world, dof = problem.world, len(problem.q_start)
+    budget = options.max_samples if budget is None else budget
+    club = np.empty((0, dof)) if club is None else club
+    radius, count, probability = (
+        (options.club_radius, options.club_count, options.club_probability)
+        if isinstance(options, RRTHOptions)
+        else (0.0, 0, 0.0)
+    )
+    capacity = min(2 * budget, MAX_NODES) + len(roots) + sum(len(t.nodes) for t in previous) + 2
+    tree_q = np.empty((2, capacity, dof))
+    parents = np.full((2, capacity), -1, dtype=np.int64)
+    sizes = np.array([1, len(roots), 0, len(roots)], dtype=np.int64)
+    tree_q[0, 0] = problem.q_start
+    tree_q[1, : len(roots)] = roots
+    meeting = np.full(2, -1, dtype=np.int64)
+    seam = (world.resolution, world.robot, world.obstacles)
+    for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
+        sizes[side] = reuse.transplant(
+            world.edge_check,
+            *seam,
+            old.nodes,
+            old.parents,
+            sizes[side],
+            tree_q[side],
+            parents[side],
+        )
+    if previous:
+        reuse.join(world.edge_check, *seam, options.step_size, tree_q, sizes, meeting)
+    drawn, stopped = 0, None
+    while meeting[0] < 0 and drawn < budget and sizes[:2].max() < capacity - 1:
+        stopped = deadline.status()
+        if stopped is not None:
+            break
+        drawn += rrt.advance(
+            world.edge_check,
+            world.free_radius,
+            *seam,
+            world.bounds,
+            options.step_size,
+            options.clearance_gain,
+            options.goal_bias,
+            options.is_bidirectional,
+            best_cost,
+            club,
+            radius,
+            count,
+            probability,
+            min(BATCH, budget - drawn),
+            rng,
+            tree_q,
+            parents,
+            sizes,
+            meeting,
+        )
+    waypoints = None
+    if meeting[0] >= 0:
+        path = np.empty((MAX_WAYPOINTS, dof))
+        n = tree.trace_path(tree_q, parents, meeting[0], meeting[1], path)
+        waypoints = path[:n].copy() if n else None
+    return Growth(
+        waypoints=waypoints,
+        n_samples=drawn,
+        stopped=stopped,
+        trees=tuple(
+            Tree(nodes=tree_q[side, : sizes[side]], parents=parents[side, : sizes[side]])
+            for side in range(2 if options.is_bidirectional else 1)
+        ),
+    )

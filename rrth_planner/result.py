@@ -1,0 +1,93 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What planning brought: a path or none, the trees, and how the cost fell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import RrthError
+from rrth_planner.path import Path
+from rrth_planner.status import PlanStatus
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Tree:
+    """
+    Configurations and where each came from.
+
+    Parameters
+    ----------
+    nodes : array_like, shape (n, dof)
+        [rad].
+    parents : array_like of int, shape (n,)
+        Index of the parent, before its children; -1 for a root.
+
+    """
+
+    nodes: Array
+    parents: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        """Freeze."""
+        dof = np.shape(self.nodes)[-1]
+        nodes = frozen_array(self.nodes, (None, dof), 'nodes', 'rad', RrthError)
+        parents = np.array(self.parents, dtype=np.int64)
+        parents.setflags(write=False)
+        if len(parents) != len(nodes) or not (parents < np.arange(len(nodes))).all():
+            raise RrthError('parents: expected for every node one that comes before it, or -1')
+        object.__setattr__(self, 'nodes', nodes)
+        object.__setattr__(self, 'parents', parents)
+
+
+def ordered_tree(nodes: Array, parents: NDArray[np.int64]) -> Tree:
+    """Return a tree whose nodes come in the order of their depth, so parents come first."""
+    depth = np.zeros(len(nodes), dtype=np.int64)
+    above = np.array(parents)
+    while (above >= 0).any():
+        depth[above >= 0] += 1
+        above = np.where(above >= 0, parents[above], -1)
+    order = np.argsort(depth, kind='stable')
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    old = parents[order]
+    return Tree(nodes=nodes[order], parents=np.where(old >= 0, rank[old], -1))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlanResult:
+    """
+    How planning ended.
+
+    Parameters
+    ----------
+    status : PlanStatus
+        SOLVED, TIMEOUT, SAMPLE_LIMIT or CANCELLED.
+    path : Path or None
+        The best path; None unless solved.
+    raw_path : Path or None
+        The first path that growth found, before any shortening; None where a straight edge did.
+    trees : tuple of Tree
+        From the start and, with two trees, from the goals, as they were last.
+    cost_history, sample_history, time_history : tuple of float, of int, of float
+        Length of the best path after each improvement [rad], draws and seconds until then.
+    n_samples : int
+        Draws in all.
+    planning_time : float
+        [s].
+    is_reproducible : bool
+        False where the clock ended the improvement: the seed alone does not fix the path then.
+
+    """
+
+    status: PlanStatus
+    path: Path | None
+    raw_path: Path | None = None
+    trees: tuple[Tree, ...] = ()
+    cost_history: tuple[float, ...] = ()
+    sample_history: tuple[int, ...] = ()
+    time_history: tuple[float, ...] = ()
+    n_samples: int = 0
+    planning_time: float = 0.0
+    is_reproducible: bool = True

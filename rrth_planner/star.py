@@ -1,0 +1,224 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""RRT*, Informed RRT* and RRT*-Smart: paths that get shorter as the trees grow."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.arrays import Array
+from rrth_planner.deadline import Deadline
+from rrth_planner.growth import BATCH, MAX_NODES, MAX_WAYPOINTS
+from rrth_planner.kernels import (
+    informed_rrt_star,
+    reuse,
+    rrt_star,
+    rrt_star_smart,
+    tree,
+)
+from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
+from rrth_planner.path import Path
+from rrth_planner.problem import PlanningProblem
+from rrth_planner.result import ordered_tree, PlanResult, Tree
+from rrth_planner.status import PlanStatus
+
+# Pairs of nodes at which the two trees meet, at most.
+MAX_MEETINGS = 65536
+
+
+class _Trees:
+    """The buffers of the two trees, as the kernels see them."""
+
+    def __init__(
+        self, problem: PlanningProblem, options: RRTStarOptions, previous: tuple[Tree, ...]
+    ) -> None:
+        dof, n_goals = len(problem.q_start), len(problem.q_goals)
+        old = sum(len(t.nodes) for t in previous)
+        capacity = min(options.max_samples, MAX_NODES) + n_goals + old + 2
+        self.tree_q = np.empty((2, capacity, dof))
+        self.links = np.full((2, 3, capacity), -1, dtype=np.int64)
+        self.costs = np.zeros((2, capacity))
+        self.sizes = np.array([1, n_goals, 0, n_goals], dtype=np.int64)
+        self.tree_q[0, 0] = problem.q_start
+        self.tree_q[1, :n_goals] = problem.q_goals
+        self.meetings = np.empty((MAX_MEETINGS, 2), dtype=np.int64)
+        self.best = np.array([np.inf, -1.0])
+        self.is_bidirectional = options.is_bidirectional
+        for side, grown in enumerate(previous[: 2 if options.is_bidirectional else 1]):
+            self._take_over(problem, side, grown)
+        if previous:
+            self._meet(problem, options)
+
+    def _take_over(self, problem: PlanningProblem, side: int, old: Tree) -> None:
+        """Begin with what is still free of an earlier tree."""
+        world, n_roots = problem.world, int(self.sizes[side])
+        parents = np.full(self.tree_q.shape[1], -1, dtype=np.int64)
+        n = reuse.transplant(
+            world.edge_check,
+            world.resolution,
+            world.robot,
+            world.obstacles,
+            old.nodes,
+            old.parents,
+            n_roots,
+            self.tree_q[side],
+            parents,
+        )
+        for i in range(n_roots, n):
+            parent = parents[i]
+            rrt_star.attach(self.links[side], i, parent)
+            step = np.linalg.norm(self.tree_q[side, i] - self.tree_q[side, parent])
+            self.costs[side, i] = self.costs[side, parent] + step
+        self.sizes[side] = n
+
+    def _meet(self, problem: PlanningProblem, options: RRTStarOptions) -> None:
+        """Look for a first path in the trees that were taken over."""
+        world, meeting = problem.world, np.full(2, -1, dtype=np.int64)
+        reuse.join(
+            world.edge_check,
+            world.resolution,
+            world.robot,
+            world.obstacles,
+            options.step_size,
+            self.tree_q,
+            self.sizes,
+            meeting,
+        )
+        if meeting[0] >= 0:
+            self.meetings[0] = meeting
+            self.sizes[2] = 1
+            rrt_star.find_best(self.tree_q, self.costs, self.sizes, self.meetings, self.best)
+
+    def path(self) -> Array:
+        """Return the waypoints of the best path, shape (n, dof)."""
+        a, b = self.meetings[int(self.best[1])]
+        path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
+        parents: NDArray[np.int64] = np.ascontiguousarray(self.links[:, 0, :])
+        n = tree.trace_path(self.tree_q, parents, a, b, path)
+        return path[:n].copy()
+
+    def frozen(self) -> tuple[Tree, ...]:
+        """Return the trees as values."""
+        return tuple(
+            ordered_tree(self.tree_q[side, :n].copy(), self.links[side, 0, :n].copy())
+            for side, n in enumerate(self.sizes[: 2 if self.is_bidirectional else 1])
+        )
+
+
+def search(
+    problem: PlanningProblem,
+    options: RRTStarOptions,
+    rng: np.random.Generator,
+    deadline: Deadline,
+    previous: tuple[Tree, ...],
+) -> PlanResult:
+    """Return the best path after `max_samples` draws, or after `improve_time` since the first."""
+    world, dof = problem.world, len(problem.q_start)
+    trees = _Trees(problem, options, previous)
+    is_smart = isinstance(options, RRTStarSmartOptions)
+    bias = options.biasing_ratio if isinstance(options, RRTStarSmartOptions) else 1
+    advance = rrt_star.advance
+    if isinstance(options, InformedRRTStarOptions):
+        advance = informed_rrt_star.advance
+    elif is_smart:
+        advance = rrt_star_smart.advance
+    radius = options.rewire_factor * optimal_radius(world.bounds)
+    best_path: Array | None = None
+    raw_path: Path | None = None
+    beacons = np.empty((0, dof))
+    cost, tree_cost = np.inf, np.inf
+    history: list[tuple[float, int, float]] = []
+    drawn, stopped, is_cut = 0, None, False
+    first_time = np.inf
+    while drawn < options.max_samples:
+        stopped = deadline.status()
+        if stopped is not None:
+            break
+        if deadline.elapsed() - first_time > options.improve_time:
+            is_cut = options.improve_time > 0.0
+            break
+        if trees.sizes[:2].max() >= trees.tree_q.shape[1] - 1:
+            break
+        before = deadline.elapsed()
+        costs = np.empty(min(BATCH, options.max_samples - drawn))
+        made = advance(
+            world.edge_check,
+            world.free_radius,
+            world.resolution,
+            world.robot,
+            world.obstacles,
+            world.bounds,
+            options.step_size,
+            options.clearance_gain,
+            options.goal_bias,
+            radius,
+            options.is_bidirectional,
+            bias,
+            beacons,
+            len(costs),
+            rng,
+            trees.tree_q,
+            trees.links,
+            trees.costs,
+            trees.sizes,
+            trees.meetings,
+            trees.best,
+            costs,
+        )
+        if is_smart and trees.best[0] < tree_cost:
+            best_path, beacons = _better(problem, trees.path(), best_path)
+            costs[made - 1] = _length(best_path)
+        tree_cost = trees.best[0]
+        after = deadline.elapsed()
+        for i in range(made):
+            if costs[i] < cost:
+                cost = float(costs[i])
+                history.append((cost, drawn + i + 1, before + (i + 1) / made * (after - before)))
+        drawn += made
+        if cost < np.inf and first_time == np.inf:
+            first_time = after
+            raw_path = Path(trees.path())
+    if cost < np.inf and not is_smart:
+        best_path = trees.path()
+    solved = best_path is not None and stopped is not PlanStatus.CANCELLED
+    return PlanResult(
+        status=PlanStatus.SOLVED if solved else (stopped or PlanStatus.SAMPLE_LIMIT),
+        path=Path(best_path) if solved and best_path is not None else None,
+        raw_path=raw_path,
+        trees=trees.frozen(),
+        cost_history=tuple(entry[0] for entry in history),
+        sample_history=tuple(entry[1] for entry in history),
+        time_history=tuple(entry[2] for entry in history),
+        n_samples=drawn,
+        planning_time=deadline.elapsed(),
+        is_reproducible=stopped is None and not is_cut,
+    )
+
+
+def optimal_radius(bounds: Array) -> float:
+    """
+    Return the least gamma for which RRT* is asymptotically optimal (Karaman and Frazzoli 2011).
+
+    gamma = 2 (1 + 1/d)^(1/d) (mu / zeta_d)^(1/d), mu the volume of the bounds (at least that of
+    the free space), zeta_d that of the unit ball.
+    """
+    d = bounds.shape[1]
+    volume = float(np.prod(bounds[1] - bounds[0]))
+    ball = math.pi ** (d / 2) / math.gamma(d / 2 + 1)
+    return float(2 * (1 + 1 / d) ** (1 / d) * (volume / ball) ** (1 / d))
+
+
+def _better(problem: PlanningProblem, waypoints: Array, best: Array | None) -> tuple[Array, Array]:
+    """Return the shorter of a path, shortened, and the best one; and its inner waypoints."""
+    world, path = problem.world, waypoints.copy()
+    n = rrt_star_smart.skip_waypoints(
+        world.edge_check, world.resolution, world.robot, world.obstacles, path, len(path)
+    )
+    shorter = path[:n].copy()
+    if best is not None and _length(best) <= _length(shorter):
+        shorter = best
+    return shorter, np.ascontiguousarray(shorter[1:-1])
+
+
+def _length(waypoints: Array) -> float:
+    return float(np.linalg.norm(np.diff(waypoints, axis=0), axis=1).sum())
