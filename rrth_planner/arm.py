@@ -11,6 +11,8 @@ from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import ModelError
 from rrth_planner.rotation import pose_matrix
 
+JOINT_KEYS = {'name', 'type', 'alpha', 'a', 'offset', 'd', 'lower', 'upper', 'radius'}
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ArmModel:
@@ -72,6 +74,8 @@ class ArmModel:
             raise ModelError(f'radii: {self.radii.tolist()}, expected lengths >= 0 [m]')
         if self.dh[-1, 3] != 0.0:
             raise ModelError(f'dh: d = {self.dh[-1, 3]} in the row of the tool, expected 0 [m]')
+        if not np.array_equal(self.T_base_mount[3], [0.0, 0.0, 0.0, 1.0]):
+            raise ModelError(f'mount: last row {self.T_base_mount[3].tolist()}, expected 0 0 0 1')
         r = self.T_base_mount[:3, :3]
         if np.abs(r @ r.T - np.eye(3)).max() > 1e-6 or np.linalg.det(r) < 0.0:
             raise ModelError(f'mount: rotation {r.tolist()}, expected a rotation matrix [-]')
@@ -94,6 +98,15 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
     """
     try:
         joints = list(data['joints'])
+        _check_keys('arm', data, {'name', 'joints', 'tool', 'mount'})
+        for joint in joints:
+            _check_keys(f'joint "{joint["name"]}"', joint, JOINT_KEYS)
+        if data['tool'].get('d', 0.0) != 0.0:
+            raise ModelError(
+                f'tool: d = {data["tool"]["d"]}, expected none: the ray begins at the frame [m]'
+            )
+        _check_keys('tool', data['tool'], {'alpha', 'a', 'offset', 'd', 'radius'})
+        _check_keys('mount', data['mount'], {'position', 'quaternion_xyzw'})
         rows = [*joints, {**data['tool'], 'd': 0.0}]
         kinds = [str(joint['type']) for joint in joints]
         for joint, kind in zip(joints, kinds, strict=True):
@@ -124,6 +137,13 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         raise ModelError(
             f'arm description: {problem}; expected numbers laid out as in config/arm.yaml'
         ) from problem
+
+
+def _check_keys(what: str, given: Mapping[str, Any], known: set[str]) -> None:
+    """Refuse a key that would otherwise be overlooked, a misspelt radius say."""
+    unknown = sorted(set(given) - known)
+    if unknown:
+        raise ModelError(f'{what}: {", ".join(unknown)}, expected only {", ".join(sorted(known))}')
 
 
 def forward_kinematics(arm: ArmModel, q: Array) -> Array:

@@ -15,6 +15,8 @@ from rrth_planner.world import World
 SHARE = 0.45
 # Each try is this much smaller than the last, down to the smallest that still saves time [rad].
 SHRINK, SMALLEST = 0.6, 1e-3
+# A corner that hardly turns needs hardly a blend, but one it needs [rad].
+ENOUGH = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -105,7 +107,7 @@ def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
         float((0.75 * turn * cap**2 / limits.acceleration).max()),
         float(np.sqrt(1.5 * turn * cap**3 / limits.jerk).max()),
     )
-    half_length = min(whole.half_length, enough)
+    half_length = min(whole.half_length, max(enough, ENOUGH))
     while half_length > SMALLEST:
         blend = Blend(
             corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=half_length

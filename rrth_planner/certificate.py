@@ -81,6 +81,9 @@ def certify(trajectory: Trajectory, world: World) -> Certificate:
     Each piece is proven by the second-order certificate of `kernels.arm_validity.prove_curve`,
     from the very numbers that the trajectory holds.
     """
+    if len(trajectory.times) == 1:
+        is_free = world.is_valid(trajectory.positions[0])
+        return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
     coefficients = piece_coefficients(trajectory)
     speed, bend = derivative_bounds(coefficients)
     for i, curve in enumerate(coefficients):

@@ -14,9 +14,10 @@ from rrth_planner.trajectory import sample, Trajectory
 
 # Shortest time between two looks [s]; they are longer where the distance allows it.
 PERIOD = 0.001
-# The library's distances are good to about a micrometre; a bar without thickness becomes a
-# capsule of this radius [m].
-TOLERANCE, THINNEST = 2e-6, 1e-6
+# Bars become capsules this thin, and their radius is taken off the distance: of thick ones the
+# library overestimates it by up to half a millimetre. Then it is good to a few micrometres, rarely
+# worse, so a look comes this much earlier than the distance allows [m].
+THINNEST, TOLERANCE, EARLIER = 1e-6, 3e-6, 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class _Body:
 
     def __init__(self, arm: ArmModel, scene: Scene) -> None:
         self.arm, self.bars, self.names = arm, bar_ends(arm), bar_names(arm)
-        self.radii = [max(float(arm.radii[row]), THINNEST) for row, _ in self.bars]
+        self.radii = [float(arm.radii[row]) for row, _ in self.bars]
         # Each object carries its geometry's identity, by which a result names the box.
         geometries = [fcl.Box(*box.size) for box in scene.boxes]
         self.box_of = {
@@ -80,7 +81,7 @@ class _Body:
         self.boxes.distance(capsule, data, fcl.defaultDistanceCallback)
         found = data.result
         box = self.box_of.get(id(found.o1)) or self.box_of.get(id(found.o2), 'a box')
-        return float(found.min_distance), box
+        return float(found.min_distance) + THINNEST - self.radii[k], box
 
     def length(self, k: int, q: Array, ray_length: float) -> float:
         """Return the signed length of bar k at q, shape (dof,) [m]."""
@@ -95,7 +96,7 @@ class _Body:
         """Return the object of bar k with a length [m]."""
         kept, capsule = self.capsules.get(k, (-1.0, None))
         if kept != length:
-            capsule = fcl.CollisionObject(fcl.Capsule(self.radii[k], length))
+            capsule = fcl.CollisionObject(fcl.Capsule(THINNEST, length))
             self.capsules[k] = (length, capsule)
         return capsule
 
@@ -161,6 +162,7 @@ def first_touch(
                 break
             if i == n - 1:
                 break
-            ahead = int(np.searchsorted(way, way[i] + distance - margin, side='right')) - 1
+            free = distance - margin - EARLIER
+            ahead = int(np.searchsorted(way, way[i] + free, side='right')) - 1
             i = min(max(i + 1, ahead), n - 1)
     return min(touches, key=lambda touch: touch.time, default=None)

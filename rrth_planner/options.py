@@ -5,7 +5,10 @@
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+import numpy as np
 from rrth_planner.errors import OptionsError
+
+NUMBERS = (int, float, np.integer, np.floating)
 
 
 def _option(default: Any, low: float, high: float, unit: str, text: str) -> Any:
@@ -40,9 +43,12 @@ class TreeOptions:
         """Validate each field against its own metadata."""
         for f in fields(self):
             value, meta = getattr(self, f.name), f.metadata
-            if not meta['low'] <= value <= meta['high']:
+            is_count = f.type in ('int', int)
+            is_number = isinstance(value, (int, np.integer) if is_count else NUMBERS)
+            if not is_number or not meta['low'] <= value <= meta['high']:
+                kind = 'a whole number from ' if is_count else ''
                 raise OptionsError(
-                    f'{f.name}: {value}, expected {meta["low"]:g} to {meta["high"]:g} '
+                    f'{f.name}: {value!r}, expected {kind}{meta["low"]:g} to {meta["high"]:g} '
                     f'[{meta["unit"]}]'
                 )
 

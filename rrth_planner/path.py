@@ -25,8 +25,7 @@ class Path:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        dof = np.shape(self.waypoints)[-1]
-        value = frozen_array(self.waypoints, (None, dof), 'waypoints', 'rad', RrthError)
+        value = frozen_array(self.waypoints, (None, None), 'waypoints', 'rad', RrthError)
         if len(value) == 0:
             raise RrthError('waypoints: none, expected at least one [rad]')
         object.__setattr__(self, 'waypoints', value)

@@ -108,14 +108,19 @@ def plan_motion(
     """
     begin = time.perf_counter()
     world = arm_world(arm, scene, margin, ray_guard_length)
-    refusal = start_refusal(arm, world, q_start, margin) or target_refusal(scene, goal, margin)
+    refusal = start_refusal(
+        arm, grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
+    ) or target_refusal(scene, goal, margin)
     if refusal is None:
         found = _find_path(arm, goal, world, q_start, options, seed, should_stop, begin)
         if isinstance(found, PlanResult) and found.path is not None:
             timed = _time_path(arm, scene, goal, world, found.path, limits, margin)
-            if isinstance(timed, Trajectory):
+            if should_stop():
+                refusal = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+            elif isinstance(timed, Trajectory):
                 return _solved(arm, goal, world, found, timed, margin, seed, begin)
-            refusal = timed
+            else:
+                refusal = timed
         else:
             assert isinstance(found, Refusal)
             refusal = found
@@ -161,7 +166,7 @@ def _find_path(
     """Return the shortest path found, with as much spare clearance as there is room for."""
     goals: GoalSet | None = None
     result: PlanResult | None = None
-    n_samples = 0
+    n_samples, is_clocked = 0, False
     for spare in SPARES:
         roomy = grown(world, spare)
         if not roomy.is_valid(q_start):
@@ -178,16 +183,15 @@ def _find_path(
         rng = np.random.default_rng(seed)
         result = plan(problem, replace(options, time_limit=left), rng, should_stop)
         n_samples += result.n_samples
+        is_clocked |= result.status is PlanStatus.TIMEOUT
         if result.status in (PlanStatus.SOLVED, PlanStatus.CANCELLED):
             break
     if result is None:
-        # The start was valid without any spare, so the goals were asked for at least once, or
-        # only the hair of the smallest spare is missing at the start.
-        if goals is None:
-            goals = goal_configurations(arm, goal, world, q_start, MANY)
+        # The start keeps the smallest spare, so the goals were asked for.
+        assert goals is not None
         return goal_refusal(world, goals)
     if result.status is PlanStatus.SOLVED:
-        return result
+        return replace(result, is_reproducible=result.is_reproducible and not is_clocked)
     elapsed = time.perf_counter() - begin
     sentence = {
         PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
@@ -209,7 +213,7 @@ def _time_path(
     """Return the timed path once both judges agree that it is free, with stops if need be."""
     rounded = round_corners(path, grown(world, HAIR), limits)
     stops = tuple(replace(blend, half_length=0.0) for blend in rounded)
-    trajectory = _first_proven(path, (rounded, stops), limits, world)
+    trajectory = first_proven(path, (rounded, stops), limits, world)
     if trajectory is None:
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
@@ -226,11 +230,24 @@ def _time_path(
     return trajectory
 
 
-def _first_proven(
+def first_proven(
     path: Path, choices: tuple[tuple[Blend, ...], ...], limits: MotionLimits, world: World
 ) -> Trajectory | None:
-    for blends in choices:
-        trajectory = parameterize(path, blends, limits)
+    """
+    Return the fastest trajectory along a path that is proven free, or None.
+
+    Parameters
+    ----------
+    path : Path
+    choices : tuple of tuple of Blend
+        Ways to take the corners.
+    limits : MotionLimits
+    world : World
+
+    """
+    # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
+    timed = [parameterize(path, blends, limits) for blends in choices]
+    for trajectory in sorted(timed, key=lambda trajectory: trajectory.duration):
         if certify(trajectory, world).is_proven:
             return trajectory
     return None

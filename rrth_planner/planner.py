@@ -28,7 +28,7 @@ _SEARCH = {
     InformedRRTStarOptions: 'star',
     RRTStarSmartOptions: 'star',
     RRTHOptions: 'rrt_h',
-    PrintedRRTHOptions: 'rrt_h',
+    PrintedRRTHOptions: 'printed',
 }
 
 

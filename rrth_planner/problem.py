@@ -45,3 +45,5 @@ class PlanningProblem:
         for name, shape in (('q_start', (dof,)), ('q_goals', (None, dof))):
             value = frozen_array(getattr(self, name), shape, name, 'rad', RrthError)
             object.__setattr__(self, name, value)
+        if len(self.q_goals) == 0:
+            raise RrthError('q_goals: none, expected at least one configuration [rad]')

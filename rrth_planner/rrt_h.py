@@ -2,12 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
 
+from collections.abc import Callable
+
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grow, MAX_WAYPOINTS
 from rrth_planner.kernels import rrt_h
-from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
+from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.result import PlanResult, Tree
@@ -27,6 +29,7 @@ def search(
     rng: np.random.Generator,
     deadline: Deadline,
     previous: tuple[Tree, ...],
+    shorten_path: Callable[[PlanningProblem, Array, RRTHOptions], Array] | None = None,
 ) -> PlanResult:
     """
     Return the shortest path of some growths, each pulled taut.
@@ -34,12 +37,17 @@ def search(
     The straight edges to the goals come first, nearest goal first: a length that no path to a
     later goal can beat ends the search. Growths after the first path keep away from the path
     club, the points of all raw paths, and draw only where a shorter path can lead.
+    `shorten_path` stands in for `shorten`.
     """
+    pull = shorten if shorten_path is None else shorten_path
+    stopped = deadline.status()
+    if stopped is not None:
+        return PlanResult(status=stopped, path=None, is_reproducible=False)
     best, raw, trees = _straight(problem, options), None, previous
     history = [] if best is None else [(_length(best), 0, deadline.elapsed())]
     distances = np.linalg.norm(problem.q_goals - problem.q_start, axis=1)
     club = np.empty((0, len(problem.q_start)))
-    n_samples, is_reproducible, stopped = 0, True, None
+    n_samples, is_reproducible = 0, True
     for attempt in range(options.club_attempts + 1):
         cost = np.inf if best is None else _length(best)
         useful = np.flatnonzero(distances < cost * (1.0 - rrt_h.TAUT))[:MAX_ROOTS]
@@ -70,7 +78,7 @@ def search(
             continue
         raw = Path(grown.waypoints) if raw is None else raw
         club = np.concatenate([club, grown.waypoints[1:-1]])
-        path = shorten(problem, grown.waypoints, options)
+        path = pull(problem, grown.waypoints, options)
         if _length(path) < cost:
             best = path
             history.append((_length(path), n_samples, deadline.elapsed()))
@@ -107,7 +115,6 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
     waypoints : ndarray, shape (n, dof)
         A path of the problem [rad].
     options : RRTHOptions
-        PrintedRRTHOptions do the three steps as printed, and may touch.
 
     """
     world = problem.world
@@ -115,8 +122,6 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
     n = len(waypoints)
     path[:n] = waypoints
     arguments = (world.edge_check, world.resolution, world.robot, world.obstacles)
-    if isinstance(options, PrintedRRTHOptions):
-        return _shorten_as_printed(arguments, path, n, options)
     spacing = options.corner_spacing
     n = rrt_h.pull_taut(*arguments, path, n, spacing, MAX_ROUNDS)
     for _ in range(MAX_ROUNDS):
@@ -124,18 +129,6 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
         if gain < rrt_h.TAUT:
             break
         n = rrt_h.pull_taut(*arguments, path, n, spacing, MAX_ROUNDS)
-    return path[:n].copy()
-
-
-def _shorten_as_printed(
-    arguments: tuple[object, ...], path: Array, n: int, options: PrintedRRTHOptions
-) -> Array:
-    # Compiled only when somebody checks the paper.
-    from rrth_planner.kernels import rrt_h_printed
-
-    n = rrt_h_printed.shorten(
-        *arguments, path, n, options.target_spacing, options.check_spacing, options.corner_spacing
-    )
     return path[:n].copy()
 
 

@@ -77,7 +77,7 @@ class Trajectory:
         if len(times) == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
         object.__setattr__(self, 'times', times)
-        dof = np.shape(self.positions)[-1]
+        dof: int | None = None
         for name, unit in (
             ('positions', 'rad'),
             ('velocities', 'rad/s'),
@@ -85,6 +85,7 @@ class Trajectory:
         ):
             value = frozen_array(getattr(self, name), (len(times), dof), name, unit, RrthError)
             object.__setattr__(self, name, value)
+            dof = value.shape[1]
 
     @property
     def duration(self) -> float:

@@ -23,6 +23,11 @@ OWN = {
     'fcl_check': {'fcl'},
     'resources': {'yaml', 'ament_index_python'},
 }
+# The node says that it compiles before it imports what has to be compiled.
+LATE = {
+    ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
+    ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+}
 
 
 def imports_of(file):
@@ -69,7 +74,7 @@ def test_a_module_imports_only_what_its_layer_may(module):
     for name, level, is_top in imports_of(MODULES[module]):
         assert level == 0, f'{module} imports {name} relatively'
         assert allowed(module, name), f'{module} may not import {name}'
-        if name.startswith('rrth_planner'):
+        if name.startswith('rrth_planner') and (module, name) not in LATE:
             assert is_top, f'{module} imports {name} below the top'
         if name.startswith('rrth_planner.fcl_check'):
             assert module.endswith(('.pipeline', '.fcl_check')), f'{module} imports {name}'

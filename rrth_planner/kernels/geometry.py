@@ -8,6 +8,9 @@ from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, MAT, OUT_VEC
 
+# Bars nearer than this are in contact [m].
+CONTACT = 1e-12
+
 
 @kernel(boolean(float64, float64, float64, float64, float64, float64, float64, MAT))
 def bar_touches_boxes(ax, ay, az, bx, by, bz, radius, boxes):
@@ -86,7 +89,8 @@ def bar_box_distance(start, step, half):
     for k in range(3):
         excess = max(abs(start[k] + t * step[k]) - half[k], 0.0)
         squared += excess * excess
-    if squared > 0.0:
+    # Rounding alone can leave a bar right through the box some 1e-17 m outside.
+    if squared > CONTACT * CONTACT:
         return math.sqrt(squared)
     overlap = math.inf
     for k in range(3):

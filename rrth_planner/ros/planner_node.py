@@ -18,6 +18,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.errors import MessageError, ModelError, RrthError
+from rrth_planner.kernels.jit import is_compiled
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.frames import FrameError
@@ -73,8 +74,6 @@ class PlannerNode(Node):
                 f'python-fcl: {problem}, expected an installed one for the second check of every '
                 'motion (pip install python-fcl)'
             ) from problem
-        from rrth_planner.kernels.jit import is_compiled
-
         if not is_compiled():
             self.get_logger().info(
                 'compiling kernels, once for this machine: takes up to a minute'
