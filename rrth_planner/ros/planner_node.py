@@ -67,13 +67,11 @@ class PlannerNode(Node):
 
     def _load_planner(self) -> Callable[..., Any]:
         """Return what plans, compiled; imported here, since that may take up to a minute."""
-        try:
-            import fcl  # noqa: F401
-        except ImportError as problem:
+        if find_spec('fcl') is None:
             raise ModelError(
-                f'python-fcl: {problem}, expected an installed one for the second check of every '
-                'motion (pip install python-fcl)'
-            ) from problem
+                'python-fcl: not installed, expected for the second check of every motion '
+                '(pip install python-fcl)'
+            )
         if not is_compiled():
             self.get_logger().info(
                 'compiling kernels, once for this machine: takes up to a minute'
