@@ -15,7 +15,7 @@ from rrth_planner.certificate import certify, least_clearance
 from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
-from rrth_planner.options import RRTHOptions, TreeOptions
+from rrth_planner.options import TreeOptions
 from rrth_planner.path import Path
 from rrth_planner.planner import plan, PlanResult
 from rrth_planner.refusal import goal_refusal, Refusal, start_refusal, target_refusal
@@ -132,7 +132,7 @@ def plan_motion(
     )
 
 
-def warm_up(arm: ArmModel) -> None:
+def warm_up(arm: ArmModel, options: TreeOptions) -> None:
     """Plan once round a small box, so that every kernel is compiled and loaded."""
     q_start = arm.bounds.mean(axis=0)
     T = tool_pose(arm, q_start)
@@ -145,7 +145,7 @@ def warm_up(arm: ArmModel) -> None:
         q_start,
         PointingGoal(T[:3, 3] + T[:3, 2] + 0.1 * T[:3, 1]),
         MotionLimits(velocity=ones, acceleration=ones, jerk=ones),
-        RRTHOptions(),
+        options,
         margin=0.0,
         ray_guard_length=1.0,
         seed=0,

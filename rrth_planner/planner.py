@@ -65,8 +65,9 @@ def plan(
     if home is None:
         names = ', '.join(kind.__name__ for kind in _SEARCH)
         raise OptionsError(f'options: {type(options).__name__}, expected one of {names}')
-    deadline = Deadline(options.time_limit, should_stop)
+    # Compiling, the first time, is not planning: the clock starts afterwards.
     search = import_module(f'rrth_planner.{home}').search
+    deadline = Deadline(options.time_limit, should_stop)
     result: PlanResult = search(
         problem, options, rng, deadline, () if previous is None else previous.trees
     )

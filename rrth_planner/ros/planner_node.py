@@ -3,6 +3,7 @@
 """The planner as a ROS 2 node: what it offers, and how it starts and ends."""
 
 from collections.abc import Callable
+from importlib.util import find_spec
 import signal
 import sys
 import time
@@ -79,7 +80,8 @@ class PlannerNode(Node):
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 
-        warm_up(self._reporter.parameters.arm)
+        parameters = self._reporter.parameters
+        warm_up(parameters.arm, parameters.options)
         return plan_request
 
     def _on_parameters(self, _: Any) -> None:
