@@ -23,6 +23,13 @@ def is_edge_free(q_from, q_to, resolution, robot, obstacles):
     """
     dof = q_from.shape[0]
     for j in range(obstacles.shape[0]):
+        # Most boxes lie to one side of both ends.
+        is_beside = False
+        for k in range(dof):
+            is_beside |= max(q_from[k], q_to[k]) <= obstacles[j, k] + TOUCH
+            is_beside |= min(q_from[k], q_to[k]) >= obstacles[j, dof + k] - TOUCH
+        if is_beside:
+            continue
         enter, leave = 0.0, 1.0
         for k in range(dof):
             lower, upper = obstacles[j, k] + TOUCH, obstacles[j, dof + k] - TOUCH

@@ -120,20 +120,28 @@ def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes,
     """
     if not is_edge_free(nodes[near], q, resolution, robot, obstacles):
         return 0
-    parent, cost = near, costs[near] + distance(nodes[near], q)
+    neighbours, lengths = np.empty(n, np.int64), np.empty(n)
+    n_near = 0
     for i in range(n):
-        if i != near:
-            length = distance(nodes[i], q)
-            is_shorter = length <= radius and costs[i] + length < cost - GAIN
-            if is_shorter and is_edge_free(nodes[i], q, resolution, robot, obstacles):
-                parent, cost = i, costs[i] + length
+        squared = 0.0
+        for k in range(q.shape[0]):
+            squared += (nodes[i, k] - q[k]) ** 2
+        if squared <= radius * radius:
+            neighbours[n_near], lengths[n_near] = i, math.sqrt(squared)
+            n_near += 1
+    parent, cost = near, costs[near] + distance(nodes[near], q)
+    for row in range(n_near):
+        i, length = neighbours[row], lengths[row]
+        is_shorter = i != near and costs[i] + length < cost - GAIN
+        if is_shorter and is_edge_free(nodes[i], q, resolution, robot, obstacles):
+            parent, cost = i, costs[i] + length
     nodes[n] = q
     links[CHILD, n] = -1
     costs[n] = cost
     attach(links, n, parent)
-    for i in range(n):
-        length = distance(nodes[i], q)
-        is_shorter = i != parent and length <= radius and cost + length < costs[i] - GAIN
+    for row in range(n_near):
+        i, length = neighbours[row], lengths[row]
+        is_shorter = i != parent and cost + length < costs[i] - GAIN
         if is_shorter and is_edge_free(q, nodes[i], resolution, robot, obstacles):
             detach(links, i)
             attach(links, i, n)
