@@ -119,7 +119,8 @@ def grow(
     )
     capacity = min(2 * budget, MAX_NODES) + len(roots) + sum(len(t.nodes) for t in previous) + 2
     tree_q = np.empty((2, capacity, dof))
-    parents = np.full((2, capacity), -1, dtype=np.int64)
+    parents = np.empty((2, capacity), dtype=np.int64)
+    parents[0, 0] = parents[1, : len(roots)] = -1
     sizes = np.array([1, len(roots), 0, len(roots)], dtype=np.int64)
     tree_q[0, 0] = problem.q_start
     tree_q[1, : len(roots)] = roots

@@ -36,8 +36,10 @@ class _Trees:
         old = sum(len(t.nodes) for t in previous)
         capacity = min(options.max_samples, MAX_NODES) + n_goals + old + 2
         self.tree_q = np.empty((2, capacity, dof))
-        self.links = np.full((2, 3, capacity), -1, dtype=np.int64)
-        self.costs = np.zeros((2, capacity))
+        self.links = np.empty((2, 3, capacity), dtype=np.int64)
+        self.links[:, :, : n_goals + 1] = -1
+        self.costs = np.empty((2, capacity))
+        self.costs[:, : n_goals + 1] = 0.0
         self.sizes = np.array([1, n_goals, 0, n_goals], dtype=np.int64)
         self.tree_q[0, 0] = problem.q_start
         self.tree_q[1, :n_goals] = problem.q_goals
@@ -66,6 +68,7 @@ class _Trees:
         )
         for i in range(n_roots, n):
             parent = parents[i]
+            self.links[side, rrt_star.CHILD, i] = -1
             rrt_star.attach(self.links[side], i, parent)
             step = np.linalg.norm(self.tree_q[side, i] - self.tree_q[side, parent])
             self.costs[side, i] = self.costs[side, parent] + step
