@@ -17,6 +17,7 @@ setup(
         (share, ['package.xml']),
         (f'{share}/launch', sorted(glob('launch/*.py'))),
         (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
         (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
     ],
     python_requires='>=3.10',
@@ -24,6 +25,7 @@ setup(
     install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
     extras_require={
         'node': ['python-fcl', 'ruckig', 'matplotlib'],
+        'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },
     # The kernels' compiled cache is kept by source file, so these must be real files.
@@ -37,6 +39,7 @@ setup(
             'planner_node = rrth_planner.ros.planner_node:main',
             'playback_node = rrth_planner.ros.playback_node:main',
             'demo = rrth_planner.ros.demo:main',
+            'reproduce = rrth_planner.reproduce:main',
         ],
     },
 )

@@ -1,0 +1,138 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The report of the reproduction: what the paper says, what we measure, why they differ."""
+
+from collections.abc import Mapping, Sequence
+
+from rrth_planner.campaign.arm_claims import (
+    arm_table,
+    escape_claim,
+    escape_table,
+    long_table,
+    mode_table,
+    target_table,
+    ways_claim,
+)
+from rrth_planner.campaign.paper_runs import ARM_STEP, Extent, STEPS, TWO_WAYS
+from rrth_planner.campaign.plane_claims import plane_claims, plane_table
+from rrth_planner.campaign.problems import MARGIN
+from rrth_planner.campaign.statistics import markdown_table, Rows
+
+
+def report(
+    rows: Rows, extent: Extent, command: str, machine: str, pictures: Mapping[str, Sequence[str]]
+) -> str:
+    """
+    Return the report in Markdown.
+
+    Parameters
+    ----------
+    rows : Rows
+        Of one campaign.
+    extent : Extent
+        How many runs stand behind each number.
+    command : str
+        The command that wrote it.
+    machine : str
+        On what.
+    pictures : mapping
+        By caption, where the pictures are, relative to the report.
+
+    """
+    row = rows.rows[0]
+    commit = f', commit {row["commit"]}' if row['commit'] else ''
+    claims = markdown_table(
+        (
+            'the paper says',
+            'map',
+            f'we measure, {extent.few} runs',
+            f'we measure, {extent.many} runs',
+            'why they differ, or why not',
+        ),
+        plane_claims(rows, extent),
+    )
+    gallery = '\n\n'.join(
+        f'### {caption}\n\n' + '\n'.join(f'![{caption}]({path})' for path in paths)
+        for caption, paths in pictures.items()
+    )
+    versions = (
+        f'Python {row["python_version"]}, numpy {row["numpy_version"]}, '
+        f'numba {row["numba_version"]}, sources {row["source_digest"]}{commit}'
+    )
+    return f"""# What the paper says, and what we measure
+
+Zou et al. 2024, "Obstacle Avoidance Path Planning of a 4-DOF Weapon Arm Based on Improved RRT
+(RRT-H) Algorithm". Only its motion planning is looked at here.
+
+Written by `{command}`; do not edit.
+{len(rows)} runs on {machine}; {versions}.
+
+Times come from runs done one after another, those of the arm and shares over many seeds from runs
+side by side. The paper gives no coordinates, step sizes or spacings: maps, targets and options are
+ours (`config/maps`, `rrth_planner/campaign/paper_runs.py`). Where it names none, the planners have
+one tree, no goal bias and a step of 10 on maps of 100 by 100. "RRT-H" is the method as corrected,
+"as printed" its three steps word for word. Every path is judged by code that shares nothing with
+the planners.
+Numbers are medians, with quartiles in brackets.
+
+## The claims of section 3
+
+RRT and RRT-H stop at the first path; the others run {STEPS} steps.
+
+{claims}
+
+## All planners, {extent.few} runs
+
+{plane_table(rows, extent, extent.few)}
+
+## All planners, {extent.many} runs
+
+{plane_table(rows, extent, extent.many)}
+
+RRT* and Informed RRT* approach the exact shortest path as theory says:
+
+{long_table(rows, extent)}
+
+## The escape from local traps (section 4)
+
+The paper says that the path club makes new growths explore other ways round, and that the best of
+several paths wins (Figure 14; it gives no number). Measured on `{TWO_WAYS}`, whose ways differ by
+a third.
+
+{ways_claim(extent)}
+
+{escape_claim(rows)} ({extent.seeds} seeds.) Why the last two hardly differ: from this start a
+first growth seldom takes the worse way, and our further growths draw only where a shorter path can
+lead, which by itself drives them round the other side.
+
+{escape_table(rows)}
+
+## The arm (section 6.2)
+
+Accumulated change of the four joint angles from the folded state to {len(extent.targets)} targets,
+each by the nearest free posture that aims at it; none is reached by a straight edge. RRT and RRT-H
+come from the same growth (one tree, step {ARM_STEP} rad), mean over the targets and seeds.
+
+{arm_table(rows, extent)}
+
+Why they differ: the wearer, the mount, the targets and the postures are ours; the paper gives
+none. RRT's travel is a matter of its step, so the reductions depend on it too; joint by joint
+they depend on which joints the targets ask to move. After shortening only what the posture and
+the way round the body demand is left, which is why joint 2, which hardly has to move, loses most.
+
+{target_table(rows, extent)}
+
+## The collision tests (section 6.1)
+
+RRT-H with its edges checked in three ways, its paths judged every 0.002 rad by exact clipping
+against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A taut
+path leans on the body, so what a test does not see between two checks is where it touches. On
+maps the judge is exact, and RRT-H as printed is shown with check points every 1 and every 0.2
+map units.
+
+{mode_table(rows, extent)}
+
+## Pictures
+
+{gallery}
+"""

@@ -1,0 +1,182 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The problems of a campaign by name, each with a judge that shares nothing with the planner."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from rrth_planner.aiming import check_pointing_arm, goal_configurations, MANY
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
+from rrth_planner.checking import by_check_points, sampled
+from rrth_planner.errors import OptionsError, SceneError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.oracle import first_contact
+from rrth_planner.problem import PlanningProblem
+from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.rotation import rotation_matrix
+from rrth_planner.scene import Box, Scene
+from rrth_planner.shortest import enters, extended_obstacles
+from rrth_planner.world import arm_world, World
+
+CERTIFIED = 'certified'
+# Eight points round the wearer [m]; from the folded state none is reached by a straight edge.
+TARGETS = {
+    'front': (1.5, 0.1, 0.3),
+    'front_far': (4.0, 0.0, 0.0),
+    'front_left': (1.3, 0.75, 0.3),
+    'low_left': (1.1, 0.65, -0.45),
+    'left_knee': (0.6, 0.5, -0.7),
+    'floor_front': (0.9, 0.0, -1.1),
+    'lap': (0.45, 0.0, -0.25),
+    'right_hand': (0.45, -0.3, -0.1),
+}
+# Behind the back, the tool down [rad].
+FOLDED = np.array([0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi])
+# Growth of the wearer's boxes, and how much of the ray counts as arm [m].
+MARGIN, RAY = 0.02, 1.0
+# Spacing at which the judge looks at an arm's motion [rad].
+JUDGE_SPACING = 0.002
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class NamedProblem:
+    """
+    A planning problem, and who says whether a path of it is valid.
+
+    Parameters
+    ----------
+    name : str
+    problem : PlanningProblem
+    is_path_valid : callable
+        Waypoints (n, dof) -> does the path keep clear, by exact clipping on a map, by looking
+        every 0.002 rad on the arm.
+    is_body_clear : callable
+        The same without the margin round the boxes.
+
+    """
+
+    name: str
+    problem: PlanningProblem
+    is_path_valid: Callable[[Array], bool]
+    is_body_clear: Callable[[Array], bool]
+
+
+@cache
+def load_problem(name: str, collision: str = CERTIFIED) -> NamedProblem:
+    """
+    Return the problem of a name.
+
+    Parameters
+    ----------
+    name : str
+        A map of `config/maps`, a path that ends in `.yaml`, or `arm/` and one of the TARGETS.
+    collision : str
+        `certified`, or `sampled:SPACING` or `check_points:SPACING` of the checks along an edge
+        [rad].
+
+    Raises
+    ------
+    RrthError
+        There is no such problem or mode.
+
+    """
+    if name.startswith('arm/'):
+        return _arm_problem(name, collision)
+    box_map = load_map(name)
+    problem = map_problem(box_map)
+    problem = map_problem(box_map, _checked(problem.world, collision))
+    boxes = extended_obstacles(box_map)
+
+    def is_path_valid(waypoints: Array) -> bool:
+        low, high = box_map.bounds
+        is_inside = bool(((waypoints >= low - 1e-9) & (waypoints <= high + 1e-9)).all())
+        return is_inside and not bool(enters(waypoints[:-1], waypoints[1:], boxes).any())
+
+    return NamedProblem(
+        name=name, problem=problem, is_path_valid=is_path_valid, is_body_clear=is_path_valid
+    )
+
+
+def load_map(name: str) -> BoxMap:
+    """Return a map of `config/maps`, or that of a file if the name ends in `.yaml`."""
+    path = Path(name) if name.endswith('.yaml') else resource_path(f'config/maps/{name}.yaml')
+    data = load_yaml(path)
+    if not isinstance(data, dict):
+        raise SceneError(f'map "{name}": expected a mapping laid out as in config/maps')
+    return map_from_mapping(data, path.stem)
+
+
+def load_wearer() -> Scene:
+    """Return the standing wearer, forearms forward."""
+    boxes = []
+    for marker in load_yaml(resource_path('msg_examples/body.yaml'))['markers']:
+        if marker['action'] != 0:
+            continue
+        pose, size = marker['pose'], marker['scale']
+        quaternion = np.array([pose['orientation'][k] for k in 'xyzw'], dtype=float)
+        boxes.append(
+            Box(
+                marker['text'],
+                np.array([pose['position'][k] for k in 'xyz'], dtype=float),
+                np.array([size[k] for k in 'xyz'], dtype=float),
+                rotation_matrix(quaternion),
+            )
+        )
+    return Scene(tuple(boxes))
+
+
+def _arm_problem(name: str, collision: str) -> NamedProblem:
+    """Return the motion from the folded state to the nearest posture that aims at a target."""
+    target = TARGETS.get(name.removeprefix('arm/'))
+    if target is None:
+        raise SceneError(f'problem "{name}": expected arm/ and one of {", ".join(TARGETS)}')
+    arm, scene = load_arm(), load_wearer()
+    check_pointing_arm(arm)
+    world = arm_world(arm, scene, MARGIN, RAY)
+    goals = goal_configurations(arm, PointingGoal(np.array(target)), world, FOLDED, MANY)
+    if len(goals.q_goals) == 0:
+        raise SceneError(f'problem "{name}": target {target}, expected one that a posture aims at')
+    problem = PlanningProblem(
+        world=_checked(world, collision), q_start=FOLDED, q_goals=goals.q_goals[:1]
+    )
+    low, high = world.bounds
+
+    def is_path_valid(waypoints: Array) -> bool:
+        is_inside = bool(((waypoints >= low - 1e-9) & (waypoints <= high + 1e-9)).all())
+        return is_inside and keeps_clear(arm, scene, waypoints, MARGIN)
+
+    def is_body_clear(waypoints: Array) -> bool:
+        return keeps_clear(arm, scene, waypoints, 0.0)
+
+    return NamedProblem(
+        name=name, problem=problem, is_path_valid=is_path_valid, is_body_clear=is_body_clear
+    )
+
+
+def keeps_clear(arm: ArmModel, scene: Scene, waypoints: Array, margin: float) -> bool:
+    """Return whether a path, (n, dof) [rad], touches none of the boxes grown by a margin [m]."""
+    for q_from, q_to in zip(waypoints[:-1], waypoints[1:], strict=True):
+        n = int(np.linalg.norm(q_to - q_from) / JUDGE_SPACING) + 2
+        q = q_from + np.linspace(0.0, 1.0, n)[:, None] * (q_to - q_from)
+        if first_contact(arm, scene, q, RAY, margin) is not None:
+            return False
+    return True
+
+
+def _checked(world: World, collision: str) -> World:
+    """Return the world with its edges checked in a mode."""
+    mode, _, spacing = collision.partition(':')
+    try:
+        if collision == CERTIFIED:
+            return world
+        return {'sampled': sampled, 'check_points': by_check_points}[mode](world, float(spacing))
+    except (KeyError, ValueError):
+        raise OptionsError(
+            f'collision: {collision!r}, expected certified, sampled:SPACING or '
+            'check_points:SPACING [rad]'
+        ) from None

@@ -1,0 +1,184 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""One run of a planner and the flat row that it leaves."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+import hashlib
+from importlib.metadata import PackageNotFoundError, version
+import json
+from pathlib import Path
+import platform
+import subprocess
+from typing import Any
+
+import numpy as np
+from rrth_planner.campaign.problems import CERTIFIED, load_problem
+from rrth_planner.options import TreeOptions
+from rrth_planner.planner import plan
+from rrth_planner.result import PlanResult
+
+Row = dict[str, Any]
+# What decides about a row besides the run itself.
+_SOURCES = (
+    *('growth', 'star', 'rrt_h', 'planner', 'box_map', 'checking', 'aiming', 'world', 'reach'),
+    *('options', 'oracle', 'shortest', 'campaign/problems', 'campaign/runs'),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """
+    What is asked of a planner once.
+
+    Parameters
+    ----------
+    problem : str
+        A name that `load_problem` knows.
+    algorithm : str
+        What tables and pictures call these options.
+    options : TreeOptions
+    seed : int
+    collision : str
+        As for `load_problem`.
+
+    """
+
+    problem: str
+    algorithm: str
+    options: TreeOptions
+    seed: int
+    collision: str = CERTIFIED
+
+    def key(self) -> str:
+        """Return what two runs have in common if one need not be done again."""
+        parts = (self.problem, self.algorithm, options_digest(self.options), self.seed)
+        return _digest(json.dumps([*parts, self.collision, source_digest()]))
+
+
+def options_digest(options: TreeOptions) -> str:
+    """Return a short digest of the kind and the values of options."""
+    return _digest(json.dumps([type(options).__name__, asdict(options)], sort_keys=True))
+
+
+@cache
+def source_digest() -> str:
+    """Return a short digest of the sources that decide what a run brings."""
+    root = Path(__file__).parent.parent
+    files = [*sorted((root / 'kernels').glob('*.py')), *(root / f'{n}.py' for n in _SOURCES)]
+    return _digest(''.join(file.read_text(encoding='utf-8') for file in files))
+
+
+@cache
+def provenance() -> Mapping[str, str | None]:
+    """Return the versions and the kind of machine that a row comes from."""
+    return {
+        'package_version': _version('rrth_planner'),
+        'numpy_version': _version('numpy'),
+        'numba_version': _version('numba'),
+        'python_version': platform.python_version(),
+        'machine': f'{processor_name()}, {platform.system()}',
+        'commit': _commit(),
+        'source_digest': source_digest(),
+    }
+
+
+def processor_name() -> str:
+    """Return the processor's own name where the system tells it."""
+    try:
+        for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
+            if line.startswith('model name'):
+                return line.partition(':')[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+_warm: set[tuple[str, str, bool]] = set()
+
+
+def execute(run: Run, timing: str) -> Row:
+    """
+    Return the row of a run.
+
+    Parameters
+    ----------
+    run : Run
+    timing : str
+        Where its time was taken: `serial`, alone on the machine, or `cluster`, beside others.
+
+    """
+    named = load_problem(run.problem, run.collision)
+    kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
+    if kind not in _warm:
+        # Kernels are loaded by the first plan that uses them: that is not its planning time.
+        plan(named.problem, run.options, np.random.default_rng(run.seed))
+        _warm.add(kind)
+    result = plan(named.problem, run.options, np.random.default_rng(run.seed))
+    waypoints = None if result.path is None else result.path.waypoints
+    is_valid = None if waypoints is None else named.is_path_valid(waypoints)
+    # What keeps off the grown boxes keeps off the body too.
+    is_body_clear = is_valid or (None if waypoints is None else named.is_body_clear(waypoints))
+    return {
+        'key': run.key(),
+        'problem': run.problem,
+        'algorithm': run.algorithm,
+        'options_class': type(run.options).__name__,
+        'options': json.dumps(asdict(run.options), sort_keys=True),
+        'options_digest': options_digest(run.options),
+        'seed': run.seed,
+        'collision': run.collision,
+        'timing': timing,
+        **_outcome(result),
+        'is_valid': is_valid,
+        'is_body_clear': is_body_clear,
+        **provenance(),
+    }
+
+
+def _outcome(result: PlanResult) -> Row:
+    """Return the columns that tell how a plan ended."""
+    path, is_improved = result.path, len(result.cost_history) > 0
+    travel = None if path is None else np.abs(np.diff(path.waypoints, axis=0)).sum(axis=0)
+    return {
+        'status': result.status.value,
+        'time_first': result.time_history[0] if is_improved else None,
+        'time_total': result.planning_time,
+        'cost_first': None if result.raw_path is None else result.raw_path.length,
+        'cost_final': None if path is None else path.length,
+        'draws_first': result.sample_history[0] if is_improved else None,
+        'draws_total': result.n_samples,
+        'n_waypoints': None if path is None else len(path.waypoints),
+        'joint_travel': None if travel is None else travel.tolist(),
+        'history_cost': list(result.cost_history),
+        'history_draws': list(result.sample_history),
+        'history_time': list(result.time_history),
+    }
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        # The source tree itself.
+        return 'source'
+
+
+def _commit() -> str | None:
+    try:
+        told = subprocess.run(
+            ['git', 'rev-parse', '--short', 'HEAD'],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            timeout=10.0,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return told.stdout.strip() or None

@@ -1,0 +1,139 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The reproduction: every figure and number of the paper, measured again by one command."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+import os
+from pathlib import Path
+import platform
+import sys
+
+from rrth_planner.campaign.paper_runs import Extent, QUICK, spread_runs, timed_runs
+from rrth_planner.campaign.runs import processor_name, source_digest
+from rrth_planner.errors import RrthError
+
+MISSING = """{}: the reproduction needs more libraries than the planner; install them by
+    pip install -r requirements/campaign.txt"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the campaign, then write the report and its pictures."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(arguments)
+    try:
+        from rrth_planner.campaign.cluster import cluster_client, run_campaign
+        from rrth_planner.campaign.paper_report import report
+        from rrth_planner.campaign.statistics import Rows
+        from rrth_planner.campaign.store import read_rows, replace_file
+        from rrth_planner.viewers.paper_pictures import draw_pictures
+    except ImportError as problem:
+        print(MISSING.format(problem), file=sys.stderr)
+        return 2
+    extent = _extent(options)
+    output = options.output or Path('build/reproduction' if options.quick else 'docs')
+    data = options.data or output / 'reproduction.parquet'
+    try:
+        timed, spread = timed_runs(extent), spread_runs(extent)
+        run_campaign(timed, data, timed=True, label='one by one')
+        if options.serial:
+            run_campaign(spread, data, label='the rest')
+        else:
+            with cluster_client(options.scheduler) as client:
+                run_campaign(spread, data, client=client, label='side by side')
+        wanted = {run.key() for run in (*timed, *spread)}
+        rows = Rows([row for row in read_rows(data).to_pylist() if row['key'] in wanted])
+        output.mkdir(parents=True, exist_ok=True)
+        pictures = draw_pictures(rows, extent, output)
+        command = ' '.join(['python -m rrth_planner.reproduce', *_portable(arguments)])
+        machine = f'{processor_name()} ({os.cpu_count()} cores, {platform.system()})'
+        text = report(rows, extent, command, machine, pictures)
+        target = output / 'reproduction.md'
+        replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
+    except KeyboardInterrupt:
+        print(f'interrupted; the next start goes on from {data}', file=sys.stderr)
+        return 130
+    except (RrthError, OSError) as problem:
+        print(f'reproduce: {problem}', file=sys.stderr)
+        return 1
+    print(f'{target}: {len(rows)} runs of the sources {source_digest()}; rows in {data}')
+    return 0
+
+
+def _extent(options: argparse.Namespace) -> Extent:
+    """Return how many runs the command line asks for."""
+    extent = QUICK if options.quick else Extent()
+    if options.runs:
+        few, many = min(options.runs), max(options.runs)
+        extent = replace(extent, few=few, many=many, seeds=max(many, extent.seeds))
+    if options.seeds:
+        extent = replace(
+            extent,
+            seeds=max(options.seeds, extent.many),
+            long=min(extent.long, options.seeds),
+            arm=min(extent.arm, options.seeds),
+            arm_modes=min(extent.arm_modes, options.seeds),
+        )
+    if options.maps:
+        extent = replace(extent, maps=tuple(options.maps))
+    if options.targets:
+        extent = replace(extent, targets=tuple(options.targets))
+    return extent
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='reproduce', description=__doc__)
+    parser.add_argument('--quick', action='store_true', help='few runs: a minute or two')
+    parser.add_argument(
+        '--output',
+        type=Path,
+        help='folder of reproduction.md and its pictures (docs; --quick: build/reproduction)',
+    )
+    parser.add_argument(
+        '--data', type=Path, help='Parquet file of the runs (reproduction.parquet in the output)'
+    )
+    parser.add_argument(
+        '--runs',
+        type=_positive,
+        nargs='+',
+        metavar='N',
+        help='timed runs of each planner on each map: fewest and most are told (10 100)',
+    )
+    parser.add_argument(
+        '--seeds', type=_positive, metavar='N', help='runs behind each share and draw (1000)'
+    )
+    parser.add_argument('--maps', nargs='+', choices=Extent().maps, help='only these maps')
+    parser.add_argument(
+        '--targets', nargs='+', choices=Extent().targets, help='only these targets of the arm'
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        '--scheduler', metavar='tcp://HOST:PORT', help='a dask scheduler (a local cluster)'
+    )
+    where.add_argument('--serial', action='store_true', help='all runs here, one after another')
+    return parser
+
+
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f'{text}, expected a number of runs of 1 or more')
+    return int(text)
+
+
+def _portable(arguments: Sequence[str]) -> list[str]:
+    """Return the arguments without what belongs to one machine: folders and addresses."""
+    kept, skip = [], False
+    for argument in arguments:
+        name = argument.partition('=')[0]
+        if skip:
+            skip = False
+        elif name in ('--output', '--data', '--scheduler'):
+            skip = '=' not in argument
+        else:
+            kept.append(argument)
+    return kept
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,126 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of the arm's plans by RRT and RRT-H, as the paper's Figures 20 and 21."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.path import Path
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.viewers.arm_view import draw_motion
+from rrth_planner.viewers.plots import JOINT_COLOURS
+
+Pair = tuple[Path, Path]
+NAMES = ('RRT', 'RRT-H')
+
+
+def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
+    """
+    Return the joints along the paths to each target: RRT thin, RRT-H thick.
+
+    Parameters
+    ----------
+    pairs : mapping
+        By name of the target, the paths of RRT and of RRT-H from the same growth [rad].
+
+    """
+    n_columns = min(4, len(pairs))
+    n_rows = -(-len(pairs) // n_columns)
+    figure = Figure(figsize=(3.6 * n_columns, 3.0 * n_rows + 0.5), layout='constrained', dpi=100)
+    grid = figure.subplots(n_rows, n_columns, squeeze=False, sharey=True)
+    handles: dict[str, Any] = {}
+    for axes in grid.flat[len(pairs) :]:
+        axes.set_visible(False)
+    for k, (axes, (target, pair)) in enumerate(zip(grid.flat, pairs.items(), strict=False)):
+        for name, path in zip(NAMES, pair, strict=True):
+            along = _distances(path.waypoints)
+            for j, values in enumerate(path.waypoints.T):
+                (handle,) = axes.plot(
+                    along,
+                    values,
+                    color=JOINT_COLOURS[j % len(JOINT_COLOURS)],
+                    lw=2.4 if name == NAMES[1] else 0.9,
+                    ls='-' if name == NAMES[1] else (0, (4, 1.5)),
+                )
+                handles[f'joint {j + 1}, {name}'] = handle
+        lengths = [path.length for path in pair]
+        axes.set_title(
+            f'{target.replace("_", " ")}\n{lengths[0]:.1f} rad to {lengths[1]:.1f} rad',
+            fontsize=9.5,
+        )
+        axes.grid(color='#e4e6ea', lw=0.8)
+        if k >= len(pairs) - n_columns:
+            axes.set_xlabel('way along the path [rad]')
+        if k % n_columns == 0:
+            axes.set_ylabel('position [rad]')
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+    labels = sorted(handles, key=lambda label: (label.split(', ')[0], label))
+    figure.legend(
+        [handles[label] for label in labels],
+        labels,
+        loc='outside lower center',
+        ncols=4,
+        frameon=False,
+        fontsize=9,
+    )
+    return figure
+
+
+def motions_figure(
+    arm: ArmModel,
+    scene: Scene,
+    pairs: Mapping[str, Pair],
+    targets: Mapping[str, Sequence[float]],
+    ray_length: float,
+) -> Figure:
+    """
+    Return the arm's motion round its wearer, a row a target: left RRT, right RRT-H.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    pairs : mapping
+        By name of the target, the paths of RRT and of RRT-H [rad].
+    targets : mapping
+        Where they are in the base frame, three coordinates each [m].
+    ray_length : float
+        How much of the pointing ray counted as arm [m].
+
+    """
+    figure = Figure(figsize=(12.0, 4.9 * len(pairs)), dpi=80)
+    for row, (target, pair) in enumerate(pairs.items()):
+        for column, (name, path) in enumerate(zip(NAMES, pair, strict=True)):
+            height = 1.0 / len(pairs)
+            axes: Any = figure.add_axes(
+                (0.5 * column + 0.04, 1.0 - (row + 0.9) * height, 0.41, 0.78 * height),
+                projection='3d',
+            )
+            trajectory = unhurried(path)
+            draw_motion(axes, arm, scene, trajectory, np.array(targets[target]), ray_length)
+            axes.set_title(
+                f'{name}, {target.replace("_", " ")}: {path.length:.1f} rad', fontsize=11, y=1.08
+            )
+    return figure
+
+
+def unhurried(path: Path) -> Trajectory:
+    """Return a motion along a path that rests at each waypoint: a straight line stays one."""
+    times = _distances(path.waypoints)
+    # A waypoint on the one before it takes no time, and times must increase.
+    keep = np.concatenate([[True], np.diff(times) > 1e-9])
+    q = path.waypoints[keep]
+    still = np.zeros_like(q)
+    return Trajectory(times=times[keep], positions=q, velocities=still, accelerations=still)
+
+
+def _distances(waypoints: Array) -> Array:
+    steps = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])

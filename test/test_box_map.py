@@ -1,0 +1,98 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Another map as a YAML file works, a bad one is refused in one sentence."""
+
+import numpy as np
+import pytest
+from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
+from rrth_planner.errors import RrthError, SceneError
+from rrth_planner.options import RRTHOptions
+from rrth_planner.planner import plan
+from rrth_planner.resources import load_yaml
+from rrth_planner.shortest import shortest_path
+
+GATE = """
+name: gate
+bounds: [0, 0, 60, 40]
+start: [5, 20]
+goal: [55, 20]
+rectangles:
+  - [28, 0, 32, 25]
+"""
+
+
+def read(tmp_path, text):
+    """Return the map of a YAML file with this text."""
+    file = tmp_path / 'map.yaml'
+    file.write_text(text, encoding='utf-8')
+    return map_from_mapping(load_yaml(file), file.stem)
+
+
+def test_another_map_is_read_and_planned_on(tmp_path):
+    box_map = read(tmp_path, GATE)
+    assert box_map.name == 'gate'
+    exact = 2.0 * np.hypot(23.0, 5.0) + 4.0
+    assert shortest_path(box_map)[0] == pytest.approx(exact)
+    options = RRTHOptions(step_size=10.0, corner_spacing=0.05, time_limit=60.0)
+    result = plan(map_problem(box_map), options, np.random.default_rng(0))
+    assert result.path.length == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_map_without_a_name_has_that_of_its_file(tmp_path):
+    assert read(tmp_path, GATE.replace('name: gate\n', '')).name == 'map'
+
+
+def test_a_map_without_walls_is_a_map(tmp_path):
+    box_map = read(tmp_path, GATE.replace('\n  - [28, 0, 32, 25]', ' []'))
+    assert shortest_path(box_map)[0] == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'told'),
+    [
+        ('start: [5, 20]', 'start: [30, 20]', 'start [30.0, 20.0] is inside obstacle 0'),
+        ('goal: [55, 20]', 'goal: [30, 20]', 'goal [30.0, 20.0] is inside obstacle 0'),
+        ('[28, 0, 32, 25]', '[32, 0, 28, 25]', 'expected a positive size along every axis'),
+        ('[28, 0, 32, 25]', '[28, 0, 28, 25]', 'expected a positive size along every axis'),
+        ('goal: [55, 20]', 'goal: [65, 20]', 'goal [65.0, 20.0], expected within'),
+        ('start: [5, 20]', 'start: [5, -1]', 'start [5.0, -1.0], expected within'),
+        ('goal: [55, 20]\n', '', "no 'goal', expected bounds, rectangles or boxes"),
+        ('bounds: [0, 0, 60, 40]\n', '', "no 'bounds', expected bounds, rectangles or boxes"),
+        ('start: [5, 20]', 'start: [.nan, 20]', 'start: [nan, 20.0], expected finite numbers'),
+        ('[28, 0, 32, 25]', '[28, .nan, 32, 25]', 'expected finite numbers'),
+        ('[28, 0, 32, 25]', '[28, 0, .inf, 25]', 'expected finite numbers'),
+        ('[28, 0, 32, 25]', '[28, 0, 32]', 'expected numbers laid out as in config/maps'),
+        ('[28, 0, 32, 25]', '[28, 0, wide, 25]', 'expected numbers laid out as in config/maps'),
+        ('[0, 0, 60, 40]', '[60, 0, 0, 40]', 'expected lower < upper'),
+        ('[0, 0, 60, 40]', '[0, 0, 60]', 'expected numbers laid out as in config/maps'),
+        ('start: [5, 20]', 'start: here', 'expected numbers laid out as in config/maps'),
+    ],
+)
+def test_a_bad_map_is_refused_in_one_sentence(tmp_path, old, new, told):
+    text = GATE.replace(old, new)
+    assert text != GATE
+    with pytest.raises(SceneError) as refusal:
+        read(tmp_path, text)
+    sentence = str(refusal.value)
+    assert told in sentence
+    assert 'map "' in sentence
+    assert '\n' not in sentence
+    assert len(sentence) < 250
+
+
+@pytest.mark.parametrize('text', ['bounds: [0, 0', '\t- :'])
+def test_a_file_that_is_no_yaml_is_refused_in_one_sentence(tmp_path, text):
+    with pytest.raises(RrthError) as refusal:
+        read(tmp_path, text)
+    assert '\n' not in str(refusal.value)
+
+
+def test_touching_a_wall_is_no_entering():
+    box_map = BoxMap(
+        name='touching',
+        bounds=[[0, 0], [9, 9]],
+        obstacles=[[[3, 3], [6, 6]]],
+        start=[3, 4],
+        goal=[6, 4],
+    )
+    assert shortest_path(box_map)[0] == pytest.approx(5.0)

@@ -1,0 +1,182 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Campaigns: each run once, nothing lost by an interruption, the same rows however they come."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pa = pytest.importorskip('pyarrow')
+pytest.importorskip('tqdm')
+
+import pyarrow.parquet as pq
+from rrth_planner.campaign import cluster
+from rrth_planner.campaign.cluster import cluster_client, run_campaign
+from rrth_planner.campaign.paper_runs import ALGORITHMS, PRINTED, RRT, RRT_H, RRT_STAR
+from rrth_planner.campaign.problems import load_map, load_problem
+from rrth_planner.campaign.runs import execute, Run
+from rrth_planner.campaign.statistics import histories_on, Rows
+from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
+from rrth_planner.errors import RrthError
+from rrth_planner.shortest import shortest_path
+
+# Columns that differ from run to run whatever the seed.
+CLOCK = ('time_first', 'time_total', 'history_time', 'timing')
+
+
+def runs(n=3, names=(RRT, RRT_H)):
+    """Return n runs of some planners on the C."""
+    return [
+        Run(problem='c_shape', algorithm=name, options=ALGORITHMS[name], seed=seed)
+        for name in names
+        for seed in range(n)
+    ]
+
+
+def without_clock(table):
+    """Return the rows of a table in the order of their keys, without what the clock says."""
+    rows = sorted(table.to_pylist(), key=lambda row: row['key'])
+    return [{name: row[name] for name in row if name not in CLOCK} for row in rows]
+
+
+def test_a_row_tells_what_was_asked_and_what_came_out():
+    exact = shortest_path(load_map('c_shape'))[0]
+    rrt, rrt_h, star = (execute(run, 'serial') for run in runs(1, (RRT, RRT_H, RRT_STAR)))
+    assert rrt['cost_first'] == rrt['cost_final'] == rrt_h['cost_first']
+    assert rrt['draws_total'] == rrt_h['draws_first']
+    assert exact - 1e-6 <= rrt_h['cost_final'] < 1.001 * exact
+    assert star['draws_first'] < star['draws_total'] == 2000
+    assert star['history_cost'] == sorted(star['history_cost'], reverse=True)
+    assert star['history_cost'][-1] == pytest.approx(star['cost_final'])
+    assert all(row['is_valid'] for row in (rrt, rrt_h, star))
+    assert all(row['python_version'] and row['numba_version'] for row in (rrt, rrt_h, star))
+
+
+def test_the_judge_of_a_map_finds_what_the_printed_steps_break():
+    row = execute(runs(1, (PRINTED,))[0], 'serial')
+    assert row['is_valid'] is False
+
+
+def test_the_judge_of_the_arm_refuses_a_motion_through_the_wearer():
+    named = load_problem('arm/front')
+    q_start, q_goal = named.problem.q_start, named.problem.q_goals[0]
+    assert named.is_path_valid(np.array([q_start, q_start]))
+    assert not named.is_path_valid(np.array([q_start, q_goal]))
+
+
+@pytest.mark.parametrize(
+    ('name', 'collision'),
+    [('arm/nowhere', 'certified'), ('no_map', 'certified'), ('c_shape', 'guessed:1')],
+)
+def test_an_unknown_problem_or_mode_is_refused(name, collision):
+    with pytest.raises(RrthError, match='expected'):
+        load_problem(name, collision)
+
+
+def test_what_is_asked_for_again_is_not_done_again(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    assert run_campaign(runs(2), path) == 4
+    before = path.read_bytes()
+    assert run_campaign(runs(2), path) == 0
+    assert path.read_bytes() == before
+    assert run_campaign(runs(3), path) == 2
+    assert len(read_rows(path)) == 6
+
+
+def test_every_part_of_a_run_counts_for_whether_it_is_another_one():
+    run = runs(1)[0]
+    others = [
+        replace(run, seed=1),
+        replace(run, problem='spiral'),
+        replace(run, algorithm='mine'),
+        replace(run, collision='sampled:1.0'),
+        replace(run, options=replace(run.options, step_size=9.0)),
+        replace(run, options=ALGORITHMS[RRT_H]),
+    ]
+    assert len({other.key() for other in [run, *others]}) == 7
+    assert runs(1)[0].key() == run.key()
+
+
+def test_an_interruption_loses_no_row_that_was_made(tmp_path, monkeypatch):
+    path = tmp_path / 'rows.parquet'
+    made = []
+
+    def interrupted(run, timing):
+        if len(made) == 3:
+            raise KeyboardInterrupt
+        made.append(run.key())
+        return execute(run, timing)
+
+    monkeypatch.setattr(cluster, 'execute', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(runs(3), path)
+    assert finished_keys(path) == set(made)
+    monkeypatch.undo()
+    assert run_campaign(runs(3), path) == 3
+    assert len(read_rows(path)) == 6
+    assert not path.with_name('rows.parquet.parts').exists()
+
+
+def test_a_part_that_was_cut_short_is_done_again_and_one_left_behind_counts_once(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    rows = [execute(run, 'serial') for run in runs(1)]
+    pq.write_table(pa.Table.from_pylist(rows[:1], schema=read_rows(path).schema), path)
+    append_rows(path, rows)
+    part = next(path.with_name('rows.parquet.parts').iterdir())
+    part.with_name('000009-cut.parquet').write_bytes(part.read_bytes()[:100])
+    assert len(read_rows(path)) == 2
+    assert run_campaign(runs(1), path) == 0
+    assert len(pq.read_table(path)) == 2
+
+
+def test_a_file_of_something_else_is_refused_and_kept(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    path.write_bytes(b'my letters')
+    with pytest.raises(RrthError, match='expected the rows of a campaign'):
+        run_campaign(runs(1), path)
+    assert path.read_bytes() == b'my letters'
+
+
+def test_pandas_and_polars_read_the_file(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    run_campaign(runs(2), path)
+    pandas = pytest.importorskip('pandas')
+    frame = pandas.read_parquet(path)
+    assert frame.groupby('algorithm')['cost_final'].median().loc[RRT_H] < 114.0
+    polars = pytest.importorskip('polars')
+    assert polars.read_parquet(path).shape == frame.shape
+
+
+def test_the_second_table_has_a_row_an_improvement(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    run_campaign(runs(2, (RRT_STAR,)), path)
+    table = read_rows(path)
+    lengths = [len(row['history_cost']) for row in table.to_pylist()]
+    second = histories(table)
+    assert len(second) == sum(lengths)
+    assert second.column_names == ['key', 'history_cost', 'history_draws', 'history_time']
+    costs = histories_on(Rows(table.to_pylist()), 'history_draws', np.array([0.0, 2000.0]))
+    assert np.isinf(costs[:, 0]).all()
+    np.testing.assert_allclose(costs[:, 1], table['cost_final'].to_numpy())
+
+
+def test_a_cluster_brings_the_rows_of_a_serial_campaign(tmp_path):
+    pytest.importorskip('distributed')
+    asked = runs(4, (RRT, RRT_H, RRT_STAR))
+    serial, spread = tmp_path / 'serial.parquet', tmp_path / 'spread.parquet'
+    run_campaign(asked, serial)
+    with cluster_client(n_workers=2) as client:
+        assert len(client.nthreads()) == 2
+        assert run_campaign(asked, spread, client=client) == len(asked)
+        assert run_campaign(asked, spread, client=client) == 0
+        # The same by address, as a cluster of other machines is named.
+        with cluster_client(client.scheduler.address) as other:
+            assert run_campaign(runs(5), spread, client=other) == 2
+    keys = {run.key() for run in asked}
+    rows = without_clock(read_rows(spread))
+    assert [row for row in rows if row['key'] in keys] == without_clock(read_rows(serial))
+    # Where times matter, what was done beside other runs is done again, and then counts.
+    assert run_campaign(asked[:2], spread, timed=True) == 2
+    assert run_campaign(asked[:2], spread, timed=True) == 0
+    assert without_clock(read_rows(spread)) == rows

@@ -1,0 +1,46 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The examples run, from anywhere, and tell what they found."""
+
+from pathlib import Path
+import subprocess
+import sys
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
+# What each of them tells.
+TOLD = {
+    '01_plan_on_a_map': 'spiral: solved',
+    '02_plan_on_the_arm': 'aim at the target; solved',
+    '03_compare_planners': 'RRT-H',
+}
+
+
+def run(example, folder, *arguments):
+    """Return what an example prints."""
+    code = f'import runpy, sys; sys.path.insert(0, {str(ROOT)!r}); sys.argv[1:] = {arguments!r}; '
+    code += f"runpy.run_path({str(example)!r}, run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=folder, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize('example', EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_is_short(example, tmp_path):
+    assert TOLD[example.stem] in run(example, tmp_path)
+    assert len(example.read_text(encoding='utf-8').splitlines()) < 60
+
+
+def test_the_first_example_plans_on_a_map_of_ones_own(tmp_path):
+    (tmp_path / 'gate.yaml').write_text(
+        'bounds: [0, 0, 60, 40]\nstart: [5, 20]\ngoal: [55, 20]\n'
+        'rectangles:\n  - [28, 0, 32, 25]\n',
+        encoding='utf-8',
+    )
+    told = run(EXAMPLES[0], tmp_path, 'gate.yaml')
+    assert 'solved' in told
+    assert '[28.0, 25.0]' in told
