@@ -16,7 +16,7 @@ from rrth_planner.status import PlanStatus
 
 MAX_WAYPOINTS = 4096
 # Draws between two looks at the clock.
-BATCH = 100
+BATCH = 250
 # Nodes that a tree has room for, at most.
 MAX_NODES = 200_000
 

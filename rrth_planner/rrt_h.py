@@ -48,10 +48,12 @@ def search(
     distances = np.linalg.norm(problem.q_goals - problem.q_start, axis=1)
     club = np.empty((0, len(problem.q_start)))
     n_samples, is_reproducible = 0, True
-    for attempt in range(options.club_attempts + 1):
+    # The first path, unless a straight edge is one, does not count as a further attempt.
+    n_growths = options.club_attempts + (best is None)
+    for attempt in range(n_growths):
         cost = np.inf if best is None else _length(best)
         useful = np.flatnonzero(distances < cost * (1.0 - rrt_h.TAUT))[:MAX_ROOTS]
-        if best is not None and (len(useful) == 0 or attempt == options.club_attempts):
+        if best is not None and len(useful) == 0:
             break
         if best is not None and deadline.elapsed() > options.improve_time:
             is_reproducible = options.improve_time == 0.0
@@ -68,7 +70,8 @@ def search(
             budget=options.max_samples if best is None else options.club_budget,
         )
         n_samples += grown.n_samples
-        trees = grown.trees
+        # The trees that know the best way are the ones worth keeping.
+        trees = grown.trees if best is None else trees
         if grown.stopped is not None:
             stopped, is_reproducible = grown.stopped, False
             break
@@ -80,7 +83,7 @@ def search(
         club = np.concatenate([club, grown.waypoints[1:-1]])
         path = pull(problem, grown.waypoints, options)
         if _length(path) < cost:
-            best = path
+            best, trees = path, grown.trees
             history.append((_length(path), n_samples, deadline.elapsed()))
     is_solved = best is not None and stopped is not PlanStatus.CANCELLED
     return PlanResult(

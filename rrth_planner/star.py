@@ -5,17 +5,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import BATCH, MAX_NODES, MAX_WAYPOINTS
-from rrth_planner.kernels import (
-    informed_rrt_star,
-    reuse,
-    rrt_star,
-    rrt_star_smart,
-    tree,
-)
+from rrth_planner.kernels import informed_rrt_star, reuse, rrt_star, rrt_star_smart
 from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -44,7 +37,9 @@ class _Trees:
         self.tree_q[0, 0] = problem.q_start
         self.tree_q[1, :n_goals] = problem.q_goals
         self.meetings = np.empty((MAX_MEETINGS, 2), dtype=np.int64)
-        self.best = np.array([np.inf, -1.0])
+        # Cost of the best path, row of its meeting; waypoints and cost of the shortened path.
+        self.best = np.array([np.inf, -1.0, 0.0, np.inf])
+        self.shortened = np.empty((MAX_WAYPOINTS, dof))
         self.is_bidirectional = options.is_bidirectional
         for side, grown in enumerate(previous[: 2 if options.is_bidirectional else 1]):
             self._take_over(problem, side, grown)
@@ -93,11 +88,10 @@ class _Trees:
             rrt_star.find_best(self.tree_q, self.costs, self.sizes, self.meetings, self.best)
 
     def path(self) -> Array:
-        """Return the waypoints of the best path, shape (n, dof)."""
+        """Return the waypoints of the best path of the trees, shape (n, dof)."""
         a, b = self.meetings[int(self.best[1])]
         path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
-        parents: NDArray[np.int64] = np.ascontiguousarray(self.links[:, 0, :])
-        n = tree.trace_path(self.tree_q, parents, a, b, path)
+        n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)
         return path[:n].copy()
 
     def frozen(self) -> tuple[Tree, ...]:
@@ -116,7 +110,7 @@ def search(
     previous: tuple[Tree, ...],
 ) -> PlanResult:
     """Return the best path after `max_samples` draws, or after `improve_time` since the first."""
-    world, dof = problem.world, len(problem.q_start)
+    world = problem.world
     trees = _Trees(problem, options, previous)
     is_smart = isinstance(options, RRTStarSmartOptions)
     bias = options.biasing_ratio if isinstance(options, RRTStarSmartOptions) else 1
@@ -126,10 +120,8 @@ def search(
     elif is_smart:
         advance = rrt_star_smart.advance
     radius = options.rewire_factor * optimal_radius(world.bounds)
-    best_path: Array | None = None
     raw_path: Path | None = None
-    beacons = np.empty((0, dof))
-    cost, tree_cost = np.inf, np.inf
+    cost = np.inf
     history: list[tuple[float, int, float]] = []
     drawn, stopped, is_cut = 0, None, False
     first_time = np.inf
@@ -157,7 +149,7 @@ def search(
             radius,
             options.is_bidirectional,
             bias,
-            beacons,
+            trees.shortened,
             len(costs),
             rng,
             trees.tree_q,
@@ -168,25 +160,23 @@ def search(
             trees.best,
             costs,
         )
-        if is_smart and trees.best[0] < tree_cost:
-            best_path, beacons = _better(problem, trees.path(), best_path)
-            costs[made - 1] = _length(best_path)
-        tree_cost = trees.best[0]
         after = deadline.elapsed()
-        for i in range(made):
-            if costs[i] < cost:
-                cost = float(costs[i])
-                history.append((cost, drawn + i + 1, before + (i + 1) / made * (after - before)))
+        # The draws of this batch after which the path was shorter than ever before.
+        least = np.minimum.accumulate(np.concatenate([[cost], costs[:made]]))
+        for i in np.flatnonzero(least[1:] < least[:-1]):
+            moment = before + (i + 1) / made * (after - before)
+            history.append((float(costs[i]), drawn + int(i) + 1, moment))
+        cost = float(least[-1])
         drawn += made
         if cost < np.inf and first_time == np.inf:
             first_time = after
             raw_path = Path(trees.path())
-    if cost < np.inf and not is_smart:
-        best_path = trees.path()
-    solved = best_path is not None and stopped is not PlanStatus.CANCELLED
+    best_path: Array | None = None
+    if cost < np.inf and stopped is not PlanStatus.CANCELLED:
+        best_path = trees.shortened[: int(trees.best[2])] if is_smart else trees.path()
     return PlanResult(
-        status=PlanStatus.SOLVED if solved else (stopped or PlanStatus.SAMPLE_LIMIT),
-        path=Path(best_path) if solved and best_path is not None else None,
+        status=(stopped or PlanStatus.SAMPLE_LIMIT) if best_path is None else PlanStatus.SOLVED,
+        path=None if best_path is None else Path(best_path),
         raw_path=raw_path,
         trees=trees.frozen(),
         cost_history=tuple(entry[0] for entry in history),
@@ -209,19 +199,3 @@ def optimal_radius(bounds: Array) -> float:
     volume = float(np.prod(bounds[1] - bounds[0]))
     ball = math.pi ** (d / 2) / math.gamma(d / 2 + 1)
     return float(2 * (1 + 1 / d) ** (1 / d) * (volume / ball) ** (1 / d))
-
-
-def _better(problem: PlanningProblem, waypoints: Array, best: Array | None) -> tuple[Array, Array]:
-    """Return the shorter of a path, shortened, and the best one; and its inner waypoints."""
-    world, path = problem.world, waypoints.copy()
-    n = rrt_star_smart.skip_waypoints(
-        world.edge_check, world.resolution, world.robot, world.obstacles, path, len(path)
-    )
-    shorter = path[:n].copy()
-    if best is not None and _length(best) <= _length(shorter):
-        shorter = best
-    return shorter, np.ascontiguousarray(shorter[1:-1])
-
-
-def _length(waypoints: Array) -> float:
-    return float(np.linalg.norm(np.diff(waypoints, axis=0), axis=1).sum())

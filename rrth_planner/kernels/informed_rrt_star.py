@@ -25,7 +25,7 @@ def advance(
     rewire_radius,
     is_bidirectional,
     bias,
-    beacons,
+    shortened,
     n_draws,
     rng,
     tree_q,
@@ -41,7 +41,7 @@ def advance(
 
     They come straight from the ellipsoid between the start and one of the goals (Gammell et al.
     2014, algorithm 2). history (n_draws,): cost of the best path after each draw. `bias` and
-    `beacons` are not used.
+    `shortened` are not used.
     """
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):

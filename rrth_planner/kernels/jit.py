@@ -123,18 +123,20 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
     return decorate
 
 
-class FirstClass(types.WrapperAddressProtocol):
+class FirstClass:
     """
-    A kernel to be handed to other kernels, its address looked up once.
+    A kernel to be handed to other kernels, its type and address looked up once.
 
-    numba looks it up anew at each call that passes the bare kernel, which costs more (70 us) than
-    most plans spend in the call.
+    numba looks both up anew at each call that passes the bare kernel, which costs more (70 us)
+    than most plans spend in the call.
     """
 
     def __init__(self, compiled: Any) -> None:
         self.compiled = compiled
         (self._signature,) = compiled.nopython_signatures
         self._address = _get_wrapper_address(compiled, self._signature)
+        # Where numba looks for the type of a value.
+        self._numba_type_ = types.FunctionType(self._signature)
 
     def __wrapper_address__(self) -> int:
         """Return the address of the compiled code, as numba's protocol asks."""

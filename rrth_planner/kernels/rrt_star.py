@@ -26,8 +26,9 @@ from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
 # resolution, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two
-# trees or one, biasing ratio, beacons, draws, rng, tree_q, links, costs, sizes, meetings, best,
-# history.
+# trees or one, biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes, meetings,
+# best, history. best (4,): cost of the best path and row of its meeting, then number of waypoints
+# and cost of the shortened path, which RRT*-Smart alone keeps.
 STAR_SIGNATURE = int64(
     EDGE_CHECK,
     FREE_RADIUS,
@@ -41,7 +42,7 @@ STAR_SIGNATURE = int64(
     float64,
     boolean,
     int64,
-    MAT,
+    OUT_MAT,
     int64,
     npy_rng,
     OUT_CUBE,
@@ -151,13 +152,39 @@ def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes,
 
 @kernel(void(OUT_CUBE, OUT_MAT, OUT_INTS, OUT_INT_MAT, OUT_VEC))
 def find_best(tree_q, costs, sizes, meetings, best):
-    """Write the least cost over all meetings, and the row of that meeting, into best (2,)."""
+    """Write the least cost over all meetings, and the row of that meeting, into best[:2]."""
     best[0], best[1] = math.inf, -1.0
     for row in range(sizes[N_MEETINGS]):
         a, b = meetings[row, 0], meetings[row, 1]
         cost = costs[0, a] + distance(tree_q[0, a], tree_q[1, b]) + costs[1, b]
         if cost < best[0]:
             best[0], best[1] = cost, row
+
+
+@kernel(int64(OUT_CUBE, OUT_INT_CUBE, int64, int64, OUT_MAT))
+def trace_path(tree_q, links, from_start, from_goal, path):
+    """Write the path root - from_start - from_goal - root; return its waypoints, 0: no room."""
+    n = 0
+    i = from_start
+    while i >= 0:
+        n += 1
+        i = links[0, PARENT, i]
+    if n >= path.shape[0]:
+        return 0
+    i = from_start
+    for row in range(n - 1, -1, -1):
+        path[row] = tree_q[0, i]
+        i = links[0, PARENT, i]
+    i = from_goal
+    if distance(path[n - 1], tree_q[1, i]) == 0.0:
+        i = links[1, PARENT, i]
+    while i >= 0:
+        if n >= path.shape[0]:
+            return 0
+        path[n] = tree_q[1, i]
+        n += 1
+        i = links[1, PARENT, i]
+    return n
 
 
 @kernel(
@@ -206,7 +233,7 @@ def extend(
     tree_q (2, capacity, dof), links (2, 3, capacity), costs (2, capacity): the tree of the start
     and that of the goals. meetings (rows, 2): pairs of their nodes that a proven edge joins. With
     one tree each goal within a step of a new node is a meeting; with two, whatever node of the
-    other tree within a step makes a better path. best (2,): its cost and the row of its meeting.
+    other tree within a step makes a better path. best (4,): its cost and the row of its meeting.
     """
     other, dof = 1 - side, q.shape[0]
     near = nearest(tree_q[side], sizes[side], q)
@@ -260,7 +287,7 @@ def advance(
     rewire_radius,
     is_bidirectional,
     bias,
-    beacons,
+    shortened,
     n_draws,
     rng,
     tree_q,
@@ -274,7 +301,7 @@ def advance(
     """
     Make n_draws uniform draws; return how many were made.
 
-    history (n_draws,): cost of the best path after each draw. `bias` and `beacons` are not used.
+    history (n_draws,): cost of the best path after each draw. `bias` and `shortened` are not used.
     """
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):

@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """RRT*-Smart: RRT* that draws near the corners of its shortened path."""
 
+import math
+
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
-from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
+from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
+from rrth_planner.kernels.tree import path_length
 
 
 @kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64))
@@ -17,7 +20,7 @@ def skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n):
     From the end back: each waypoint is joined to the earliest ancestor that it sees (the path
     optimisation of Nasir et al. 2013, seen from the start).
     """
-    kept, i = 1, 0
+    kept, i = min(n, 1), 0
     while i < n - 1:
         ahead = n - 1
         while ahead > i + 1 and not is_edge_free(
@@ -44,7 +47,7 @@ def advance(
     rewire_radius,
     is_bidirectional,
     bias,
-    beacons,
+    shortened,
     n_draws,
     rng,
     tree_q,
@@ -56,19 +59,20 @@ def advance(
     history,
 ):
     """
-    Make n_draws draws, or fewer if the path gets better; return how many were made.
+    Make n_draws draws; return how many were made.
 
-    beacons (n, dof): the inner waypoints of the shortened best path; every `bias`-th draw comes
+    Whenever the path of the trees improves, it is shortened by skipping waypoints. The best such
+    path is kept in `shortened`, its inner waypoints are the beacons: every `bias`-th draw comes
     from a ball of half a step round one of them (Nasir et al. 2013). history (n_draws,): cost of
-    the best path of the tree after each draw.
+    the shortened path after each draw.
     """
-    dof = tree_q.shape[2]
-    q = np.empty(dof)
+    q, path = np.empty(tree_q.shape[2]), np.empty(shortened.shape)
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0
-        if beacons.shape[0] > 0 and draw % bias == 0:
-            beacon = int64(rng.random() * beacons.shape[0])
-            draw_ball(beacons[beacon], 0.5 * step_size, bounds, rng, q)
+        n_beacons = int64(best[2]) - 2
+        if n_beacons > 0 and draw % bias == 0:
+            beacon = 1 + int64(rng.random() * n_beacons)
+            draw_ball(shortened[beacon], 0.5 * step_size, bounds, rng, q)
         elif rng.random() < goal_bias:
             goal = int64(rng.random() * sizes[N_GOALS])
             q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
@@ -93,7 +97,14 @@ def advance(
             meetings,
             best,
         )
-        history[draw] = best[0]
-        if is_better:
-            return draw + 1
+        # Trees that were taken over may have brought a path along.
+        if is_better or best[0] < math.inf and best[3] == math.inf:
+            row = int64(best[1])
+            n = trace_path(tree_q, links, meetings[row, 0], meetings[row, 1], path)
+            n = skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n)
+            length = path_length(path, n)
+            if n > 0 and length < best[3]:
+                shortened[:n] = path[:n]
+                best[2], best[3] = n, length
+        history[draw] = best[3]
     return n_draws
