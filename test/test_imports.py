@@ -59,7 +59,8 @@ def allowed(module, name):
         if layer == 'kernels':
             return target == 'kernels'
         if target == 'viewers':
-            return layer == 'viewers' or (layer == 'ros' and 'demo' in module)
+            is_demo = layer == 'ros' and 'demo' in module
+            return layer == 'viewers' or is_demo or module == REPORTER
         return target != 'ros' or layer == 'ros'
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
