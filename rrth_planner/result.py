@@ -67,7 +67,8 @@ class PlanResult:
     path : Path or None
         The best path; None unless solved.
     raw_path : Path or None
-        The first path that growth found, before any shortening; None where a straight edge did.
+        The first path that growth found, before any shortening; None where a straight edge did,
+        and for RRT* and its kin, which shorten nothing.
     trees : tuple of Tree
         From the start and, with two trees, from the goals, as they were last.
     cost_history, sample_history, time_history : tuple of float, of int, of float

@@ -120,7 +120,6 @@ def search(
     elif is_smart:
         advance = rrt_star_smart.advance
     radius = options.rewire_factor * optimal_radius(world.bounds)
-    raw_path: Path | None = None
     cost = np.inf
     history: list[tuple[float, int, float]] = []
     drawn, stopped, is_cut = 0, None, False
@@ -170,14 +169,12 @@ def search(
         drawn += made
         if cost < np.inf and first_time == np.inf:
             first_time = after
-            raw_path = Path(trees.path())
     best_path: Array | None = None
     if cost < np.inf and stopped is not PlanStatus.CANCELLED:
         best_path = trees.shortened[: int(trees.best[2])] if is_smart else trees.path()
     return PlanResult(
         status=(stopped or PlanStatus.SAMPLE_LIMIT) if best_path is None else PlanStatus.SOLVED,
         path=None if best_path is None else Path(best_path),
-        raw_path=raw_path,
         trees=trees.frozen(),
         cost_history=tuple(entry[0] for entry in history),
         sample_history=tuple(entry[1] for entry in history),

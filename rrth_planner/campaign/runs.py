@@ -145,7 +145,7 @@ def _outcome(result: PlanResult) -> Row:
         'status': result.status.value,
         'time_first': result.time_history[0] if is_improved else None,
         'time_total': result.planning_time,
-        'cost_first': None if result.raw_path is None else result.raw_path.length,
+        'cost_first': _first_cost(result),
         'cost_final': None if path is None else path.length,
         'draws_first': result.sample_history[0] if is_improved else None,
         'draws_total': result.n_samples,
@@ -182,3 +182,10 @@ def _commit() -> str | None:
     except (OSError, subprocess.SubprocessError):
         return None
     return told.stdout.strip() or None
+
+
+def _first_cost(result: PlanResult) -> float | None:
+    """Return the length of the first path, before any shortening, or None."""
+    if result.raw_path is not None:
+        return result.raw_path.length
+    return result.cost_history[0] if result.cost_history else None
