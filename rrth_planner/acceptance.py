@@ -16,6 +16,8 @@ EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
 # Instants of each piece of a motion at which limits are looked at.
 INSTANTS = 64
+# A motion that ends later than this is refused [s].
+LONGEST_WAIT = 3600.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -85,11 +87,27 @@ def accept(
     Raises
     ------
     MessageError
-        The new motion is not at the present state now, or leaves limits somewhere. Within
-        `start_tolerance` the arm steps onto it.
+        The new motion is not at the present state now, leaves limits somewhere, or ends more
+        than an hour ahead. Within `start_tolerance` the arm steps onto it.
 
     """
     new = Playback(trajectory=trajectory, start_time=start_time, time_scale=rules.time_scale)
+    # Numbers that overflow become infinite or NaN, which every comparison below refuses.
+    with np.errstate(all='ignore'):
+        _check_start(playback, new, arm, rules, time)
+        _check_limits(new, arm, rules)
+        ahead = new.end_time - time
+    if not ahead <= LONGEST_WAIT:
+        raise MessageError(
+            f'the motion ends in {ahead:.6g} s, expected an end within {LONGEST_WAIT:g} s'
+        )
+    return new
+
+
+def _check_start(
+    playback: Playback, new: Playback, arm: ArmModel, rules: PlaybackRules, time: float
+) -> None:
+    """Raise MessageError where a motion is not at the present state now."""
     q, v, _ = playback.state_at(time)
     q_new, v_new, _ = new.state_at(time)
     for what, unit, wanted, present in (
@@ -98,13 +116,11 @@ def accept(
     ):
         gap = np.abs(wanted - present)
         i = int(np.argmax(gap))
-        if gap[i] > rules.start_tolerance:
+        if not gap[i] <= rules.start_tolerance:
             raise MessageError(
-                f'{arm.joint_names[i]}: the motion begins at {what} {wanted[i]:.4f}, the arm is '
-                f'at {present[i]:.4f}, expected at most {rules.start_tolerance:g} apart [{unit}]'
+                f'{arm.joint_names[i]}: the motion begins at {what} {wanted[i]:.6g}, the arm is '
+                f'at {present[i]:.6g}, expected at most {rules.start_tolerance:g} apart [{unit}]'
             )
-    _check_limits(new, arm, rules)
-    return new
 
 
 def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> None:
@@ -129,8 +145,8 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
     ):
         excess = np.maximum(low - value, value - high)
         k, i = np.unravel_index(np.argmax(excess), excess.shape)
-        if excess[k, i] > 0.0:
+        if not excess[k, i] <= 0.0:
             raise MessageError(
-                f'{arm.joint_names[i]}: {what} {value[k, i]:.4f} at {instants[k]:.3f} s, '
-                f'expected {low[i]:.4f} to {high[i]:.4f} [{unit}]'
+                f'{arm.joint_names[i]}: {what} {value[k, i]:.6g} at {instants[k]:.6g} s, '
+                f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]'
             )

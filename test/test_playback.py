@@ -126,6 +126,27 @@ def test_a_motion_that_does_not_fit_is_refused(move, words):
         taken(standing(FOLDED), move)
 
 
+@pytest.mark.parametrize('size', [1e200, 1e306, 1e308])
+def test_numbers_that_overflow_are_refused_without_a_warning(size, recwarn):
+    move = Trajectory(
+        times=[0.0, 1.0, 2.0],
+        positions=[FOLDED, FOLDED, FOLDED],
+        velocities=[STILL, [size, -size, size, 0.0], STILL],
+        accelerations=[STILL, [-size] * 4, STILL],
+    )
+    with pytest.raises(MessageError) as refusal:
+        taken(standing(FOLDED), move)
+    assert len(str(refusal.value)) < 200
+    assert not recwarn.list
+
+
+def test_a_motion_that_ends_more_than_an_hour_ahead_is_refused():
+    move = motion(FOLDED, FOLDED - 0.3, duration=10.0)
+    accept(standing(FOLDED), move, ARM, rules(), start_time=3589.0, time=0.0)
+    with pytest.raises(MessageError, match=r'ends in 3601 s, expected an end within 3600 s'):
+        accept(standing(FOLDED), move, ARM, rules(), start_time=3591.0, time=0.0)
+
+
 def test_slow_motion_is_held_to_limits_as_it_is_played():
     fast = motion(FOLDED, FOLDED + [2.0, 0.0, 0.0, 0.0], duration=2.0)
     assert taken(standing(FOLDED), fast, time_scale=0.5).end_time == pytest.approx(4.0)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wearer as visualization markers: which boxes there are, and until when."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 # More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.
 MOST_BOXES = 10000
+# So many markers whose lifetime has passed are remembered, to be named.
+MOST_EXPIRED = 100
+
+Key = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +41,27 @@ class BodyPart:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Edit:
+    """
+    What one marker does to the wearer.
+
+    Parameters
+    ----------
+    action : int
+        Marker.ADD, DELETE or DELETEALL.
+    key : (str, int)
+        Its ns and id.
+    part : BodyPart or None
+        What is added; None unless it adds.
+
+    """
+
+    action: int
+    key: Key
+    part: BodyPart | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class WearerBody:
     """
     The wearer's boxes by namespace and id, as RViz would show them; a value, never changed.
@@ -45,10 +70,13 @@ class WearerBody:
     ----------
     parts : tuple of ((str, int), BodyPart)
         Keys (ns, id), each once.
+    expired : tuple of ((str, int), BodyPart)
+        Those that were neither deleted nor added again since their lifetime passed; at most 100.
 
     """
 
-    parts: tuple[tuple[tuple[str, int], BodyPart], ...] = ()
+    parts: tuple[tuple[Key, BodyPart], ...] = ()
+    expired: tuple[tuple[Key, BodyPart], ...] = ()
 
     @property
     def n_boxes(self) -> int:
@@ -59,7 +87,11 @@ class WearerBody:
         """Return the body without the parts whose lifetime has passed at a time [s]."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        return WearerBody(tuple(item for item in self.parts if item[1].expires > now))
+        gone = dict(self.expired) | {k: part for k, part in self.parts if part.expires <= now}
+        return WearerBody(
+            tuple(item for item in self.parts if item[1].expires > now),
+            tuple(gone.items())[-MOST_EXPIRED:],
+        )
 
     def apply(
         self, msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
@@ -87,29 +119,48 @@ class WearerBody:
             A bad marker; a FrameError when its frame is the reason.
 
         """
-        parts = dict(self.at(now).parts)
-        for index, marker in enumerate(msg.markers):
-            key = (marker.ns, marker.id)
-            if marker.action == Marker.DELETEALL:
-                parts = {k: part for k, part in parts.items() if marker.ns not in ('', k[0])}
-            elif marker.action == Marker.DELETE:
-                parts.pop(key, None)
-            elif marker.action == Marker.ADD:
-                try:
-                    parts[key] = _body_part(marker, now, base_frame, lookup)
-                except FrameError as problem:
-                    raise FrameError(f'{_label(index, marker)}: {problem}') from problem
-                except (MessageError, SceneError) as problem:
-                    raise MessageError(f'{_label(index, marker)}: {problem}') from problem
+        return self.edited(read_edits(msg, now, base_frame, lookup), now)
+
+    def edited(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
+        """Return the body after the edits of one array, heard at a time [s], or raise."""
+        present = self.at(now)
+        parts, expired = dict(present.parts), dict(present.expired)
+        for edit in edits:
+            if edit.action == Marker.DELETEALL:
+                ns = edit.key[0]
+                parts = {k: part for k, part in parts.items() if ns not in ('', k[0])}
+                expired = {k: part for k, part in expired.items() if ns not in ('', k[0])}
+                continue
+            expired.pop(edit.key, None)
+            if edit.part is None:
+                parts.pop(edit.key, None)
             else:
-                raise MessageError(
-                    f'{_label(index, marker)}: action {marker.action}, expected 0 (ADD), '
-                    '2 (DELETE) or 3 (DELETEALL)'
-                )
-        body = WearerBody(tuple(parts.items()))
+                parts[edit.key] = edit.part
+        body = WearerBody(tuple(parts.items()), tuple(expired.items()))
         if body.n_boxes > MOST_BOXES:
             raise MessageError(f'{body.n_boxes} boxes, expected at most {MOST_BOXES} in all')
         return body
+
+    def with_older(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
+        """
+        Return the body with what an array adds where nothing is, heard at a time [s].
+
+        For an array that is older than the body: it takes nothing away and changes nothing.
+        """
+        older = {e.key: e.part for e in edits if e.part is not None and e.part.expires > now}
+        present = dict(self.parts)
+        missing = [Edit(Marker.ADD, k, part) for k, part in older.items() if k not in present]
+        return self.edited(missing, now)
+
+
+def read_edits(
+    msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
+) -> tuple[Edit, ...]:
+    """Return what an array does, in its order; arguments and errors are those of `apply`."""
+    return tuple(
+        _edit(f'marker {index} ("{marker_name(marker)}")', marker, now, base_frame, lookup)
+        for index, marker in enumerate(msg.markers)
+    )
 
 
 def scene_of(body: WearerBody) -> Scene:
@@ -122,8 +173,20 @@ def marker_name(marker: Any) -> str:
     return marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
 
 
-def _label(index: int, marker: Any) -> str:
-    return f'marker {index} ("{marker_name(marker)}")'
+def _edit(label: str, marker: Any, now: float, base_frame: str, lookup: Lookup | None) -> Edit:
+    key = (marker.ns, marker.id)
+    if marker.action in (Marker.DELETE, Marker.DELETEALL):
+        return Edit(marker.action, key)
+    if marker.action != Marker.ADD:
+        raise MessageError(
+            f'{label}: action {marker.action}, expected 0 (ADD), 2 (DELETE) or 3 (DELETEALL)'
+        )
+    try:
+        return Edit(Marker.ADD, key, _body_part(marker, now, base_frame, lookup))
+    except FrameError as problem:
+        raise FrameError(f'{label}: {problem}') from problem
+    except (MessageError, SceneError) as problem:
+        raise MessageError(f'{label}: {problem}') from problem
 
 
 def _body_part(marker: Any, now: float, base_frame: str, lookup: Lookup | None) -> BodyPart:

@@ -10,8 +10,6 @@ from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 
-STATUS_NAME = 'rrth_planner: planning'
-
 
 @dataclass(frozen=True, slots=True)
 class PlanReport:
@@ -51,13 +49,20 @@ class PlanReport:
 
 
 def diagnostics_msg(
-    stamp: Any, now: float, heard: Inputs, parameters: PlannerParameters, report: PlanReport
+    node_name: str,
+    stamp: Any,
+    now: float,
+    heard: Inputs,
+    parameters: PlannerParameters,
+    report: PlanReport,
 ) -> DiagnosticArray:
     """
     Return the diagnostics of the planner.
 
     Parameters
     ----------
+    node_name : str
+        Fully qualified.
     stamp : builtin_interfaces.msg.Time
         Of the message.
     now : float
@@ -68,6 +73,7 @@ def diagnostics_msg(
     report : PlanReport
 
     """
+    body = heard.body.value.at(now)
     level, message = _summary(now, heard, parameters, report)
     values = {
         'last code': '' if report.code is None else f'{report.code.name} ({report.code.value})',
@@ -80,14 +86,18 @@ def diagnostics_msg(
         'duration [s]': f'{report.duration:.3f}',
         'path length [rad]': f'{report.length:.4f}',
         'least clearance [m]': f'{report.clearance:.4f}',
-        'boxes': str(heard.body.value.at(now).n_boxes),
+        'boxes': str(body.n_boxes),
+        'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
     }
     for name, topic in heard.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
         values[f'refused messages, {name}'] = str(topic.n_refused)
         values[f'last refusal, {name}'] = str(topic.refusal or '')
     status = DiagnosticStatus(
-        level=level, name=STATUS_NAME, hardware_id='rrth_planner', message=message
+        level=level,
+        name=f'{node_name.lstrip("/")}: planning',
+        hardware_id='rrth_planner',
+        message=message,
     )
     status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
     msg = DiagnosticArray(status=[status])

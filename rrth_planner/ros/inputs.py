@@ -6,15 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.error_codes import ErrorCode
-from rrth_planner.ros.messages import FrameError, scene_of, WearerBody
+from rrth_planner.ros.messages import FrameError, JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
 
 T = TypeVar('T')
+# An arm that moves faster is not at rest [rad/s].
+REST_SPEED = 0.01
 
 
 class RequestError(RrthError):
@@ -72,7 +75,28 @@ class PlanInputs:
 
     scene: Scene
     goal: PointingGoal
-    q_start: Array
+    joints: JointReading
+
+    @property
+    def q_start(self) -> Array:
+        """Where the arm is, shape (dof,) [rad]."""
+        return self.joints.positions
+
+    def require_rest(self, now: float, arm: ArmModel) -> None:
+        """Raise RequestError where the arm moves at a time [s]: motions begin at rest."""
+        if now > self.joints.velocities_expire:
+            return
+        speeds = abs(self.joints.velocities).tolist()
+        for name, speed, is_prismatic in zip(
+            arm.joint_names, speeds, arm.is_prismatic, strict=True
+        ):
+            if not speed <= REST_SPEED:
+                unit = 'm/s' if is_prismatic else 'rad/s'
+                raise RequestError(
+                    ErrorCode.START_STATE_INVALID,
+                    f'{name} moves at {speed:.3f} {unit}, expected an arm at rest (at most '
+                    f'{REST_SPEED:g} {unit})',
+                )
 
 
 class Inputs:
@@ -82,7 +106,9 @@ class Inputs:
         """Begin with nothing heard."""
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
-        self.joints: Input[Array | None] = Input(joint_topic, None)
+        self.joints: Input[JointReading | None] = Input(joint_topic, None)
+        # Why the last message with all joints was refused; None: it was good.
+        self.joint_refusal: MessageError | None = None
 
     @property
     def all(self) -> dict[str, Input[Any]]:
@@ -107,13 +133,20 @@ class Inputs:
         Raises
         ------
         RequestError
-            Something is missing, too old or, as the last target, refused.
+            Something is missing, too old or, as the last target or joint positions, refused.
 
         """
         scene = self._scene(now, parameters)
         if goal is None:
             goal = self._goal()
-        q_start = _require(
+        refusal = self.joint_refusal
+        if refusal is not None:
+            # Where the arm was before says nothing of where it is.
+            raise RequestError(
+                ErrorCode.ROBOT_STATE_STALE,
+                f'the last message on {self.joints.topic} was refused: {refusal}',
+            )
+        joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
         )
         _require_fresh(
@@ -123,7 +156,7 @@ class Inputs:
             'joint_timeout',
             ErrorCode.ROBOT_STATE_STALE,
         )
-        return PlanInputs(scene, goal, q_start)
+        return PlanInputs(scene, goal, joints)
 
     def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
         _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')

@@ -9,9 +9,11 @@ from typing import Any
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.bodies import read_edits
+from rrth_planner.ros.body_history import BodyHistory
 from rrth_planner.ros.frames import Frames
 from rrth_planner.ros.inputs import Input, Inputs
-from rrth_planner.ros.messages import configuration_from_msg, goal_from_msg, has_joint_of
+from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.subscriptions import OpenSubscription
 from sensor_msgs.msg import JointState
@@ -53,8 +55,9 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
+        self._history = BodyHistory()
         self._subscriptions = [
-            OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body),
+            OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body, self._on_body),
             OpenSubscription(node, PointStamped, 'target', self._on_target),
             OpenSubscription(node, JointState, 'joint_states', self._on_joints),
         ]
@@ -63,27 +66,30 @@ class Listener:
         """Return the goal of a request's own target, or raise MessageError."""
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
-    def _on_body(self, msg: MarkerArray) -> None:
+    def _on_body(self, msg: MarkerArray, sent: int) -> None:
         now, body = self._now(), self._inputs.body
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(body)
-        self._take(
-            body, lambda: body.value.apply(msg, now, self._base_frame, self._frames.lookup), now
-        )
 
-    def _on_target(self, msg: PointStamped) -> None:
+        def read() -> WearerBody:
+            edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
+            return self._history.apply(body.value, edits, sent, now)
+
+        self._take(body, read, now)
+
+    def _on_target(self, msg: PointStamped, _: int) -> None:
         if not msg.header.frame_id:
             self._warn_of_empty_frame(self._inputs.target)
         self._take(self._inputs.target, lambda: self.goal(msg), self._now())
 
-    def _on_joints(self, msg: JointState) -> None:
+    def _on_joints(self, msg: JointState, _: int) -> None:
         # Other machines share this topic; a message without any joint of ours is none of ours.
-        if has_joint_of(msg, self._joint_names):
-            self._take(
-                self._inputs.joints,
-                lambda: configuration_from_msg(msg, self._joint_names),
-                self._now(),
-            )
+        if not has_joint_of(msg, self._joint_names):
+            return
+        now, heard = self._now(), self._inputs.joints
+        self._take(heard, lambda: joint_reading(msg, self._joint_names, now, heard.value), now)
+        if set(self._joint_names) <= set(msg.name):
+            self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
 
     def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> None:
         was_good = heard.received is not None and not heard.is_last_refused

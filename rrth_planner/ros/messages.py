@@ -7,8 +7,10 @@ Bodies and trajectories have modules of their own; their names are offered here 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from geometry_msgs.msg import PointStamped
+import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import MessageError, SceneError
 from rrth_planner.goal import PointingGoal
@@ -23,12 +25,17 @@ from rrth_planner.ros.trajectories import (
 )
 from sensor_msgs.msg import JointState
 
+# Positions that are older than this say nothing about the present velocity [s].
+DIFFERENCE_AGE = 0.5
+
 __all__ = [
     'FrameError',
+    'JointReading',
     'WearerBody',
     'configuration_from_msg',
     'goal_from_msg',
     'has_joint_of',
+    'joint_reading',
     'joint_trajectory_from_msg',
     'joint_trajectory_to_msg',
     'pose_to_msg',
@@ -94,3 +101,66 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
         )
     q = [msg.position[names.index(name)] for name in joint_names]
     return frozen_array(q, (len(q),), f'position of {list(joint_names)}', 'rad', MessageError)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointReading:
+    """
+    What one message says of the arm.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (dof,)
+        [rad].
+    velocities : ndarray, shape (dof,)
+        As they were given, NaN included, or how the positions changed [rad/s].
+    received : float
+        [s].
+    velocities_expire : float
+        Until when the velocities count; inf: as long as the positions [s].
+
+    """
+
+    positions: Array
+    velocities: Array
+    received: float
+    velocities_expire: float
+
+
+def joint_reading(
+    msg: JointState, joint_names: Sequence[str], received: float, before: JointReading | None
+) -> JointReading:
+    """
+    Return the positions and velocities of these joints, by name; others are ignored.
+
+    Parameters
+    ----------
+    msg : JointState
+        Without velocities, these are the change since the reading before.
+    joint_names : sequence of str
+    received : float
+        When it came [s].
+    before : JointReading or None
+
+    Raises
+    ------
+    MessageError
+        As `configuration_from_msg`, or velocities of only some of the names.
+
+    """
+    q = configuration_from_msg(msg, joint_names)
+    names = list(msg.name)
+    if len(msg.velocity):
+        if len(msg.velocity) != len(names):
+            raise MessageError(
+                f'velocity: {len(msg.velocity)} values for {len(names)} names, expected none or '
+                'one a name [rad/s]'
+            )
+        v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
+        return JointReading(q, v, received, float('inf'))
+    if before is None:
+        return JointReading(q, np.zeros_like(q), received, received)
+    step = max(received - before.received, 1e-9)
+    return JointReading(
+        q, (q - before.positions) / step, received, before.received + DIFFERENCE_AGE
+    )

@@ -7,12 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.arm import ArmModel
@@ -27,6 +22,7 @@ from rrth_planner.options import (
     TreeOptions,
 )
 from rrth_planner.resources import load_arm
+from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 from rrth_planner.trajectory import MotionLimits
 
 ALGORITHMS: dict[str, type[TreeOptions]] = {
@@ -41,46 +37,6 @@ OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 LONGEST_TIMEOUT = 86400.0
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
 LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """One parameter: its name, default, range (None: no range), unit and meaning."""
-
-    name: str
-    default: Any
-    low: float | None
-    high: float | None
-    unit: str
-    description: str
-    is_read_only: bool = False
-
-    @property
-    def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows; a step other than 0 would refuse values."""
-        msg = ParameterDescriptor(
-            description=f'{self.description} [{self.unit}]', read_only=self.is_read_only
-        )
-        if self.low is None or self.high is None:
-            return msg
-        if isinstance(self.default, int):
-            msg.integer_range = [IntegerRange(from_value=self.low, to_value=self.high)]
-        else:
-            msg.floating_point_range = [
-                FloatingPointRange(from_value=float(self.low), to_value=float(self.high))
-            ]
-        return msg
-
-
-ARM = Setting(
-    'arm',
-    '',
-    None,
-    None,
-    'path of a YAML file',
-    'the arm, as config/arm.yaml; empty: that one',
-    True,
-)
 
 
 def settings(dof: int) -> tuple[Setting, ...]:
@@ -194,10 +150,10 @@ def declare_parameters(node: Node) -> PlannerParameters:
         A value that the node was started with is refused, or describes no arm.
 
     """
-    node.declare_parameter(ARM.name, ARM.default, ARM.descriptor)
+    declare(node, (ARM,))
     arm = load_arm(node.get_parameter(ARM.name).value)
-    for setting in settings(arm.dof):
-        node.declare_parameter(setting.name, setting.default, setting.descriptor)
+    refuse_unknown(node, (ARM, *settings(arm.dof)))
+    declare(node, settings(arm.dof))
 
     def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
         values = _values(node, arm) | {change.name: change.value for change in changes}

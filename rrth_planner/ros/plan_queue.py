@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from threading import Lock
 import time
 import traceback
 from typing import Any
@@ -14,10 +15,12 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
-from rrth_planner.ros.error_codes import ErrorCode
+from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
+from rrth_planner.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +30,12 @@ class Response:
     is_solved: bool
     text: str
     tool_path: Path
+
+
+class _Ticket:
+    """One request, until its motion is published or it ends without one."""
+
+    is_cancelled = False
 
 
 class PlanQueue:
@@ -56,53 +65,77 @@ class PlanQueue:
         self._plan_request = plan_request
         self._publishers = PlanPublishers(node)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
-        self._n_cancels = 0
-        self._n_open = 0
+        # Held while a motion is published, so that what was cancelled before never is.
+        self._lock = Lock()
+        self._open: set[_Ticket] = set()
+        self._is_closed = False
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
-        future = Future()
-        begin, n_cancels = time.perf_counter(), self._n_cancels
+        future, ticket = Future(), _Ticket()
+        begin = time.perf_counter()
 
         def work() -> None:
             try:
-                future.set_result(self._work(goal, begin, lambda: self._n_cancels != n_cancels))
+                future.set_result(self._work(goal, begin, ticket))
             except BaseException as problem:
                 future.set_exception(problem)
             executor = self._node.executor
             if executor is not None:
                 executor.wake()
 
-        self._n_open += 1
+        with self._lock:
+            self._open.add(ticket)
         try:
             self._worker.submit(work)
             return await future
         finally:
-            self._n_open -= 1
+            with self._lock:
+                self._open.discard(ticket)
+
+    def prepare(self, work: Callable[[], None]) -> None:
+        """Have something done in the worker's thread before the requests that follow."""
+
+        def prepared() -> None:
+            try:
+                work()
+            except Exception:
+                # The request that needs it will say what is wrong.
+                self._node.get_logger().error(traceback.format_exc())
+
+        self._worker.submit(prepared)
 
     def cancel(self) -> int:
-        """End the request in progress and those that wait; return how many these are."""
-        self._n_cancels += 1
-        return self._n_open
+        """End the requests that have published no motion yet; return how many these are."""
+        with self._lock:
+            ended, self._open = self._open, set()
+            for ticket in ended:
+                ticket.is_cancelled = True
+        return len(ended)
 
     def close(self) -> None:
-        """End everything; no request may follow."""
+        """End everything; nothing is published any more, and no request may follow."""
+        with self._lock:
+            self._is_closed = True
         self.cancel()
         self._worker.shutdown(wait=True, cancel_futures=True)
 
-    def _work(
-        self, goal: PointingGoal | None, begin: float, should_stop: Callable[[], bool]
-    ) -> Response:
+    def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
         """Plan, publish and conclude; called in the worker's thread."""
         figures, path, outcome = PlanReport(), Path(), None
         parameters = self._reporter.parameters
         try:
-            outcome = self._plan_request(self._heard, parameters, self._now, should_stop, goal)
+            outcome = self._plan_request(
+                self._heard, parameters, self._now, lambda: ticket.is_cancelled, goal
+            )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if outcome.trajectory is not None:
-                self._publishers.publish_motion(outcome.trajectory, parameters)
+            if self._settle(ticket, outcome.trajectory, parameters):
+                if code is not ErrorCode.PREEMPTED:
+                    code, sentence = ErrorCode.PREEMPTED, 'the request was cancelled'
+                outcome = None
+            elif outcome.trajectory is not None:
                 figures = replace(
                     figures,
                     response_time=time.perf_counter() - begin,
@@ -113,11 +146,27 @@ class PlanQueue:
         except Exception as problem:
             # Whatever it is, the caller gets an answer, and the node lives on.
             self._node.get_logger().error(traceback.format_exc())
+            with self._lock:
+                self._open.discard(ticket)
             code, sentence, outcome = ErrorCode.FAILURE, _in_a_sentence(problem), None
+        if self._is_closed:
+            return Response(False, answer(code, sentence), path)
         if outcome is not None and outcome.trajectory is not None:
             path = self._show(outcome, parameters)
         text = self._reporter.conclude(code, sentence, figures)
         return Response(code is ErrorCode.SUCCESS, text, path)
+
+    def _settle(
+        self, ticket: _Ticket, trajectory: Trajectory | None, parameters: PlannerParameters
+    ) -> bool:
+        """Return whether a request was cancelled; publish its motion, if it has one, if not."""
+        with self._lock:
+            if ticket.is_cancelled or self._is_closed:
+                return True
+            if trajectory is not None:
+                self._publishers.publish_motion(trajectory, parameters)
+            self._open.discard(ticket)
+            return False
 
     def _show(self, outcome: Any, parameters: Any) -> Path:
         """Publish what shows a motion; a failure of this does not unsay the motion."""

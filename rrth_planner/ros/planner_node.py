@@ -9,7 +9,7 @@ import sys
 import time
 from typing import Any
 
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PointStamped, Pose
 from nav_msgs.srv import GetPlan
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -53,9 +53,9 @@ class PlannerNode(Node):
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
         self._reporter = Reporter(self, heard, parameters)
-        self.add_post_set_parameters_callback(self._on_parameters)
         self._listener = Listener(self, parameters, heard, self._reporter.publish)
         self._queue = PlanQueue(self, heard, self._reporter, self._load_planner())
+        self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)
         self.create_service(GetPlan, '~/get_plan', self._on_get_plan, callback_group=group)
@@ -80,12 +80,17 @@ class PlannerNode(Node):
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 
+        self._warm_up = warm_up
         parameters = self._reporter.parameters
         warm_up(parameters.arm, parameters.options)
         return plan_request
 
     def _on_parameters(self, _: Any) -> None:
-        self._reporter.parameters = current_parameters(self, self._reporter.parameters.arm)
+        before = self._reporter.parameters
+        now = self._reporter.parameters = current_parameters(self, before.arm)
+        if type(now.options) is not type(before.options):
+            # Not within the time of the next plan; requests wait until it is done.
+            self._queue.prepare(lambda: self._warm_up(now.arm, now.options))
 
     async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         found = await self._queue.respond(None)
@@ -99,6 +104,11 @@ class PlannerNode(Node):
             if request.start.header.frame_id:
                 raise MessageError(
                     f'start: frame "{request.start.header.frame_id}", expected an empty start, '
+                    'since a plan begins where the arm is'
+                )
+            if request.start.pose != Pose():
+                raise MessageError(
+                    'start: a pose, expected an empty start (position 0, orientation 0, 0, 0, 1), '
                     'since a plan begins where the arm is'
                 )
             goal = self._listener.goal(

@@ -11,7 +11,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError
 from rrth_planner.resources import load_arm
-from rrth_planner.ros.parameters import ARM, Setting
+from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 
 FOLDED = [0.0, -0.35, np.pi / 2, np.pi / 2]
 EACH = 'a value for each joint, or one for all'
@@ -62,8 +62,8 @@ def declare_playback_parameters(node: Node) -> ArmModel:
         A value that the node was started with is refused, or describes no arm.
 
     """
-    for setting in SETTINGS:
-        node.declare_parameter(setting.name, setting.default, setting.descriptor)
+    refuse_unknown(node, SETTINGS)
+    declare(node, SETTINGS)
     arm = load_arm(node.get_parameter(ARM.name).value)
     playback_rules(node, arm)
     initial_positions(node, arm)

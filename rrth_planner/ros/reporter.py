@@ -3,6 +3,8 @@
 """Tell how requests ended: to the log, and to diagnostics."""
 
 from dataclasses import replace
+from threading import Lock
+import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -13,6 +15,8 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 
 PERIOD = 1.0
+# Changes are published at most this often; the last one always is [s].
+SHORTEST_PERIOD = 0.1
 
 
 class Reporter:
@@ -34,19 +38,55 @@ class Reporter:
         self.report = PlanReport()
         self._node, self._heard = node, heard
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._lock = Lock()
+        self._published = -SHORTEST_PERIOD
+        self._is_changed = False
+        self._named: set[tuple[str, int]] = set()
         # Not the node's clock: simulated time may stand still.
-        self._timer = node.create_timer(
-            PERIOD, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timers = [
+            node.create_timer(PERIOD, self._publish, clock=steady),
+            node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
+        ]
 
     def publish(self) -> None:
-        """Publish the diagnostics of now."""
-        now = self._node.get_clock().now()
-        self._publisher.publish(
-            diagnostics_msg(
-                now.to_msg(), now.nanoseconds * 1e-9, self._heard, self.parameters, self.report
+        """Publish the diagnostics of now, or, when the last are too recent, soon."""
+        self._is_changed = True
+        self._publish_change()
+
+    def _publish_change(self) -> None:
+        if self._is_changed and time.monotonic() - self._published >= SHORTEST_PERIOD:
+            self._publish()
+
+    def _publish(self) -> None:
+        # Both the executor's thread and the worker's come here.
+        with self._lock:
+            self._published, self._is_changed = time.monotonic(), False
+            now = self._node.get_clock().now()
+            seconds = now.nanoseconds * 1e-9
+            self._warn_of_expired(seconds)
+            self._publisher.publish(
+                diagnostics_msg(
+                    self._node.get_fully_qualified_name(),
+                    now.to_msg(),
+                    seconds,
+                    self._heard,
+                    self.parameters,
+                    self.report,
+                )
             )
-        )
+
+    def _warn_of_expired(self, now: float) -> None:
+        """Name in the log, once, the boxes whose lifetime has passed."""
+        expired = self._heard.body.value.at(now).expired
+        new = [(key, part) for key, part in expired if key not in self._named]
+        if new:
+            self._named.update(key for key, _ in new)
+            names = ', '.join(f'"{box.name}"' for _, part in new for box in part.boxes)
+            self._node.get_logger().warning(
+                f'{self._heard.body.topic}: the lifetime of {names} has passed, plans no longer '
+                'regard them'
+            )
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
         """Log and publish how a request ended, and return the answer to it."""

@@ -10,6 +10,7 @@ import numpy as np
 from rrth_planner.arm import tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
@@ -20,7 +21,7 @@ from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
-START_TOLERANCE = 0.01
+START_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +65,9 @@ def plan_request(
 
     """
     try:
-        inputs = heard.at(clock(), parameters, goal)
+        now = clock()
+        inputs = heard.at(now, parameters, goal)
+        inputs.require_rest(now, parameters.arm)
         if should_stop():
             raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled before its turn')
         plan = plan_motion(
@@ -99,12 +102,13 @@ def _check_present(
     """Raise RequestError where wearer or arm have moved so that the motion no longer fits."""
     present = heard.at(now, parameters, inputs.goal)
     moved = float(np.abs(present.q_start - inputs.q_start).max())
-    if moved > START_TOLERANCE:
+    if not moved <= START_TOLERANCE:
         raise RequestError(
             ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
             f'the arm moved by {moved:.4f} rad while its motion was planned, expected at most '
             f'{START_TOLERANCE:g} rad',
         )
+    present.require_rest(now, parameters.arm)
     if _is_same(present.scene, inputs.scene):
         return
     world = arm_world(
@@ -112,7 +116,15 @@ def _check_present(
     )
     q_end: Array = trajectory.positions[-1]
     reach = float(np.linalg.norm(inputs.goal.target - tool_pose(parameters.arm, q_end)[:3, 3]))
-    if not (world.is_valid(q_end, reach) and certify(trajectory, world).is_proven):
+    # Both judges must agree, as they had to when it was planned.
+    if not (
+        world.is_valid(q_end, reach)
+        and certify(trajectory, world).is_proven
+        and first_touch(
+            parameters.arm, present.scene, trajectory, parameters.margin, world.ray_length, reach
+        )
+        is None
+    ):
         raise RequestError(
             ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
             'the wearer moved while the motion was planned, and it is no longer proven free of '

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A subscription that hears every publisher: best effort, reliable, or latched before it began."""
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -25,47 +24,46 @@ Stamp = tuple[int, int]
 
 class DuplicateFilter:
     """
-    Which of the copies of messages count, so that each publisher is heard in its own order.
+    Which of the copies of messages count, and which of those come late.
 
     No single quality of service hears everybody, so a message may come twice: live, and from a
-    reliable reader, which may be late but misses nothing. The first copy counts. When a reliable
-    reader brings one that was missed live, those that the same publisher sent after it count
-    once more behind it: what came later stays last.
+    reliable reader, which may be late but misses nothing. The first copy counts. A copy of a
+    reliable reader is late when something that was sent after it, by whomever, has counted: it
+    was latched before, or missed live.
     """
 
     def __init__(self) -> None:
         """Start with nothing seen."""
-        self._order: deque[Stamp] = deque()
-        self._seen: set[Stamp] = set()
-        self._newest = 0
-        self._repeat: set[int] = set()
+        self._seen: dict[Stamp, None] = {}
+        self._seen_late: dict[Stamp, None] = {}
+        self.newest = 0
 
     def counts_live(self, stamp: Stamp) -> bool:
         """Return whether a copy of the best-effort reader counts, and remember it."""
-        is_new = stamp not in self._seen
-        if is_new:
-            self._remember(stamp)
-        return is_new
+        if stamp in self._seen:
+            return False
+        # What comes live is the news, even from a machine whose clock is behind.
+        self.newest = max(self.newest, stamp[0])
+        _remember(self._seen, stamp)
+        return True
+
+    def is_late(self, stamp: Stamp) -> bool:
+        """Return whether a copy of a reliable reader is older than what has counted."""
+        return stamp[0] < self.newest
 
     def counts_reliable(self, stamp: Stamp) -> bool:
         """Return whether a copy of a reliable reader counts, and remember it."""
-        time, number = stamp
-        is_missed = stamp not in self._seen
-        is_late = is_missed and time < self._newest
-        is_behind_late = number in self._repeat
-        self._repeat.discard(number)
-        if (is_late or is_behind_late) and time < self._newest:
-            self._repeat.add(number + 1)
-        if is_missed:
-            self._remember(stamp)
-        return is_missed or is_behind_late
+        if not self.is_late(stamp):
+            return self.counts_live(stamp)
+        is_new = stamp not in self._seen and stamp not in self._seen_late
+        _remember(self._seen_late, stamp)
+        return is_new
 
-    def _remember(self, stamp: Stamp) -> None:
-        self._newest = max(self._newest, stamp[0])
-        self._seen.add(stamp)
-        self._order.append(stamp)
-        if len(self._order) > REMEMBERED:
-            self._seen.discard(self._order.popleft())
+
+def _remember(stamps: dict[Stamp, None], stamp: Stamp) -> None:
+    stamps[stamp] = None
+    if len(stamps) > REMEMBERED:
+        del stamps[next(iter(stamps))]
 
 
 class OpenSubscription:
@@ -80,17 +78,25 @@ class OpenSubscription:
     node : Node
     msg_type : type
     topic : str
-    callback : callable
-        Gets each message.
+    on_message : callable
+        Gets each message, and when it was sent [ns]: these times never fall.
+    on_late : callable, optional
+        Gets each message that is older than one before, and when it was sent [ns]; without,
+        these are dropped, since the last one wins.
 
     """
 
     def __init__(
-        self, node: Node, msg_type: type, topic: str, callback: Callable[[Any], None]
+        self,
+        node: Node,
+        msg_type: type,
+        topic: str,
+        on_message: Callable[[Any, int], None],
+        on_late: Callable[[Any, int], None] | None = None,
     ) -> None:
         """Begin to listen."""
         self._node, self._msg_type, self._topic = node, msg_type, topic
-        self._callback = callback
+        self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -137,11 +143,17 @@ class OpenSubscription:
 
     def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
         if self._filter.counts_live(_stamp_of(info)):
-            self._callback(deserialize_message(data, self._msg_type))
+            self._on_message(deserialize_message(data, self._msg_type), self._filter.newest)
 
     def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
-        if self._filter.counts_reliable(_stamp_of(info)):
-            self._callback(deserialize_message(data, self._msg_type))
+        stamp = _stamp_of(info)
+        is_late = self._filter.is_late(stamp)
+        if not self._filter.counts_reliable(stamp):
+            return
+        if not is_late:
+            self._on_message(deserialize_message(data, self._msg_type), self._filter.newest)
+        elif self._on_late is not None:
+            self._on_late(deserialize_message(data, self._msg_type), stamp[0])
 
 
 def _stamp_of(info: dict[str, Any]) -> Stamp:

@@ -8,17 +8,13 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rclpy.exceptions import (  # noqa: E402
-    InvalidParameterTypeException,
-    InvalidParameterValueException,
-)
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.errors import ModelError, OptionsError  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
 from rrth_planner.resources import load_arm, load_yaml, resource_path  # noqa: E402
+from rrth_planner.ros.declaring import ARM  # noqa: E402
 from rrth_planner.ros.parameters import (  # noqa: E402
-    ARM,
     current_parameters,
     declare_parameters,
     settings,
@@ -124,8 +120,16 @@ def test_an_empty_array_is_refused(started):
 @pytest.mark.parametrize(
     ('name', 'value', 'error'),
     [
-        ('margin', 3.0, InvalidParameterValueException),
-        ('margin', 3, InvalidParameterTypeException),
+        ('margin', 3.0, OptionsError),
+        ('margin', 3, OptionsError),
+        ('margin', NAN, OptionsError),
+        ('margin', [0.1], OptionsError),
+        ('margin', True, OptionsError),
+        ('seed', 1.0, OptionsError),
+        ('is_bidirectional', 1, OptionsError),
+        ('max_velocity', 1.5, OptionsError),
+        ('max_velocity', [NAN], OptionsError),
+        ('speed_limit', 1.0, OptionsError),
         ('max_jerk', [1.0, 2.0], OptionsError),
         ('algorithm', 'a_star', OptionsError),
         ('base_frame', '', OptionsError),

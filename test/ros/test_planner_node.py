@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -27,6 +29,8 @@ from rclpy.qos import (  # noqa: E402
 from rrth_planner.arm import pointing_error  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
+from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 import samples  # noqa: E402
@@ -178,6 +182,8 @@ def test_get_plan_takes_its_target_and_returns_the_path_of_the_tool(start):
     ('field', 'value', 'code'),
     [
         ('start.header.frame_id', 'torso', 'INVALID_GOAL_CONSTRAINTS (-16)'),
+        ('start.pose.position.x', 0.5, 'INVALID_GOAL_CONSTRAINTS (-16)'),
+        ('start.pose.orientation.w', 0.5, 'INVALID_GOAL_CONSTRAINTS (-16)'),
         ('goal.header.frame_id', 'camera', 'FRAME_TRANSFORM_FAILURE (-21)'),
         ('goal.pose.position.x', NAN, 'INVALID_GOAL_CONSTRAINTS (-16)'),
         ('goal.pose.position.x', 0.01, 'GOAL_IN_COLLISION (-12)'),
@@ -273,7 +279,7 @@ def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
     planner, stranger = start(**ENDLESS)
     say_all(planner, stranger, body_boxes=fenced())
     running, waiting = stranger.ask('plan'), stranger.ask('plan')
-    wait_until(lambda: planner._queue._n_open == 2)
+    wait_until(lambda: len(planner._queue._open) == 2)
     assert stranger.answer('cancel').message == 'SUCCESS (1): requests that are ended by this: 2'
     wait_until(lambda: running.done() and waiting.done())
     for future in (running, waiting):
@@ -288,7 +294,7 @@ def test_messages_are_heard_and_callers_wait_while_it_plans(start, wait_until):
     planner, stranger = start(**ENDLESS)
     say_all(planner, stranger, body_boxes=fenced())
     first = stranger.ask('plan')
-    wait_until(lambda: planner._queue._n_open == 1)
+    wait_until(lambda: len(planner._queue._open) == 1)
     for k in range(20):
         stranger.publishers['target'].publish(target(1.4, 0.01 * k, 0.2))
         wait_until(lambda k=k: inputs_of(planner).target.value.target[1] == 0.01 * k)
@@ -328,6 +334,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch):
             'the wearer moved',
         ),
         ('joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000 rad'),
+        ('joint_states', joints([0.002, *FOLDED[1:]]), 'the arm moved by 0.0020 rad'),
     ],
 )
 def test_a_plan_for_what_is_no_longer_there_is_not_published(
@@ -349,6 +356,187 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
     assert sentence in message
     assert not stranger.heard['joint_trajectory']
+
+
+@pytest.mark.parametrize(('speed', 'said'), [(1.5, '1.500'), (-0.02, '0.020'), (NAN, 'nan')])
+def test_nothing_is_planned_while_the_arm_moves(start, speed, said):
+    planner, stranger = start()
+    moving = joints(velocity=[speed, 0.0, 0.0, 0.0])
+    say_all(planner, stranger, joint_states=moving)
+    assert stranger.answer().message == (
+        f'START_STATE_INVALID (-26): joint_1 moves at {said} rad/s, expected an arm at rest '
+        '(at most 0.01 rad/s)'
+    )
+    stranger.publishers['joint_states'].publish(joints(velocity=[0.009] * 4))
+    stranger.wait_until(lambda: inputs_of(planner).joints.value.velocities[1] == 0.009)
+    assert stranger.answer().success
+
+
+def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    heard, plan_motion = inputs_of(planner).joints, requests.plan_motion
+
+    def plan_while_it_starts(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        stranger.publishers['joint_states'].publish(joints(velocity=[0.0, 0.3, 0.0, 0.0]))
+        wait_until(lambda: heard.value.velocities[1] == 0.3)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_it_starts)
+    message = stranger.answer().message
+    assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_broken_joint_positions_are_not_replaced_by_those_before(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs = inputs_of(planner)
+    good = inputs.joints.value
+    for n, bad in enumerate((joints([NAN] * 4), joints(FOLDED[:3], velocity=[])), 1):
+        stranger.publishers['joint_states'].publish(bad)
+        stranger.wait_until(lambda n=n: inputs.joints.n_refused == n)
+        message = stranger.answer().message
+        assert message.startswith('ROBOT_STATE_STALE (-23): the last message on /test_')
+        assert f'was refused: {inputs.joints.refusal}' in message
+    assert inputs.joints.value is good
+    assert not stranger.heard['joint_trajectory']
+    stranger.publishers['joint_states'].publish(joints())
+    stranger.wait_until(lambda: inputs.joint_refusal is None)
+    assert stranger.answer().success
+
+
+def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    asked = []
+
+    def plan_while_a_box_comes(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        body = inputs.body.value
+        far = box('far', len(asked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
+        stranger.publishers['body_boxes'].publish(array(far))
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    def disagree(*args):
+        asked.append(args)
+        return 'a touch' if len(asked) == 1 else None
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(requests, 'first_touch', disagree)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert not stranger.heard['joint_trajectory']
+    assert stranger.answer().success
+    assert len(asked) == 2
+
+
+def test_what_was_cancelled_is_never_published(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue, check_present = planner._queue, requests._check_present
+    ended = []
+
+    def cancel_after_the_last_look(*args):
+        check_present(*args)
+        ended.append(queue.cancel())
+
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, '_check_present', cancel_after_the_last_look)
+        message = stranger.answer().message
+    assert ended == [1]
+    assert message == 'PREEMPTED (-7): the request was cancelled'
+    assert not stranger.heard['joint_trajectory']
+    assert stranger.answer().success
+    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 1)
+
+
+def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue, ended = planner._queue, []
+    show = queue._show
+
+    def cancel_first(*args):
+        ended.append(queue.cancel())
+        return show(*args)
+
+    monkeypatch.setattr(queue, '_show', cancel_first)
+    assert stranger.answer().success
+    assert ended == [0]
+
+
+def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue, check_present = planner._queue, requests._check_present
+    closers = []
+
+    def close_after_the_last_look(*args):
+        check_present(*args)
+        closers.append(threading.Thread(target=queue.close))
+        closers[0].start()
+        stranger.wait_until(lambda: queue._is_closed)
+
+    monkeypatch.setattr(requests, '_check_present', close_after_the_last_look)
+    assert stranger.answer().message.startswith('PREEMPTED (-7): ')
+    closers[0].join(30.0)
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    order, plan_motion = [], requests.plan_motion
+
+    def warm_up(_, options):
+        time.sleep(0.2)
+        order.append(type(options).__name__)
+
+    def plan_in_turn(*args, **kwargs):
+        order.append('plan')
+        return plan_motion(*args, **kwargs)
+
+    monkeypatch.setattr(planner, '_warm_up', warm_up)
+    monkeypatch.setattr(requests, 'plan_motion', plan_in_turn)
+    planner.set_parameters([Parameter(name='margin', value=0.03)])
+    planner.set_parameters([Parameter(name='algorithm', value='rrt')])
+    assert stranger.answer().success
+    assert order == ['RRTOptions', 'plan']
+
+
+def test_a_box_whose_lifetime_has_passed_is_named(start, monkeypatch):
+    planner, stranger = start()
+    warnings = []
+    monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
+    body = wearer()
+    hat = box('hat', center=(0.0, 0.0, 0.7), size=(0.2, 0.2, 0.1), text='a hat')
+    hat.lifetime.nanosec = 10**8
+    body.markers.append(hat)
+    say_all(planner, stranger, body_boxes=body)
+    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a hat')
+    stranger.wait_until(lambda: any('"a hat"' in line for line in warnings))
+    assert stranger.answer().success
+    assert stranger.answer().success
+    assert sum('"a hat"' in line for line in warnings) == 1
+
+
+def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
+    planner, stranger = start()
+    heard = stranger.heard['/diagnostics']
+    stranger.wait_until(lambda: heard)
+    name = planner.get_fully_qualified_name()[1:]
+    assert heard[-1].status[0].name == f'{name}: planning'
+    begin, n_before = time.monotonic(), len(heard)
+    while time.monotonic() < begin + 1.0:
+        planner._reporter.publish()
+        time.sleep(0.005)
+    assert 5 <= len(heard) - n_before <= 13
+    planner._reporter.conclude(ErrorCode.FAILURE, 'the last', PlanReport())
+    stranger.wait_until(lambda: stranger.value('last sentence') == 'the last', 0.9)
 
 
 def test_the_same_seed_gives_the_same_trajectory(start):
@@ -398,7 +586,6 @@ def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until)
         ('body_boxes', array(box(size=(-1.0, 1.0, 1.0))), 'expected three lengths > 0 [m]'),
         ('body_boxes', array(box('ok'), box(frame='camera')), 'marker 1 ("torso/0"): frame'),
         ('joint_states', joints(FOLDED[:3], JOINTS[:3]), "no ['joint_4']"),
-        ('joint_states', joints([NAN] * 4), 'expected finite numbers [rad]'),
     ],
 )
 def test_a_refused_message_is_reported_and_changes_nothing(start, topic, msg, sentence):
@@ -431,7 +618,7 @@ def test_joint_states_of_other_machines_are_ignored(start):
     stranger.publishers['joint_states'].publish(joints([NAN], ['wheel']))
     stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
     heard = inputs_of(planner).joints
-    stranger.wait_until(lambda: heard.value[0] == 0.1)
+    stranger.wait_until(lambda: heard.value.positions[0] == 0.1)
     assert heard.n_refused == 0
 
 
@@ -493,8 +680,12 @@ def _framed():
 @pytest.mark.parametrize(
     ('argument', 'sentence'),
     [
-        ('margin:=3.0', 'margin out of range'),
-        ('margin:=3', "Trying to set parameter 'margin' to '3' of type 'INTEGER'"),
+        ('margin:=3.0', 'margin: 3.0, expected a number from 0 to 1 [m]'),
+        ('margin:=1', 'margin: 1, expected a number from 0 to 1 [m]: write 1.0'),
+        ('margn:=0.1', 'margn: no such parameter, the closest name is margin'),
+        ('max_velocity:=[]', 'max_velocity: [], expected numbers from 0.001 to 1000000 [rad/s]'),
+        ('max_velocity:=[1, 2, 1, 1]', 'write [1.0, 2.0, 1.0, 1.0]'),
+        ('algorithm:=7', 'algorithm: 7, expected a text'),
         ('max_jerk:=[1.0, 2.0]', 'max_jerk: [1.0, 2.0], expected 4 values'),
     ],
 )

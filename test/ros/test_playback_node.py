@@ -19,9 +19,10 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rrth_planner.arm import tool_pose  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.resources import load_arm, load_yaml, resource_path  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from rrth_planner.ros.playback_parameters import SETTINGS  # noqa: E402
 from rrth_planner.rotation import rotation_matrix  # noqa: E402
 from rrth_planner.trajectory import Trajectory  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -335,6 +336,9 @@ def test_a_signal_ends_the_process_with_code_0_and_no_traceback(observer, number
         'initial_positions:=[.nan, -1.0, 0.0, 0.0]',
         'max_velocity:=[1.0, 1.0]',
         'max_acceleration:=[0.0]',
+        'max_velocity:=[]',
+        'rate:=100',
+        'tiem_scale:=0.5',
     ],
 )
 def test_a_bad_parameter_ends_the_process_with_one_line_that_names_it(setting):
@@ -347,6 +351,15 @@ def test_a_bad_parameter_ends_the_process_with_one_line_that_names_it(setting):
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
     assert setting.split(':')[0] in ended.stderr
+
+
+def test_the_packaged_file_holds_every_parameter_with_its_default():
+    file = load_yaml(resource_path('config/playback.yaml'))['/**']['ros__parameters']
+    defaults = {setting.name: setting.default for setting in SETTINGS}
+    assert file.keys() == defaults.keys()
+    for name, value in file.items():
+        one_for_all = name in ('max_velocity', 'max_acceleration')
+        assert value == (defaults[name] * 4 if one_for_all else defaults[name])
 
 
 def test_the_node_starts_without_the_planner_kernels():
