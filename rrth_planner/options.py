@@ -87,7 +87,7 @@ class RRTHOptions(TreeOptions):
     """RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways."""
 
     corner_spacing: float = _option(
-        0.01, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
+        0.05, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
     )
     improve_time: float = _option(
         0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'

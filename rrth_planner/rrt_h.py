@@ -21,6 +21,8 @@ MAX_ROOTS = 64
 MAX_ROUNDS = 100
 # Finest step of a goal along its manifold [rad].
 FINEST_SLIDE = 2e-3
+# Waypoints nearer than this are one [rad].
+TWIN = 1e-9
 
 
 def search(
@@ -137,11 +139,14 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
 
 def without_twins(waypoints: Array) -> Array:
     """Return the waypoints without those that stand on the one before; always both ends."""
-    kept = [waypoints[0]]
-    for q in waypoints[1:-1]:
-        if np.linalg.norm(q - kept[-1]) > 1e-9 and np.linalg.norm(q - waypoints[-1]) > 1e-9:
-            kept.append(q)
-    return np.array([*kept, waypoints[-1]])
+    steps = np.abs(np.diff(waypoints, axis=0)).max(axis=1)
+    if steps.min() > TWIN:
+        return waypoints
+    # A later twin of the last waypoint goes too, the last one stays.
+    is_kept = np.concatenate([[True], steps > TWIN])
+    is_kept[1:-1] &= np.abs(waypoints[1:-1] - waypoints[-1]).max(axis=1) > TWIN
+    is_kept[-1] = True
+    return waypoints[is_kept]
 
 
 def _length(waypoints: Array) -> float:

@@ -24,8 +24,8 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.kinematics import chain_points, count_bars
 
 # How many configurations and intervals a proof may visit before it gives up (and proves nothing).
-MAX_NODES = 1024
-MAX_OPEN = 16384
+MAX_NODES = 512
+MAX_OPEN = 4096
 # Configurations beyond this are none: `sine_cosine` holds up to 1e5 [rad or m].
 LARGEST = 1e4
 # Intervals shorter than this [rad] are proven part by part of the bars, as long as there are no

@@ -129,7 +129,9 @@ def _draw_box(axes: Any, box: Box, towards: Array) -> None:
             u, v = (0.5 * box.size[k] * box.rotation[:, k] for k in range(3) if k != axis)
             middle = box.center + 0.5 * box.size[axis] * normal
             faces.append([middle - u - v, middle + u - v, middle + u + v, middle - u + v])
-            shades.append(np.array(to_rgb(colour)) * (0.72 + 0.28 * max(0.0, normal @ LIGHT)))
+            shades.append(
+                np.array(to_rgb(colour)) * (0.72 + 0.28 * max(0.0, float(normal @ LIGHT)))
+            )
     # Nearer boxes are drawn later.
     depth = BODY + 0.9 * np.tanh(0.2 * float(box.center @ towards))
     axes.add_collection3d(
