@@ -223,7 +223,9 @@ def test_without_an_input_the_answer_names_its_topic(start, missing):
             'START_STATE_IN_COLLISION (-10): ',
         ),
         ({'joint_states': joints([0.0, 1.0, 0.0, 0.0])}, 'START_STATE_INVALID (-26): joint_2'),
-        ({'target': target(0.0, 0.0, 0.0)}, 'GOAL_IN_COLLISION (-12): '),
+        ({'target': target(0.0, 0.0, 0.0)}, 'GOAL_IN_COLLISION (-12): the target'),
+        # Nearer to the axis of the upper arm, in all its postures, than the ray runs beside it.
+        ({'target': target(-0.24, -0.1, 0.5)}, 'NO_IK_SOLUTION (-31): no posture'),
         (
             {'target': target(frame='camera')},
             'FRAME_TRANSFORM_FAILURE (-21): ',
