@@ -96,7 +96,7 @@ def goal_configurations(
     order = np.argsort(np.linalg.norm(candidates[:n] - q_near, axis=1), kind='stable')
     candidates, reaches = candidates[order], reaches[order]
     flags = np.empty(n, dtype=np.int8)
-    pointing.find_free_goals(world.robot, world.obstacles, candidates, reaches, flags)
+    pointing.find_free_goals(world.chain, world.robot, world.obstacles, candidates, reaches, flags)
     is_free = flags.astype(bool)
     return GoalSet(
         q_goals=candidates[is_free],
@@ -117,6 +117,7 @@ def goal_slider(
             pointing.slide_goal(
                 world.edge_check,
                 world.resolution,
+                world.chain,
                 world.robot,
                 world.obstacles,
                 world.bounds,

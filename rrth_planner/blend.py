@@ -114,7 +114,13 @@ def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
         )
         speed, bend = blend.derivative_bounds()
         proof = arm_validity.prove_curve(
-            blend.coefficients(), speed, bend, world.resolution, world.robot, world.obstacles
+            blend.coefficients(),
+            speed,
+            bend,
+            world.resolution,
+            world.chain,
+            world.robot,
+            world.obstacles,
         )
         if proof == 1:
             return blend

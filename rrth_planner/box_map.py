@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels import jit, map_validity
+from rrth_planner.kernels import chain, jit, map_validity
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
@@ -126,6 +126,7 @@ def map_world(box_map: BoxMap) -> World:
     upper = np.where(upper >= high, upper + beyond, upper)
     return World(
         bounds=box_map.bounds,
+        chain=chain.NO_CHAIN,
         robot=np.zeros((1, 1)),
         obstacles=np.hstack([lower, upper]),
         edge_check=EDGE_CHECK,

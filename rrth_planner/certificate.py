@@ -88,7 +88,13 @@ def certify(trajectory: Trajectory, world: World) -> Certificate:
     speed, bend = derivative_bounds(coefficients)
     for i, curve in enumerate(coefficients):
         proof = arm_validity.prove_curve(
-            curve, speed[i], bend[i], 0.2 * world.resolution, world.robot, world.obstacles
+            curve,
+            speed[i],
+            bend[i],
+            0.2 * world.resolution,
+            world.chain,
+            world.robot,
+            world.obstacles,
         )
         if proof != 1:
             return Certificate(is_proven=False, piece=i, touches=proof == 0)

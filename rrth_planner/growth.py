@@ -125,7 +125,7 @@ def grow(
     tree_q[0, 0] = problem.q_start
     tree_q[1, : len(roots)] = roots
     meeting = np.full(2, -1, dtype=np.int64)
-    seam = (world.resolution, world.robot, world.obstacles)
+    seam = (world.resolution, world.chain, world.robot, world.obstacles)
     for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
         sizes[side] = reuse.transplant(
             world.edge_check,

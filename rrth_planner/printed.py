@@ -33,6 +33,7 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
     n = rrt_h_printed.shorten(
         world.edge_check,
         world.resolution,
+        world.chain,
         world.robot,
         world.obstacles,
         path,

@@ -126,7 +126,7 @@ def shorten(problem: PlanningProblem, waypoints: Array, options: RRTHOptions) ->
     path = np.empty((max(MAX_WAYPOINTS, 2 * len(waypoints)), waypoints.shape[1]))
     n = len(waypoints)
     path[:n] = waypoints
-    arguments = (world.edge_check, world.resolution, world.robot, world.obstacles)
+    arguments = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
     spacing = options.corner_spacing
     n = rrt_h.pull_taut(*arguments, path, n, spacing, MAX_ROUNDS)
     for _ in range(MAX_ROUNDS):

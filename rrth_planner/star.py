@@ -53,6 +53,7 @@ class _Trees:
         n = reuse.transplant(
             world.edge_check,
             world.resolution,
+            world.chain,
             world.robot,
             world.obstacles,
             old.nodes,
@@ -75,6 +76,7 @@ class _Trees:
         reuse.join(
             world.edge_check,
             world.resolution,
+            world.chain,
             world.robot,
             world.obstacles,
             options.step_size,
@@ -139,6 +141,7 @@ def search(
             world.edge_check,
             world.free_radius,
             world.resolution,
+            world.chain,
             world.robot,
             world.obstacles,
             world.bounds,

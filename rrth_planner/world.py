@@ -4,13 +4,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import functools
 from typing import Any
 
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.errors import OptionsError, SceneError
-from rrth_planner.kernels import arm_sampling, arm_validity, jit
+from rrth_planner.box_tree import grown_groups, pack_boxes
+from rrth_planner.errors import OptionsError
+from rrth_planner.kernels import arm_sampling, arm_validity, chain, jit
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -32,10 +34,13 @@ class World:
     ----------
     bounds : ndarray, shape (2, dof)
         Lowest and highest configuration [rad or m].
+    chain : compiled function
+        The arm's forward kinematics, `kernels.jit.CHAIN`.
     robot : ndarray, shape (n_rows, 8 + 2 dof)
         Rows of the arm, columns as in `kernels.jit`.
-    obstacles : ndarray, shape (15, m)
-        Boxes grown by the margin, in the arm's base frame, rows as in `kernels.jit` [m].
+    obstacles : ndarray, shape (n_groups, 8 * 15)
+        Boxes grown by the margin, in the arm's base frame, groups as in `kernels.jit` [m]. On a
+        map: lower and upper corners, shape (m, 2 dof).
     edge_check : compiled function
         The seam `kernels.jit.EDGE_CHECK`.
     free_radius : compiled function
@@ -44,10 +49,13 @@ class World:
         Last argument but two of the edge check [rad].
     bar_names, box_names : tuple of str
         What messages call the arm's bars and the boxes.
+    lanes : ndarray, shape (m,)
+        Which lane of the last level of groups holds box i.
 
     """
 
     bounds: Array
+    chain: Callable[..., int]
     robot: Array
     obstacles: Array
     edge_check: Callable[..., bool]
@@ -55,6 +63,7 @@ class World:
     resolution: float
     bar_names: tuple[str, ...]
     box_names: tuple[str, ...]
+    lanes: Any = ()
 
     @property
     def ray_length(self) -> float:
@@ -69,7 +78,7 @@ class World:
         """Return whether q, shape (dof,), is within limits and free, with a ray that long [m]."""
         ray = self.ray_length if ray_length is None else ray_length
         return self.is_in_bounds(q) and bool(
-            arm_validity.is_configuration_free(q, ray, self.robot, self.obstacles)
+            arm_validity.is_configuration_free(q, ray, self.chain, self.obstacles)
         )
 
     def is_edge_valid(self, q_from: Array, q_to: Array) -> bool:
@@ -77,7 +86,9 @@ class World:
         return bool(
             self.is_in_bounds(q_from)
             and self.is_in_bounds(q_to)
-            and self.edge_check(q_from, q_to, self.resolution, self.robot, self.obstacles)
+            and self.edge_check(
+                q_from, q_to, self.resolution, self.chain, self.robot, self.obstacles
+            )
         )
 
     def clearances(self, q: Array, ray_length: float | None = None) -> Array:
@@ -87,10 +98,11 @@ class World:
         Contact is < 0: the depth by which a bar enters a box. q has the shape (dof,), or (n, dof)
         for the least over n configurations.
         """
-        distances = np.empty((len(self.bar_names), self.obstacles.shape[1]))
         ray = self.ray_length if ray_length is None else ray_length
-        arm_validity.clearances(np.atleast_2d(q), ray, self.robot, self.obstacles, distances)
-        return distances
+        distances = np.empty((len(self.bar_names), jit.LANES * len(self.obstacles)))
+        arm_validity.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)
+        chosen: Array = distances[:, self.lanes]
+        return chosen
 
 
 def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float) -> World:
@@ -116,28 +128,37 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):
         if not 0.0 <= value < np.inf:
             raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
+    robot, compiled_chain = _arm_rows(arm, ray_guard_length)
+    obstacles, lanes = pack_boxes(_box_rows(arm, scene, margin))
     return World(
         bounds=arm.bounds,
-        robot=_robot_rows(arm, ray_guard_length),
-        obstacles=_box_rows(arm, scene, margin),
+        chain=compiled_chain,
+        robot=robot,
+        obstacles=obstacles,
         edge_check=EDGE_CHECK,
         free_radius=FREE_RADIUS,
         resolution=RESOLUTION,
         bar_names=tuple(bar_names(arm)),
         box_names=tuple(box.name for box in scene.boxes),
+        lanes=lanes,
     )
 
 
 def grown(world: World, by: float) -> World:
     """Return the same world with every box grown by that much more on every side [m]."""
-    obstacles = np.array(world.obstacles)
-    obstacles[jit.BOX_HALF :] += by
-    if (obstacles[jit.BOX_HALF :] <= 0.0).any():
-        raise SceneError(f'growth: {by}, expected no box to vanish [m]')
-    return replace(world, obstacles=obstacles)
+    return replace(world, obstacles=grown_groups(world.obstacles, by))
 
 
-def _robot_rows(arm: ArmModel, ray_length: float) -> Array:
+@functools.lru_cache(maxsize=16)
+def _arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
+    """Return the rows of an arm, and its compiled chain."""
+    rows = robot_rows(arm, ray_length)
+    rows.setflags(write=False)
+    return rows, chain.chain_of(rows)
+
+
+def robot_rows(arm: ArmModel, ray_length: float) -> Array:
+    """Return the rows of an arm, columns as in `kernels.jit`, with a ray of that length [m]."""
     dof = arm.dof
     rows: Any = np.zeros((dof + 1, jit.REACH + 2 * dof))
     alpha, a, offset, d = arm.dh.T
@@ -157,6 +178,7 @@ def _robot_rows(arm: ArmModel, ray_length: float) -> Array:
 
 
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
+    """Return the numbers of each box, (15, m): rotation, the base's position, half extents."""
     rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
     T_mount_base = np.linalg.inv(arm.T_base_mount)
     for j, box in enumerate(scene.boxes):

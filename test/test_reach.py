@@ -11,7 +11,7 @@ from rrth_planner.oracle import frames
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 from rrth_planner.world import arm_world
-from worlds import bezier_quintic, examples, line, oracle_bars, random_chain, table_1_arm
+from worlds import bezier_quintic, compiled_chain, examples, line, oracle_bars, table_1_arm
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -33,7 +33,7 @@ def axis_distances(arm, q, ray):
 @given(seed=SEEDS, has_tail=st.booleans())
 def test_no_point_is_further_from_a_joint_axis_than_its_reach(seed, has_tail):
     rng = np.random.default_rng(seed)
-    arm = random_chain(rng, has_tail)
+    arm = compiled_chain(rng, has_tail)
     q = rng.uniform(*arm.bounds, (300, arm.dof))
     at_stops = rng.random(q.shape) < 0.2
     q = np.where(at_stops, np.where(rng.random(q.shape) < 0.5, *arm.bounds), q)
@@ -71,7 +71,7 @@ def bows_of(arm, speed, bend, ray):
 @given(seed=SEEDS, has_tail=st.booleans())
 def test_straight_motions_bend_no_more_than_bounded(seed, has_tail):
     rng = np.random.default_rng(seed)
-    arm = random_chain(rng, has_tail)
+    arm = compiled_chain(rng, has_tail)
     for _ in range(3):
         curve = line(*rng.uniform(*arm.bounds, (2, arm.dof)))
         # At times a single joint moves, alone its bound is the sharpest.
@@ -86,7 +86,7 @@ def test_straight_motions_bend_no_more_than_bounded(seed, has_tail):
 @given(seed=SEEDS, has_tail=st.booleans())
 def test_quintic_motions_bend_no_more_than_bounded(seed, has_tail):
     rng = np.random.default_rng(seed)
-    arm = random_chain(rng, has_tail)
+    arm = compiled_chain(rng, has_tail)
     curve = bezier_quintic(rng.uniform(*arm.bounds, (6, arm.dof)))
     speed, bend = derivative_bounds(curve[None])
     bows = bows_of(arm, speed[0], bend[0], 0.9)

@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms, wearers and a fast dense oracle that the tests share; nothing random without an rng."""
 
+import functools
+
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
 from rrth_planner.arm import arm_from_mapping, ArmModel
-from rrth_planner.kernels import kinematics
 from rrth_planner.oracle import bars
 from rrth_planner.reach import bar_ends
 from rrth_planner.rotation import rotation_matrix
@@ -15,6 +16,8 @@ from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import arm_world, World
 
 MARGIN, RAY = 0.02, 1.0
+# Random arms of each kind that are compiled.
+N_CHAINS = 24
 HALF_TURN, QUARTER = np.pi, 0.5 * np.pi
 
 # Table 1 of Zou et al. 2024: alpha, a, offset, d, lower, upper.
@@ -189,6 +192,16 @@ def random_chain(rng, has_tail):
     )
 
 
+def compiled_chain(rng, has_tail):
+    """Return one of a few random arms: each must be compiled, which takes a moment."""
+    return _few_chains(int(rng.integers(N_CHAINS)), bool(has_tail))
+
+
+@functools.cache
+def _few_chains(seed, has_tail):
+    return random_chain(np.random.default_rng(seed), has_tail)
+
+
 def wearer_world(margin=MARGIN, ray=RAY, radius=0.0):
     """Return the world of the paper's arm round the standing wearer."""
     return arm_world(table_1_arm(radius), wearer(), margin, ray)
@@ -206,9 +219,9 @@ def free_configuration(rng, world: World):
 def kernel_bars(arm, world, q, ray):
     """Return the bars as the kernel sees them, in the base frame, (n_bars, 2, 3) [m]."""
     n = len(world.bar_names)
-    points = np.full((1, 3 * (n + 1)), np.nan)
-    kinematics.chain_points(world.robot, q, ray, points, 0)
-    ends = points.reshape(n + 1, 3) @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
+    points = np.full(4 * (n + 1), np.nan)
+    assert world.chain(q, ray, points, 0) == n
+    ends = points.reshape(n + 1, 4)[:, :3] @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
     return np.stack([ends[:-1], ends[1:]], axis=1)
 
 

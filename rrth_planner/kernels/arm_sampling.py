@@ -6,10 +6,21 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-from rrth_planner.kernels.arm_validity import bar_radii, is_configuration_free
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.arm_validity import ENDS_ROOM, is_configuration_free
 from rrth_planner.kernels.geometry import bar_distance
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, D, kernel, MAT, OUT_VEC, REACH, VEC
-from rrth_planner.kernels.kinematics import chain_points, count_bars
+from rrth_planner.kernels.jit import (
+    BOX_HALF,
+    BOX_OFFSET,
+    CHAIN,
+    D,
+    kernel,
+    LANES,
+    MAT,
+    OUT_VEC,
+    REACH,
+    VEC,
+)
 from rrth_planner.kernels.tree import distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
@@ -23,75 +34,78 @@ def between(q_from, q_to, share, q):
         q[k] = q_from[k] + share * (q_to[k] - q_from[k])
 
 
-@kernel(boolean(VEC, VEC, float64, MAT, MAT))
-def is_edge_free_sampled(q_from, q_to, resolution, robot, boxes):
+@kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, boxes):
     """Return whether each configuration is free, exactly, at a spacing of `resolution` [rad]."""
     n = int64(distance(q_from, q_to) / resolution) + 1
     q = np.empty(q_from.shape[0])
     ray_length = robot[robot.shape[0] - 1, D]
     for i in range(n, 0, -1):
         between(q_from, q_to, i / n, q)
-        if not is_configuration_free(q, ray_length, robot, boxes):
+        if not is_configuration_free(q, ray_length, chain, boxes):
             return False
     return True
 
 
-@kernel(boolean(VEC, MAT, MAT))
-def is_configuration_free_at_points(q, robot, boxes):
+@kernel(boolean(VEC, CHAIN, MAT, MAT))
+def is_configuration_free_at_points(q, chain, robot, boxes):
     """
     Return whether no check point of the arm at q is inside a cuboid (the paper's eqs. 1 and 2).
 
     Read sensibly: a check point collides where it is on the inner side of all six faces. Taken
     literally, the sum over the faces would ask every free point to be outside all six at once.
     """
-    n_bars = count_bars(robot)
-    points = np.empty((1, 3 * (n_bars + 1)))
-    chain_points(robot, q, robot[robot.shape[0] - 1, D], points, 0)
+    points = scratch.floats(ENDS_ROOM)
+    n_bars = chain(q, robot[robot.shape[0] - 1, D], points, 0)
+    first = (boxes.shape[0] - 1) // LANES
     for bar in range(n_bars):
         for i in range(1, POINTS_PER_BAR + 1):
             share = i / POINTS_PER_BAR
-            for j in range(boxes.shape[1]):
-                n_inner = 0
-                for r in range(3):
-                    value = boxes[BOX_OFFSET + r, j]
-                    for c in range(3):
-                        start, end = points[0, 3 * bar + c], points[0, 3 * bar + 3 + c]
-                        value += boxes[3 * r + c, j] * (start + share * (end - start))
-                    n_inner += int64(value < boxes[BOX_HALF + r, j])
-                    n_inner += int64(-value < boxes[BOX_HALF + r, j])
-                if n_inner == 6:
-                    return False
+            for g in range(first, boxes.shape[0]):
+                for j in range(LANES):
+                    n_inner = 0
+                    for r in range(3):
+                        value = boxes[g, LANES * (BOX_OFFSET + r) + j]
+                        half = boxes[g, LANES * (BOX_HALF + r) + j]
+                        for c in range(3):
+                            start, end = points[4 * bar + c], points[4 * bar + 4 + c]
+                            cosine = boxes[g, LANES * (3 * r + c) + j]
+                            value += cosine * (start + share * (end - start))
+                        n_inner += int64(value < half) + int64(-value < half)
+                    if n_inner == 6:
+                        return False
     return True
 
 
-@kernel(boolean(VEC, VEC, float64, MAT, MAT))
-def is_edge_free_at_points(q_from, q_to, resolution, robot, boxes):
+@kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+def is_edge_free_at_points(q_from, q_to, resolution, chain, robot, boxes):
     """Return whether the check points are outside at configurations `resolution` [rad] apart."""
     n = int64(distance(q_from, q_to) / resolution) + 1
     q = np.empty(q_from.shape[0])
     for i in range(n, 0, -1):
         between(q_from, q_to, i / n, q)
-        if not is_configuration_free_at_points(q, robot, boxes):
+        if not is_configuration_free_at_points(q, chain, robot, boxes):
             return False
     return True
 
 
-@kernel(float64(VEC, MAT, MAT))
-def free_radius(q, robot, boxes):
+@kernel(float64(VEC, CHAIN, MAT, MAT))
+def free_radius(q, chain, robot, boxes):
     """
     Return the radius of a ball of joint space round q that is free [rad], 0 in contact.
 
     A joint step of length r moves no point further than r times the norm of the greatest
     reaches (Cauchy-Schwarz), so all bars keep clear while that is less than their distance.
     """
-    n_bars, dof = count_bars(robot), q.shape[0]
-    points, radii = np.empty((1, 3 * (n_bars + 1))), np.empty(n_bars)
-    bar_radii(robot, radii)
-    chain_points(robot, q, robot[robot.shape[0] - 1, D], points, 0)
+    dof = q.shape[0]
+    points = scratch.floats(ENDS_ROOM)
+    n_bars = chain(q, robot[robot.shape[0] - 1, D], points, 0)
     least = math.inf
     for bar in range(n_bars):
-        for j in range(boxes.shape[1]):
-            least = min(least, bar_distance(points, 0, 3 * bar, boxes, j) - radii[bar])
+        for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
+            for j in range(LANES):
+                if boxes[g, LANES * BOX_HALF + j] > 0.0:
+                    least = min(least, bar_distance(points, 4 * bar, boxes, g, j))
     squared = 0.0
     for k in range(dof):
         reach = 0.0

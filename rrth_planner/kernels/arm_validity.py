@@ -6,97 +6,101 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-from rrth_planner.kernels.geometry import bar_distance, bar_touches_boxes, hull_is_apart
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.geometry import bar_distance, MAX_ENDS, open_lanes, touched_lanes
 from rrth_planner.kernels.jit import (
+    CHAIN,
     D,
     kernel,
     KIND,
+    LANES,
     MAT,
     NO_BAR,
     OUT_MAT,
+    OUT_POOL,
     OUT_VEC,
     PRISMATIC,
     RADIUS_A,
-    RADIUS_D,
     REACH,
     VEC,
 )
-from rrth_planner.kernels.kinematics import chain_points, count_bars
 
-# How many configurations and intervals a proof may visit before it gives up (and proves nothing).
-MAX_NODES = 512
-MAX_OPEN = 4096
+ENDS_ROOM = 4 * MAX_ENDS
+# Configurations that a proof may visit, and numbers for their points, before it gives up.
+MAX_NODES, POINTS_ROOM = 512, 8192
+# Entries of what is open (pairs of a bar and a group of boxes) that a proof has room for.
+MAX_OPEN, ENTRY = 2048, 5
+QUEUE_ROOM, POOL_ROOM = 8 * MAX_NODES, ENTRY * MAX_OPEN
+# Groups of boxes that wait to be looked at: LANES a level of their tree.
+MAX_GROUPS = 64
 # Configurations beyond this are none: `sine_cosine` holds up to 1e5 [rad or m].
 LARGEST = 1e4
 # Intervals shorter than this [rad] are proven part by part of the bars, as long as there are no
 # more open parts than these.
 SPLIT, MAX_PARTS = 0.05, 64
+# A motion is first cut into intervals no longer than this [rad].
+FIRST_INTERVAL = 1.0
 
 
-@kernel(void(MAT, OUT_VEC))
-def bar_radii(robot, radii):
-    """Write the radius of each bar, in the order of `chain_points` [m]."""
-    n = 0
-    for i in range(robot.shape[0]):
-        for column in (RADIUS_A, RADIUS_D):
-            if robot[i, column] != NO_BAR:
-                radii[n] = robot[i, column]
-                n += 1
-
-
-@kernel(boolean(MAT, int64, VEC, MAT))
-def touches(points, row, radii, boxes):
-    """Return whether any bar of a row of `points` touches a box: exact, the ray first."""
-    for k in range(radii.shape[0] - 1, -1, -1):
-        c = 3 * k
-        if bar_touches_boxes(
-            points[row, c],
-            points[row, c + 1],
-            points[row, c + 2],
-            points[row, c + 3],
-            points[row, c + 4],
-            points[row, c + 5],
-            radii[k],
-            boxes,
-        ):
-            return True
+@kernel(boolean(OUT_VEC, int64, int64, MAT))
+def touches(points, at, n_bars, boxes):
+    """Return whether any bar of the arm at points[at] touches a box: exact, the ray first."""
+    if boxes.shape[0] == 1:
+        for k in range(n_bars - 1, -1, -1):
+            if touched_lanes(points, at + 4 * k, boxes, 0) != 0:
+                return True
+        return False
+    waiting = scratch.ints(MAX_GROUPS)
+    n_waiting, waiting[0] = 1, 0
+    while n_waiting > 0:
+        n_waiting -= 1
+        g = int64(waiting[n_waiting])
+        touched = 0
+        is_leaf = LANES * g + 1 >= boxes.shape[0]
+        for k in range(n_bars - 1, -1, -1):
+            touched |= touched_lanes(points, at + 4 * k, boxes, g)
+            if is_leaf and touched != 0:
+                return True
+        for j in range(LANES):
+            if (touched >> j) & 1:
+                waiting[n_waiting] = LANES * g + j + 1
+                n_waiting += 1
     return False
 
 
-@kernel(boolean(VEC, float64, MAT, MAT))
-def is_configuration_free(q, ray_length, robot, boxes):
+@kernel(boolean(VEC, float64, CHAIN, MAT))
+def is_configuration_free(q, ray_length, chain, boxes):
     """Return whether the arm at q, with a ray of the given length [m], is clear of all boxes."""
-    n_bars = count_bars(robot)
-    points = np.empty((1, 3 * (n_bars + 1)))
-    radii = np.empty(n_bars)
-    bar_radii(robot, radii)
-    chain_points(robot, q, ray_length, points, 0)
-    return not touches(points, 0, radii, boxes)
+    points = scratch.floats(ENDS_ROOM)
+    n_bars = chain(q, ray_length, points, 0)
+    return not touches(points, 0, n_bars, boxes)
 
 
-@kernel(void(MAT, float64, MAT, MAT, OUT_MAT))
-def clearances(positions, ray_length, robot, boxes, distances):
+@kernel(void(MAT, float64, CHAIN, MAT, OUT_MAT))
+def clearances(positions, ray_length, chain, boxes, distances):
     """
-    Write the least signed distance of every bar (rows) from every box (columns) [m].
+    Write the least signed distance of every bar (rows) from every lane of the last groups [m].
 
-    positions (n, dof): the configurations over which the least is taken.
+    positions (n, dof): the configurations over which the least is taken. Unused lanes: infinity.
     """
-    n_bars = count_bars(robot)
-    points, radii = np.empty((1, 3 * (n_bars + 1))), np.empty(n_bars)
-    bar_radii(robot, radii)
+    points = scratch.floats(ENDS_ROOM)
+    first = (boxes.shape[0] - 1) // LANES
     distances[:] = math.inf
     for i in range(positions.shape[0]):
-        chain_points(robot, positions[i], ray_length, points, 0)
+        n_bars = chain(positions[i], ray_length, points, 0)
         for k in range(n_bars):
-            for j in range(boxes.shape[1]):
-                distance = bar_distance(points, 0, 3 * k, boxes, j) - radii[k]
-                distances[k, j] = min(distances[k, j], distance)
+            for g in range(first, boxes.shape[0]):
+                for j in range(LANES):
+                    if boxes[g, 12 * LANES + j] > 0.0:
+                        distance = bar_distance(points, 4 * k, boxes, g, j)
+                        lane = LANES * (g - first) + j
+                        distances[k, lane] = min(distances[k, lane], distance)
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))
 def curvature_bounds(robot, speed, bend, bows):
     """
-    Write a bound of the second derivative of each point of `chain_points` along a motion.
+    Write a bound of the second derivative of each end of a bar along a motion.
 
     speed, bend: bounds of |dq/du| and |d2q/du2| of each joint along the motion. With R_j the reach
     of a point round joint j: sum over i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus sum of
@@ -123,36 +127,88 @@ def curvature_bounds(robot, speed, bend, bows):
 def curve_point(curve, u, q):
     """Write the point of a polynomial curve at u (Horner); curve (degree + 1, dof), low first."""
     n = curve.shape[0]
-    for k in range(q.shape[0]):
+    for k in range(curve.shape[1]):
         value = curve[n - 1, k]
         for power in range(n - 2, -1, -1):
             value = value * u + curve[power, k]
         q[k] = value
 
 
-@kernel(
-    boolean(MAT, int64, int64, int64, int64, int64, float64, OUT_VEC, float64, OUT_MAT, MAT, int64)
-)
-def piece_is_apart(points, a, b, k, level, part, bow, bows, radius, piece, boxes, j):
-    """
-    Return whether part `part` of the 2^level equal parts of bar k is proven apart from box j.
-
-    Between the nodes a and b of a motion; `bow` is width^2 / 8. piece (2, 6): scratch.
-    """
-    n_parts = 1 << level
+@kernel(void(OUT_VEC, int64, int64, int64, int64, OUT_VEC))
+def cut_bar(points, a, b, n_parts, part, piece):
+    """Write one of the equal parts of a bar at two instants, laid out as points."""
     low, high = part / n_parts, (part + 1) / n_parts
     for c in range(3):
-        p, r = points[a, 3 * k + c], points[a, 3 * k + 3 + c]
-        piece[0, c], piece[0, 3 + c] = p + low * (r - p), p + high * (r - p)
-        p, r = points[b, 3 * k + c], points[b, 3 * k + 3 + c]
-        piece[1, c], piece[1, 3 + c] = p + low * (r - p), p + high * (r - p)
-    first = bow * (bows[k] + low * (bows[k + 1] - bows[k]))
-    last = bow * (bows[k] + high * (bows[k + 1] - bows[k]))
-    return hull_is_apart(piece, 0, 1, 0, first, last, radius, boxes, j)
+        p, r = points[a + c], points[a + 4 + c]
+        piece[c], piece[4 + c] = p + low * (r - p), p + high * (r - p)
+        p, r = points[b + c], points[b + 4 + c]
+        piece[8 + c], piece[12 + c] = p + low * (r - p), p + high * (r - p)
+    piece[7] = piece[15] = points[a + 7]
 
 
-@kernel(int64(MAT, VEC, VEC, float64, MAT, MAT))
-def prove_curve(curve, speed, bend, resolution, robot, boxes):
+@kernel(int64(OUT_VEC, int64, int64, int64, float64, float64, MAT, OUT_POOL, int64))
+def open_bar(points, a, b, k, first, last, boxes, pool, n_open):
+    """
+    Append to the pool the groups of boxes that are open to a whole bar; return its new length.
+
+    points[a], points[b]: bar k at two instants; first, last: the thickening round its ends [m].
+    -1: the pool has no room.
+    """
+    waiting = scratch.ints(MAX_GROUPS)
+    n_waiting, waiting[0] = 1, 0
+    while n_waiting > 0:
+        n_waiting -= 1
+        g = int64(waiting[n_waiting])
+        lanes = open_lanes(points, a, b, first, last, boxes, g)
+        if lanes == 0:
+            continue
+        if LANES * g + 1 < boxes.shape[0]:
+            for j in range(LANES):
+                if (lanes >> j) & 1:
+                    waiting[n_waiting] = LANES * g + j + 1
+                    n_waiting += 1
+            continue
+        if n_open >= MAX_OPEN:
+            return -1
+        at = ENTRY * n_open
+        pool[at], pool[at + 1], pool[at + 2], pool[at + 3], pool[at + 4] = k, g, lanes, 1, 0
+        n_open += 1
+    return n_open
+
+
+@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, boolean, MAT, OUT_POOL, int64))
+def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
+    """
+    Append to the pool what is still open of its entry `row`; return its new length.
+
+    points[a], points[b]: the arm at two nearer instants; bow: width^2 / 8. The bar, or its part,
+    is halved if asked for: on a short interval it is mostly the bar's own length that keeps the
+    hull from fitting, where the bar turns over an edge of the box. -1: the pool has no room.
+    """
+    piece = scratch.floats(16)
+    at = ENTRY * row
+    k, g, lanes = int64(pool[at]), int64(pool[at + 1]), int64(pool[at + 2])
+    n_parts, part = int64(pool[at + 3]), int64(pool[at + 4])
+    splits = 2 if is_split else 1
+    n_parts *= splits
+    for i in range(splits * part, splits * (part + 1)):
+        cut_bar(points, a + 4 * k, b + 4 * k, n_parts, i, piece)
+        rise = bows[k + 1] - bows[k]
+        first = bow * (bows[k] + i / n_parts * rise)
+        last = bow * (bows[k] + (i + 1) / n_parts * rise)
+        left = lanes & open_lanes(piece, 0, 8, first, last, boxes, g)
+        if left == 0:
+            continue
+        if n_open >= MAX_OPEN:
+            return -1
+        at = ENTRY * n_open
+        pool[at], pool[at + 1], pool[at + 2], pool[at + 3], pool[at + 4] = k, g, left, n_parts, i
+        n_open += 1
+    return n_open
+
+
+@kernel(int64(MAT, VEC, VEC, float64, CHAIN, MAT, MAT))
+def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
     """
     Return 1 where a motion is proven free, 0 where it touches a box, -1 where neither is known.
 
@@ -163,95 +219,94 @@ def prove_curve(curve, speed, bend, resolution, robot, boxes):
     open, on short intervals part by part, until an interval is shorter than `resolution` [rad]
     (`docs/algorithms.md`, section 3).
     """
-    dof, n_boxes = curve.shape[1], boxes.shape[1]
-    n_bars = count_bars(robot)
-    radii, bows, q = np.empty(n_bars), np.empty(n_bars + 1), np.empty(dof)
-    bar_radii(robot, radii)
-    curvature_bounds(robot, speed, bend, bows)
-    length = 0.0
-    for k in range(dof):
+    length = extent = 0.0
+    for k in range(curve.shape[1]):
         length += speed[k] * speed[k]
-    length = math.sqrt(length)
-    extent = 0.0
-    for power in range(curve.shape[0]):
-        for k in range(dof):
+        for power in range(curve.shape[0]):
             extent += abs(curve[power, k])
+    length = math.sqrt(length)
     # Also what is no number: it must reach neither the conversion to an integer below, nor the
     # reduction of angles.
-    if not (length < MAX_NODES - 2 and extent < LARGEST):
+    if not (length < 0.5 * FIRST_INTERVAL * MAX_NODES and extent < LARGEST):
         return -1
-    ray_length = robot[robot.shape[0] - 1, D]
-    points, u = np.empty((MAX_NODES, 3 * (n_bars + 1))), np.empty(MAX_NODES)
+    points, u = scratch.floats(POINTS_ROOM), scratch.floats(MAX_NODES)
+    q, bows = scratch.floats(MAX_ENDS), scratch.floats(MAX_ENDS)
     # Queue of intervals: node at either end, then the run of `pool` that holds what is open.
-    queue = np.empty((2 * MAX_NODES, 4), np.int32)
-    # What is open: pair of bar and box, level of subdivision of the bar, part.
-    pool, is_open = np.empty((MAX_OPEN, 3), np.int32), np.empty(max(1, n_boxes), np.int8)
-    piece = np.empty((2, 6))
-    n_open, head, tail = 0, 0, 0
-    n_nodes = int64(length) + 2
+    queue, pool = scratch.ints(QUEUE_ROOM), scratch.ints(POOL_ROOM)
+    ray_length = robot[robot.shape[0] - 1, D]
     # The far end first: it is the configuration that no earlier edge has proven.
-    for i in range(n_nodes - 1, -1, -1):
-        u[i] = i / (n_nodes - 1)
+    u[0] = 1.0
+    curve_point(curve, 1.0, q)
+    n_bars = chain(q, ray_length, points, 0)
+    if touches(points, 0, n_bars, boxes):
+        return 0
+    stride = 4 * (n_bars + 1)
+    max_nodes = min(MAX_NODES, POINTS_ROOM // stride)
+    n_pieces = int64(length / FIRST_INTERVAL) + 1
+    if n_pieces >= max_nodes:
+        return -1
+    head, tail, n_open, n_nodes = 0, 0, 0, n_pieces + 1
+    for i in range(n_pieces, 0, -1):
+        u[i] = (i - 1) / n_pieces
         curve_point(curve, u[i], q)
-        chain_points(robot, q, ray_length, points, i)
-        if touches(points, i, radii, boxes):
+        chain(q, ray_length, points, i * stride)
+        # The start is looked at below: mostly it is known to be free.
+        if i > 1 and touches(points, i * stride, n_bars, boxes):
             return 0
-    for i in range(n_nodes - 1):
-        queue[tail, 0], queue[tail, 1], queue[tail, 2], queue[tail, 3] = i, i + 1, 0, -1
-        tail += 1
+        queue[tail], queue[tail + 1] = i, i + 1 if i < n_pieces else 0
+        queue[tail + 2], queue[tail + 3] = 0, -1
+        tail += 4
+    curvature_bounds(robot, speed, bend, bows)
     while head < tail:
-        a, b = queue[head, 0], queue[head, 1]
-        first, last = queue[head, 2], queue[head, 3]
-        head += 1
+        a, b = int64(queue[head]), int64(queue[head + 1])
+        first, last = int64(queue[head + 2]), int64(queue[head + 3])
+        head += 4
         width = u[b] - u[a]
         bow = 0.125 * width * width
         start = n_open
         if last < 0:
-            if n_open + n_bars * n_boxes > MAX_OPEN:
-                return -1
             for k in range(n_bars):
-                s, t = bow * bows[k], bow * bows[k + 1]
-                for j in range(n_boxes):
-                    is_open[j] = not hull_is_apart(points, a, b, 3 * k, s, t, radii[k], boxes, j)
-                for j in range(n_boxes):
-                    pool[n_open, 0], pool[n_open, 1], pool[n_open, 2] = k * n_boxes + j, 0, 0
-                    n_open += is_open[j]
-        else:
-            # On a long interval the whole bar moves; on a short one mostly its own length keeps
-            # the hull from fitting, where it turns over an edge of the box.
-            splits = 2 if width * length < SPLIT and last - first < MAX_PARTS else 1
-            if n_open + splits * (last - first) > MAX_OPEN:
+                n_open = open_bar(
+                    points,
+                    a * stride + 4 * k,
+                    b * stride + 4 * k,
+                    k,
+                    bow * bows[k],
+                    bow * bows[k + 1],
+                    boxes,
+                    pool,
+                    n_open,
+                )
+                if n_open < 0:
+                    return -1
+        is_split = width * length < SPLIT and last - first < MAX_PARTS
+        for row in range(first, last):
+            n_open = open_again(
+                points, a * stride, b * stride, bow, bows, row, is_split, boxes, pool, n_open
+            )
+            if n_open < 0:
                 return -1
-            for row in range(first, last):
-                k, j = pool[row, 0] // n_boxes, pool[row, 0] % n_boxes
-                level = pool[row, 1] + splits - 1
-                for part in range(splits * pool[row, 2], splits * (pool[row, 2] + 1)):
-                    if not piece_is_apart(
-                        points, a, b, k, level, part, bow, bows, radii[k], piece, boxes, j
-                    ):
-                        pool[n_open, 0], pool[n_open, 1] = pool[row, 0], level
-                        pool[n_open, 2] = part
-                        n_open += 1
         if n_open == start:
             continue
-        if width * length < resolution or n_nodes >= MAX_NODES or tail + 2 > queue.shape[0]:
+        if a == 1 and last < 0 and touches(points, stride, n_bars, boxes):
+            return 0
+        if width * length < resolution or n_nodes >= max_nodes or tail > QUEUE_ROOM - 8:
             return -1
         u[n_nodes] = 0.5 * (u[a] + u[b])
         curve_point(curve, u[n_nodes], q)
-        chain_points(robot, q, ray_length, points, n_nodes)
-        if touches(points, n_nodes, radii, boxes):
+        chain(q, ray_length, points, n_nodes * stride)
+        if touches(points, n_nodes * stride, n_bars, boxes):
             return 0
-        for side in range(2):
-            queue[tail, 0] = a if side == 0 else n_nodes
-            queue[tail, 1] = n_nodes if side == 0 else b
-            queue[tail, 2], queue[tail, 3] = start, n_open
-            tail += 1
+        queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = a, n_nodes, start, n_open
+        tail += 4
+        queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = n_nodes, b, start, n_open
+        tail += 4
         n_nodes += 1
     return 1
 
 
-@kernel(boolean(VEC, VEC, float64, MAT, MAT))
-def is_edge_free(q_from, q_to, resolution, robot, boxes):
+@kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+def is_edge_free(q_from, q_to, resolution, chain, robot, boxes):
     """
     Return whether the straight joint motion q_from -> q_to is proven free along its whole length.
 
@@ -263,4 +318,4 @@ def is_edge_free(q_from, q_to, resolution, robot, boxes):
     for k in range(dof):
         line[0, k], line[1, k] = q_from[k], q_to[k] - q_from[k]
         speed[k] = abs(line[1, k])
-    return prove_curve(line, speed, bend, resolution, robot, boxes) == 1
+    return prove_curve(line, speed, bend, resolution, chain, robot, boxes) == 1

@@ -4,44 +4,64 @@
 
 import math
 
-from numba.core.types import boolean, float64, int64
+from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, MAT, OUT_VEC
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, LANES, MAT, OUT_VEC
 
 # Bars nearer than this are in contact [m].
 CONTACT = 1e-12
+# Up to four points in the axes of LANES boxes.
+LOCAL_ROOM = 12 * LANES
+# Ends of bars that an arm may have: two a DH row, and the start of the first bar.
+MAX_ENDS = 64
 
 
-@kernel(boolean(float64, float64, float64, float64, float64, float64, float64, MAT))
-def bar_touches_boxes(ax, ay, az, bx, by, bz, radius, boxes):
+@kernel(int64(OUT_VEC, int64, MAT, int64))
+def touched_lanes(points, at, boxes, g):
     """
-    Return whether the bar a-b touches any box grown by `radius` on every side.
+    Return the boxes of group g that a bar touches, bit l for lane l.
 
-    Separating axes (Gottschalk, Lin and Manocha 1996): three face normals and the bar's cross
-    products with them; for a segment and a box these six decide exactly. No branch, no division.
+    The bar runs from points[at] to points[at + 4], its radius stands behind the latter. Separating
+    axes (Gottschalk, Lin and Manocha 1996): three face normals and the bar's cross products with
+    them; for a segment and a box these six decide exactly.
     """
-    n_touched = 0
+    local = scratch.floats(LOCAL_ROOM)
+    ax, ay, az = points[at], points[at + 1], points[at + 2]
+    bx, by, bz, radius = points[at + 4], points[at + 5], points[at + 6], points[at + 7]
     ex, ey, ez = 0.5 * (bx - ax), 0.5 * (by - ay), 0.5 * (bz - az)
     mx, my, mz = 0.5 * (bx + ax), 0.5 * (by + ay), 0.5 * (bz + az)
-    for j in range(boxes.shape[1]):
-        e0 = boxes[0, j] * ex + boxes[1, j] * ey + boxes[2, j] * ez
-        e1 = boxes[3, j] * ex + boxes[4, j] * ey + boxes[5, j] * ez
-        e2 = boxes[6, j] * ex + boxes[7, j] * ey + boxes[8, j] * ez
-        m0 = boxes[9, j] + boxes[0, j] * mx + boxes[1, j] * my + boxes[2, j] * mz
-        m1 = boxes[10, j] + boxes[3, j] * mx + boxes[4, j] * my + boxes[5, j] * mz
-        m2 = boxes[11, j] + boxes[6, j] * mx + boxes[7, j] * my + boxes[8, j] * mz
-        h0, h1, h2 = boxes[12, j] + radius, boxes[13, j] + radius, boxes[14, j] + radius
+    touched = 0
+    for j in range(LANES):
+        is_apart = False
+        for r in range(3):
+            x, y, z = (
+                boxes[g, 3 * r * LANES + j],
+                boxes[g, (3 * r + 1) * LANES + j],
+                boxes[g, (3 * r + 2) * LANES + j],
+            )
+            e = x * ex + y * ey + z * ez
+            m = boxes[g, (9 + r) * LANES + j] + x * mx + y * my + z * mz
+            local[r * LANES + j], local[(3 + r) * LANES + j] = e, m
+            is_apart |= abs(m) > boxes[g, (12 + r) * LANES + j] + radius + abs(e)
+        touched |= (0 if is_apart else 1) << j
+    if touched == 0:
+        return 0
+    apart = 0
+    for j in range(LANES):
+        e0, e1, e2 = local[j], local[LANES + j], local[2 * LANES + j]
+        m0, m1, m2 = local[3 * LANES + j], local[4 * LANES + j], local[5 * LANES + j]
         f0, f1, f2 = abs(e0), abs(e1), abs(e2)
+        h0 = boxes[g, 12 * LANES + j] + radius
+        h1 = boxes[g, 13 * LANES + j] + radius
+        h2 = boxes[g, 14 * LANES + j] + radius
         is_apart = (
-            (abs(m0) > h0 + f0)
-            | (abs(m1) > h1 + f1)
-            | (abs(m2) > h2 + f2)
-            | (abs(m1 * e2 - m2 * e1) > h1 * f2 + h2 * f1)
+            (abs(m1 * e2 - m2 * e1) > h1 * f2 + h2 * f1)
             | (abs(m2 * e0 - m0 * e2) > h2 * f0 + h0 * f2)
             | (abs(m0 * e1 - m1 * e0) > h0 * f1 + h1 * f0)
         )
-        n_touched += 0 if is_apart else 1
-    return n_touched > 0
+        apart |= (1 if is_apart else 0) << j
+    return touched & ~apart
 
 
 @kernel(float64(OUT_VEC, OUT_VEC, OUT_VEC, float64))
@@ -105,74 +125,83 @@ def bar_box_distance(start, step, half):
     return -max(overlap, 0.0)
 
 
-@kernel(float64(MAT, int64, int64, MAT, int64))
-def bar_distance(points, row, column, boxes, j):
-    """Return the signed distance of the bar at points[row, column:] from box j [m]."""
+@kernel(float64(OUT_VEC, int64, MAT, int64, int64))
+def bar_distance(points, at, boxes, g, j):
+    """Return the signed distance of the bar at points[at] from lane j of group g [m]."""
     start, step, half = np.empty(3), np.empty(3), np.empty(3)
     for r in range(3):
-        at_start = at_end = boxes[BOX_OFFSET + r, j]
+        at_start = at_end = boxes[g, LANES * (BOX_OFFSET + r) + j]
         for c in range(3):
-            at_start += boxes[3 * r + c, j] * points[row, column + c]
-            at_end += boxes[3 * r + c, j] * points[row, column + 3 + c]
-        start[r], step[r], half[r] = at_start, at_end - at_start, boxes[BOX_HALF + r, j]
-    return bar_box_distance(start, step, half)
+            cosine = boxes[g, LANES * (3 * r + c) + j]
+            at_start += cosine * points[at + c]
+            at_end += cosine * points[at + 4 + c]
+        start[r], step[r] = at_start, at_end - at_start
+        half[r] = boxes[g, LANES * (BOX_HALF + r) + j]
+    return bar_box_distance(start, step, half) - points[at + 7]
 
 
-@kernel(boolean(MAT, int64, int64, int64, float64, float64, float64, MAT, int64))
-def hull_is_apart(points, row_a, row_b, column, bow_start, bow_end, radius, boxes, j):
+@kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64))
+def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
     """
-    Return whether the hull of a bar at two instants is proven apart from box j.
+    Return the boxes of group g not proven apart from the hull of a bar at two instants.
 
-    The bar starts at points[row, column:] and ends three columns on. The hull is thickened by
-    `bow_start` round the first end and by `bow_end` round the second: how far each may stray from
-    the chord of its motion (`docs/algorithms.md`, section 3). Axes: the face normals, and their
-    cross products with the mean direction of the bar. True is a proof, False is none.
+    Bit l stands for lane l. The bar runs from points[a] to points[a + 4] at the one instant, from
+    points[b] to points[b + 4] at the other; its radius stands behind the end. The hull is
+    thickened by `bow_start` round the first end and by `bow_end` round the second: how far each
+    may stray from the chord of its motion (`docs/algorithms.md`, section 3). Axes: the face
+    normals, and their cross products with the mean direction of the bar.
     """
-    r00, r01, r02 = boxes[0, j], boxes[1, j], boxes[2, j]
-    r10, r11, r12 = boxes[3, j], boxes[4, j], boxes[5, j]
-    r20, r21, r22 = boxes[6, j], boxes[7, j], boxes[8, j]
-    o0, o1, o2 = boxes[BOX_OFFSET, j], boxes[BOX_OFFSET + 1, j], boxes[BOX_OFFSET + 2, j]
-    h0 = boxes[BOX_HALF, j] + radius
-    h1 = boxes[BOX_HALF + 1, j] + radius
-    h2 = boxes[BOX_HALF + 2, j] + radius
-    x, y, z = points[row_a, column], points[row_a, column + 1], points[row_a, column + 2]
-    a0 = o0 + r00 * x + r01 * y + r02 * z
-    a1 = o1 + r10 * x + r11 * y + r12 * z
-    a2 = o2 + r20 * x + r21 * y + r22 * z
-    x, y, z = points[row_a, column + 3], points[row_a, column + 4], points[row_a, column + 5]
-    b0 = o0 + r00 * x + r01 * y + r02 * z
-    b1 = o1 + r10 * x + r11 * y + r12 * z
-    b2 = o2 + r20 * x + r21 * y + r22 * z
-    x, y, z = points[row_b, column], points[row_b, column + 1], points[row_b, column + 2]
-    c0 = o0 + r00 * x + r01 * y + r02 * z
-    c1 = o1 + r10 * x + r11 * y + r12 * z
-    c2 = o2 + r20 * x + r21 * y + r22 * z
-    x, y, z = points[row_b, column + 3], points[row_b, column + 4], points[row_b, column + 5]
-    d0 = o0 + r00 * x + r01 * y + r02 * z
-    d1 = o1 + r10 * x + r11 * y + r12 * z
-    d2 = o2 + r20 * x + r21 * y + r22 * z
-    is_apart = (
-        (min(min(a0, c0) - bow_start, min(b0, d0) - bow_end) > h0)
-        | (max(max(a0, c0) + bow_start, max(b0, d0) + bow_end) < -h0)
-        | (min(min(a1, c1) - bow_start, min(b1, d1) - bow_end) > h1)
-        | (max(max(a1, c1) + bow_start, max(b1, d1) + bow_end) < -h1)
-        | (min(min(a2, c2) - bow_start, min(b2, d2) - bow_end) > h2)
-        | (max(max(a2, c2) + bow_start, max(b2, d2) + bow_end) < -h2)
-    )
-    e0, e1, e2 = (b0 - a0) + (d0 - c0), (b1 - a1) + (d1 - c1), (b2 - a2) + (d2 - c2)
-    f0, f1, f2 = abs(e0), abs(e1), abs(e2)
-    # The thickening along an axis that is not of unit length grows with its norm, which the sum
-    # of its components bounds.
-    reach, s, t = h1 * f2 + h2 * f1, bow_start * (f1 + f2), bow_end * (f1 + f2)
-    a, b, c, d = a1 * e2 - a2 * e1, b1 * e2 - b2 * e1, c1 * e2 - c2 * e1, d1 * e2 - d2 * e1
-    is_apart |= min(min(a, c) - s, min(b, d) - t) > reach
-    is_apart |= max(max(a, c) + s, max(b, d) + t) < -reach
-    reach, s, t = h2 * f0 + h0 * f2, bow_start * (f2 + f0), bow_end * (f2 + f0)
-    a, b, c, d = a2 * e0 - a0 * e2, b2 * e0 - b0 * e2, c2 * e0 - c0 * e2, d2 * e0 - d0 * e2
-    is_apart |= min(min(a, c) - s, min(b, d) - t) > reach
-    is_apart |= max(max(a, c) + s, max(b, d) + t) < -reach
-    reach, s, t = h0 * f1 + h1 * f0, bow_start * (f0 + f1), bow_end * (f0 + f1)
-    a, b, c, d = a0 * e1 - a1 * e0, b0 * e1 - b1 * e0, c0 * e1 - c1 * e0, d0 * e1 - d1 * e0
-    is_apart |= min(min(a, c) - s, min(b, d) - t) > reach
-    is_apart |= max(max(a, c) + s, max(b, d) + t) < -reach
-    return is_apart
+    local = scratch.floats(LOCAL_ROOM)
+    ax, ay, az = points[a], points[a + 1], points[a + 2]
+    bx, by, bz = points[a + 4], points[a + 5], points[a + 6]
+    cx, cy, cz = points[b], points[b + 1], points[b + 2]
+    dx, dy, dz, radius = points[b + 4], points[b + 5], points[b + 6], points[b + 7]
+    first, last = bow_start + radius, bow_end + radius
+    left = 0
+    for j in range(LANES):
+        is_apart = False
+        for r in range(3):
+            x, y, z = (
+                boxes[g, 3 * r * LANES + j],
+                boxes[g, (3 * r + 1) * LANES + j],
+                boxes[g, (3 * r + 2) * LANES + j],
+            )
+            offset, half = boxes[g, (9 + r) * LANES + j], boxes[g, (12 + r) * LANES + j]
+            p = offset + x * ax + y * ay + z * az
+            q = offset + x * bx + y * by + z * bz
+            s = offset + x * cx + y * cy + z * cz
+            t = offset + x * dx + y * dy + z * dz
+            local[r * LANES + j], local[(3 + r) * LANES + j] = p, q
+            local[(6 + r) * LANES + j], local[(9 + r) * LANES + j] = s, t
+            is_apart |= min(min(p, s) - first, min(q, t) - last) > half
+            is_apart |= max(max(p, s) + first, max(q, t) + last) < -half
+        left |= (0 if is_apart else 1) << j
+    if left == 0:
+        return 0
+    apart = 0
+    for j in range(LANES):
+        a0, a1, a2 = local[j], local[LANES + j], local[2 * LANES + j]
+        b0, b1, b2 = local[3 * LANES + j], local[4 * LANES + j], local[5 * LANES + j]
+        c0, c1, c2 = local[6 * LANES + j], local[7 * LANES + j], local[8 * LANES + j]
+        d0, d1, d2 = local[9 * LANES + j], local[10 * LANES + j], local[11 * LANES + j]
+        h0 = boxes[g, 12 * LANES + j] + radius
+        h1 = boxes[g, 13 * LANES + j] + radius
+        h2 = boxes[g, 14 * LANES + j] + radius
+        e0, e1, e2 = (b0 - a0) + (d0 - c0), (b1 - a1) + (d1 - c1), (b2 - a2) + (d2 - c2)
+        f0, f1, f2 = abs(e0), abs(e1), abs(e2)
+        # The thickening along an axis that is not of unit length grows with its norm, which the
+        # sum of its components bounds.
+        reach, u, v = h1 * f2 + h2 * f1, bow_start * (f1 + f2), bow_end * (f1 + f2)
+        p, q, s, t = a1 * e2 - a2 * e1, b1 * e2 - b2 * e1, c1 * e2 - c2 * e1, d1 * e2 - d2 * e1
+        is_apart = min(min(p, s) - u, min(q, t) - v) > reach
+        is_apart |= max(max(p, s) + u, max(q, t) + v) < -reach
+        reach, u, v = h2 * f0 + h0 * f2, bow_start * (f2 + f0), bow_end * (f2 + f0)
+        p, q, s, t = a2 * e0 - a0 * e2, b2 * e0 - b0 * e2, c2 * e0 - c0 * e2, d2 * e0 - d0 * e2
+        is_apart |= min(min(p, s) - u, min(q, t) - v) > reach
+        is_apart |= max(max(p, s) + u, max(q, t) + v) < -reach
+        reach, u, v = h0 * f1 + h1 * f0, bow_start * (f0 + f1), bow_end * (f0 + f1)
+        p, q, s, t = a0 * e1 - a1 * e0, b0 * e1 - b1 * e0, c0 * e1 - c1 * e0, d0 * e1 - d1 * e0
+        is_apart |= min(min(p, s) - u, min(q, t) - v) > reach
+        is_apart |= max(max(p, s) + u, max(q, t) + v) < -reach
+        apart |= (1 if is_apart else 0) << j
+    return left & ~apart

@@ -28,13 +28,16 @@ OUT_INT_MAT = types.Array(int64, 2, 'C')
 OUT_INT_CUBE = types.Array(int64, 3, 'C')
 OUT_POOL = types.Array(int32, 1, 'C')
 
-# The seam between planning and geometry: (q_from, q_to, resolution, robot rows, obstacle rows)
-# -> is the straight edge between the two configurations free?
-EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, MAT, MAT))
+# An arm's forward kinematics: (q, ray_length, points, at) -> number of bars (`chain.py`).
+CHAIN = types.FunctionType(int64(VEC, float64, OUT_VEC, int64))
 
-# A second one: (q, robot rows, obstacle rows) -> radius of a ball of joint space round q that is
+# The seam between planning and geometry: (q_from, q_to, resolution, chain, robot, obstacles)
+# -> is the straight edge between the two configurations free?
+EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+
+# A second one: (q, chain, robot, obstacles) -> radius of a ball of joint space round q that is
 # free [rad].
-FREE_RADIUS = types.FunctionType(float64(VEC, MAT, MAT))
+FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
@@ -46,9 +49,13 @@ COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D, REACH = range(9)
 REVOLUTE, PRISMATIC, FIXED = 0.0, 1.0, 2.0
 NO_BAR = -1.0
 
-# Rows of `boxes`, a column for each box: the rotation into the box's own axes (9), the position of
-# the arm's base in them (3), the half extents grown by margin and slack (3). A structure of
-# arrays, so that the compiler vectorises over the boxes.
+# `boxes`: a row for each group of LANES boxes, their numbers side by side, so that the compiler
+# works on them all at once: number r of box l stands in column LANES r + l. The numbers: the
+# rotation into the box's own axes (9), the position of the arm's base in them (3), the half
+# extents grown by margin and slack (3). The groups form a tree: lane l of group g bounds the whole
+# group LANES g + l + 1, if there is such a row; the last ones hold the boxes themselves. Unused
+# lanes have half extents of minus infinity: nothing touches them.
+LANES = 8
 BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
 
 

@@ -1,27 +1,11 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Forward kinematics of a modified Denavit-Hartenberg chain."""
+"""Sine and cosine, from which forward kinematics is made."""
 
 import math
 
-from numba.core.types import float64, int64, UniTuple, void
-from rrth_planner.kernels.jit import (
-    A,
-    COS_ALPHA,
-    D,
-    kernel,
-    KIND,
-    MAT,
-    NO_BAR,
-    OFFSET,
-    OUT_MAT,
-    PRISMATIC,
-    RADIUS_A,
-    RADIUS_D,
-    REVOLUTE,
-    SIN_ALPHA,
-    VEC,
-)
+from numba.core.types import float64, int64, UniTuple
+from rrth_planner.kernels.jit import kernel
 
 
 @kernel(UniTuple(float64, 2)(float64))
@@ -77,56 +61,3 @@ def sine_cosine(x):
     sine = c if quarter & 1 else s
     cosine = s if quarter & 1 else c
     return (-sine if quarter & 2 else sine), (-cosine if (quarter + 1) & 2 else cosine)
-
-
-@kernel(void(MAT, VEC, float64, OUT_MAT, int64))
-def chain_points(robot, q, ray_length, points, row):
-    """
-    Write the ends of the arm's bars at q into a row of `points`, in the arm's base frame [m].
-
-    points[row] = x, y, z of the start of the first bar, then of the end of each bar; the last
-    bar is the pointing ray. Craig's T = Rx(alpha) Tx(a) Rz(theta) Tz(d), a row at a time.
-    """
-    px = py = pz = 0.0
-    xx, xy, xz = 1.0, 0.0, 0.0
-    yx, yy, yz = 0.0, 1.0, 0.0
-    zx, zy, zz = 0.0, 0.0, 1.0
-    column = 0
-    n_rows = robot.shape[0]
-    for i in range(n_rows):
-        if column == 0 and robot[i, RADIUS_A] != NO_BAR:
-            points[row, 0], points[row, 1], points[row, 2] = px, py, pz
-            column = 3
-        ca, sa, a = robot[i, COS_ALPHA], robot[i, SIN_ALPHA], robot[i, A]
-        px, py, pz = px + a * xx, py + a * xy, pz + a * xz
-        if robot[i, RADIUS_A] != NO_BAR:
-            points[row, column], points[row, column + 1], points[row, column + 2] = px, py, pz
-            column += 3
-        mx, my, mz = ca * yx + sa * zx, ca * yy + sa * zy, ca * yz + sa * zz
-        zx, zy, zz = ca * zx - sa * yx, ca * zy - sa * yy, ca * zz - sa * yz
-        theta, d = robot[i, OFFSET], robot[i, D]
-        if i == n_rows - 1:
-            d = ray_length
-        elif robot[i, KIND] == REVOLUTE:
-            theta += q[i]
-        elif robot[i, KIND] == PRISMATIC:
-            d += q[i]
-        s, c = sine_cosine(theta)
-        yx, yy, yz = c * mx - s * xx, c * my - s * xy, c * mz - s * xz
-        xx, xy, xz = c * xx + s * mx, c * xy + s * my, c * xz + s * mz
-        if column == 0 and robot[i, RADIUS_D] != NO_BAR:
-            points[row, 0], points[row, 1], points[row, 2] = px, py, pz
-            column = 3
-        px, py, pz = px + d * zx, py + d * zy, pz + d * zz
-        if robot[i, RADIUS_D] != NO_BAR:
-            points[row, column], points[row, column + 1], points[row, column + 2] = px, py, pz
-            column += 3
-
-
-@kernel(int64(MAT))
-def count_bars(robot):
-    """Return the number of bars that `chain_points` writes the ends of."""
-    n = 0
-    for i in range(robot.shape[0]):
-        n += int64(robot[i, RADIUS_A] != NO_BAR) + int64(robot[i, RADIUS_D] != NO_BAR)
-    return n

@@ -6,20 +6,21 @@ import math
 
 from numba.core.types import boolean, float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import kernel, MAT, VEC
+from rrth_planner.kernels.jit import CHAIN, kernel, MAT, VEC
 
 # Obstacles of a map are rows lower corner, upper corner, (m, 2 dof). Touching is allowed: a wall
 # begins this far inside its faces.
 TOUCH = 1e-9
 
 
-@kernel(boolean(VEC, VEC, float64, MAT, MAT))
-def is_edge_free(q_from, q_to, resolution, robot, obstacles):
+@kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+def is_edge_free(q_from, q_to, resolution, chain, robot, obstacles):
     """
     Return whether the straight edge stays out of the inside of every box: exact.
 
     The shares of the edge between the two faces of each axis are intervals; the edge enters the
-    box where they all overlap (Kay and Kajiya 1986). `resolution` and `robot` are not used.
+    box where they all overlap (Kay and Kajiya 1986). `resolution`, `chain` and `robot` are not
+    used.
     """
     dof = q_from.shape[0]
     for j in range(obstacles.shape[0]):
@@ -63,8 +64,8 @@ def is_point_inside(q, obstacles):
     return False
 
 
-@kernel(boolean(VEC, VEC, float64, MAT, MAT))
-def is_edge_free_sampled(q_from, q_to, resolution, robot, obstacles):
+@kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
+def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, obstacles):
     """
     Return whether no check point of the edge is inside a box: the paper's test.
 
@@ -85,8 +86,8 @@ def is_edge_free_sampled(q_from, q_to, resolution, robot, obstacles):
     return True
 
 
-@kernel(float64(VEC, MAT, MAT))
-def free_radius(q, robot, obstacles):
+@kernel(float64(VEC, CHAIN, MAT, MAT))
+def free_radius(q, chain, robot, obstacles):
     """Return the distance of q from the nearest box, 0 inside: a ball that far is free."""
     dof = q.shape[0]
     least = math.inf

@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.kernels.arm_validity import is_configuration_free
 from rrth_planner.kernels.jit import (
     A,
+    CHAIN,
     COS_ALPHA,
     D,
     EDGE_CHECK,
@@ -120,22 +121,22 @@ def goal_candidates(robot, bounds, target, q_near, ratios, n_draws, candidates, 
     return n
 
 
-@kernel(boolean(MAT, MAT, VEC, float64))
-def is_goal_free(robot, obstacles, q, reach):
+@kernel(boolean(CHAIN, MAT, MAT, VEC, float64))
+def is_goal_free(chain, robot, obstacles, q, reach):
     """Return whether q is free with its ray out to the target, and as far as it is guarded."""
     ray_length = max(reach, robot[robot.shape[0] - 1, D])
-    return is_configuration_free(q, ray_length, robot, obstacles)
+    return is_configuration_free(q, ray_length, chain, obstacles)
 
 
-@kernel(void(MAT, MAT, MAT, VEC, OUT_FLAGS))
-def find_free_goals(robot, obstacles, candidates, reaches, is_free):
+@kernel(void(CHAIN, MAT, MAT, MAT, VEC, OUT_FLAGS))
+def find_free_goals(chain, robot, obstacles, candidates, reaches, is_free):
     """Write for each of the candidates (n, dof) whether it is free."""
     for i in range(candidates.shape[0]):
-        is_free[i] = is_goal_free(robot, obstacles, candidates[i], reaches[i])
+        is_free[i] = is_goal_free(chain, robot, obstacles, candidates[i], reaches[i])
 
 
-@kernel(float64(EDGE_CHECK, float64, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))
-def slide_goal(is_edge_free, resolution, robot, obstacles, bounds, target, path, n, finest):
+@kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))
+def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path, n, finest):
     """
     Move the last waypoint along the goal manifold so that the path gets shorter; return the gain.
 
@@ -168,8 +169,8 @@ def slide_goal(is_edge_free, resolution, robot, obstacles, bounds, target, path,
             reach = aim(robot, bounds, target, path[n - 1], branch, q)
             if reach < 0.0 or distance(before, q) >= cost - 1e-9:
                 continue
-            if is_goal_free(robot, obstacles, q, reach) and is_edge_free(
-                before, q, resolution, robot, obstacles
+            if is_goal_free(chain, robot, obstacles, q, reach) and is_edge_free(
+                before, q, resolution, chain, robot, obstacles
             ):
                 path[n - 1] = q
                 cost = distance(before, q)

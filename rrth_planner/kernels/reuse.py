@@ -5,6 +5,7 @@
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
+    CHAIN,
     EDGE_CHECK,
     kernel,
     MAT,
@@ -17,9 +18,18 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.tree import distance
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))
 def transplant(
-    is_edge_free, resolution, robot, obstacles, old_nodes, old_parents, n_roots, nodes, parents
+    is_edge_free,
+    resolution,
+    chain,
+    robot,
+    obstacles,
+    old_nodes,
+    old_parents,
+    n_roots,
+    nodes,
+    parents,
 ):
     """
     Carry over what can still be reached of an old tree; return the number of nodes.
@@ -38,7 +48,7 @@ def transplant(
                     moved[i] = root
                     break
                 if parent < 0 and is_edge_free(
-                    nodes[root], old_nodes[i], resolution, robot, obstacles
+                    nodes[root], old_nodes[i], resolution, chain, robot, obstacles
                 ):
                     parent = root
             if moved[i] >= 0 or parent < 0:
@@ -46,7 +56,7 @@ def transplant(
         else:
             parent = moved[old_parents[i]]
             if parent < 0 or not is_edge_free(
-                nodes[parent], old_nodes[i], resolution, robot, obstacles
+                nodes[parent], old_nodes[i], resolution, chain, robot, obstacles
             ):
                 continue
         if n >= nodes.shape[0] - 1:
@@ -58,14 +68,14 @@ def transplant(
     return n
 
 
-@kernel(void(EDGE_CHECK, float64, MAT, MAT, float64, OUT_CUBE, OUT_INTS, OUT_INTS))
-def join(is_edge_free, resolution, robot, obstacles, step_size, tree_q, sizes, meeting):
+@kernel(void(EDGE_CHECK, float64, CHAIN, MAT, MAT, float64, OUT_CUBE, OUT_INTS, OUT_INTS))
+def join(is_edge_free, resolution, chain, robot, obstacles, step_size, tree_q, sizes, meeting):
     """Find two nodes of the two trees, within a step, that a free edge joins: `meeting`, or -1."""
     meeting[0] = meeting[1] = -1
     for b in range(sizes[1]):
         for a in range(sizes[N_START]):
             if distance(tree_q[0, a], tree_q[1, b]) <= step_size and is_edge_free(
-                tree_q[0, a], tree_q[1, b], resolution, robot, obstacles
+                tree_q[0, a], tree_q[1, b], resolution, chain, robot, obstacles
             ):
                 meeting[0], meeting[1] = a, b
                 return

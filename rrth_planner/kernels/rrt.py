@@ -7,6 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, npy_rng
 import numpy as np
 from rrth_planner.kernels.jit import (
+    CHAIN,
     EDGE_CHECK,
     FREE_RADIUS,
     kernel,
@@ -36,6 +37,7 @@ def is_rejected_by_club(q, club, radius, count, probability, rng):
         EDGE_CHECK,
         FREE_RADIUS,
         float64,
+        CHAIN,
         MAT,
         MAT,
         MAT,
@@ -60,6 +62,7 @@ def advance(
     is_edge_free,
     free_radius,
     resolution,
+    chain,
     robot,
     obstacles,
     bounds,
@@ -110,11 +113,13 @@ def advance(
         q_near = tree_q[side, near]
         if distance(q_near, q) == 0.0:
             continue
-        step = adapted_step(free_radius, robot, obstacles, q_near, step_size, clearance_gain)
+        step = adapted_step(
+            free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
+        )
         steer(q_near, q, step, q_new)
         if is_rejected_by_club(q_new, club, club_radius, club_count, club_probability, rng):
             continue
-        if not is_edge_free(q_near, q_new, resolution, robot, obstacles):
+        if not is_edge_free(q_near, q_new, resolution, chain, robot, obstacles):
             continue
         new = sizes[side]
         tree_q[side, new] = q_new
@@ -123,23 +128,25 @@ def advance(
         reached = nearest(tree_q[other], sizes[other], q_new)
         is_close = is_bidirectional or distance(tree_q[other, reached], q_new) <= step_size
         is_joined = is_close and is_edge_free(
-            tree_q[other, reached], q_new, resolution, robot, obstacles
+            tree_q[other, reached], q_new, resolution, chain, robot, obstacles
         )
         while is_bidirectional and not is_joined and sizes[other] < capacity - 1:
             q_near = tree_q[other, reached]
-            step = adapted_step(free_radius, robot, obstacles, q_near, step_size, clearance_gain)
+            step = adapted_step(
+                free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
+            )
             steer(q_near, q_new, step, q)
             if distance(q, q_new) == 0.0 or is_rejected_by_club(
                 q, club, club_radius, club_count, club_probability, rng
             ):
                 break
-            if not is_edge_free(q_near, q, resolution, robot, obstacles):
+            if not is_edge_free(q_near, q, resolution, chain, robot, obstacles):
                 break
             tree_q[other, sizes[other]] = q
             parents[other, sizes[other]] = reached
             reached = sizes[other]
             sizes[other] += 1
-            is_joined = is_edge_free(q, q_new, resolution, robot, obstacles)
+            is_joined = is_edge_free(q, q_new, resolution, chain, robot, obstacles)
         if is_joined:
             meeting[side], meeting[other] = new, reached
             return draw + 1

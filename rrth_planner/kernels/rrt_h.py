@@ -5,6 +5,7 @@
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
+    CHAIN,
     EDGE_CHECK,
     kernel,
     MAT,
@@ -33,8 +34,8 @@ def reverse_path(path, n):
             path[i, k], path[n - 1 - i, k] = path[n - 1 - i, k], path[i, k]
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64))
-def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
+def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
     """
     Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 as far as P_i sees it.
 
@@ -46,7 +47,7 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing):
     q_seen, q_try = np.empty(dof), np.empty(dof)
     i = 0
     while i + 2 < n:
-        if is_edge_free(path[i], path[i + 2], resolution, robot, obstacles):
+        if is_edge_free(path[i], path[i + 2], resolution, chain, robot, obstacles):
             n = remove_waypoint(path, n, i + 1)
             continue
         length = distance(path[i + 1], path[i + 2])
@@ -56,8 +57,8 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing):
             for k in range(dof):
                 q_try[k] = path[i + 1, k] + share * (path[i + 2, k] - path[i + 1, k])
             # The rest of the old segment stays an edge, so it is proven again on its own.
-            if is_edge_free(path[i], q_try, resolution, robot, obstacles) and is_edge_free(
-                q_try, path[i + 2], resolution, robot, obstacles
+            if is_edge_free(path[i], q_try, resolution, chain, robot, obstacles) and is_edge_free(
+                q_try, path[i + 2], resolution, chain, robot, obstacles
             ):
                 low = share
                 q_seen[:] = q_try
@@ -69,18 +70,18 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing):
     return n
 
 
-@kernel(boolean(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, VEC, VEC))
-def is_corner_free(is_edge_free, resolution, robot, obstacles, path, i, q_in, q_out):
+@kernel(boolean(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC, VEC))
+def is_corner_free(is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out):
     """Return whether waypoint i may be replaced by the chord q_in -> q_out: all three edges."""
     return (
-        is_edge_free(q_in, q_out, resolution, robot, obstacles)
-        and is_edge_free(path[i - 1], q_in, resolution, robot, obstacles)
-        and is_edge_free(q_out, path[i + 1], resolution, robot, obstacles)
+        is_edge_free(q_in, q_out, resolution, chain, robot, obstacles)
+        and is_edge_free(path[i - 1], q_in, resolution, chain, robot, obstacles)
+        and is_edge_free(q_out, path[i + 1], resolution, chain, robot, obstacles)
     )
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64))
-def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, spacing):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
+def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
     """
     Do step 3 of RRT-H in place, from both sides: replace each corner by its largest free chord.
 
@@ -115,7 +116,7 @@ def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, spacing):
                     q_in[k] = path[i, k] + s_in * (path[i - 1, k] - path[i, k])
                     q_out[k] = path[i, k] + s_out * (path[i + 1, k] - path[i, k])
                 if is_corner_free(
-                    is_edge_free, resolution, robot, obstacles, path, i, q_in, q_out
+                    is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out
                 ):
                     low = at
                     share[0], share[1] = s_in, s_out
@@ -140,8 +141,8 @@ def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, spacing):
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, int64))
-def pull_taut(is_edge_free, resolution, robot, obstacles, path, n, spacing, max_rounds):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, int64))
+def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, max_rounds):
     """
     Repeat the three steps until the path gets no shorter; return its number of waypoints.
 
@@ -151,11 +152,11 @@ def pull_taut(is_edge_free, resolution, robot, obstacles, path, n, spacing, max_
     for _ in range(max_rounds):
         if n < 3:
             break
-        n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing)
+        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         reverse_path(path, n)
-        n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, spacing)
+        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         reverse_path(path, n)
-        n = cut_corners(is_edge_free, resolution, robot, obstacles, path, n, spacing)
+        n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         shorter = path_length(path, n)
         if shorter > length * (1.0 - TAUT):
             break

@@ -4,15 +4,15 @@
 
 from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
+from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
 from rrth_planner.kernels.rrt_h import remove_waypoint, reverse_path
 from rrth_planner.kernels.tree import distance
 
 MAX_CUTS = 1000
 
 
-@kernel(float64(EDGE_CHECK, float64, MAT, MAT, VEC, VEC, float64))
-def first_contact(is_edge_free, resolution, robot, obstacles, q_from, q_to, spacing):
+@kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, VEC, VEC, float64))
+def first_contact(is_edge_free, resolution, chain, robot, obstacles, q_from, q_to, spacing):
     """Return the share of the line at which the first check point P_C collides; 2: none does."""
     dof = q_from.shape[0]
     n = int64(distance(q_from, q_to) / spacing) + 1
@@ -21,13 +21,13 @@ def first_contact(is_edge_free, resolution, robot, obstacles, q_from, q_to, spac
         for k in range(dof):
             q[k] = q_from[k] + m / n * (q_to[k] - q_from[k])
         # An edge of length zero: the configuration itself.
-        if not is_edge_free(q, q, resolution, robot, obstacles):
+        if not is_edge_free(q, q, resolution, chain, robot, obstacles):
             return m / n
     return 2.0
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, float64))
-def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, checks):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
+def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks):
     """
     Do step 1 in place: the lines from P_i to the points P_T on P_i+1 -> P_i+2, one by one.
 
@@ -43,7 +43,9 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, c
             for k in range(dof):
                 q[k] = path[i + 1, k] + t / m * (path[i + 2, k] - path[i + 1, k])
             if (
-                first_contact(is_edge_free, resolution, robot, obstacles, path[i], q, checks)
+                first_contact(
+                    is_edge_free, resolution, chain, robot, obstacles, path[i], q, checks
+                )
                 <= 1.0
             ):
                 blocked = t
@@ -57,8 +59,10 @@ def pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, c
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
-def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, checks, least):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
+def cut_corners(
+    is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least
+):
     """
     Do step 3 in place: a corner where the line of sight is first blocked, two lines back.
 
@@ -75,7 +79,9 @@ def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, ch
         for t in range(1, m + 1):
             for k in range(dof):
                 q[k] = path[i + 1, k] + t / m * (path[i + 2, k] - path[i + 1, k])
-            share = first_contact(is_edge_free, resolution, robot, obstacles, path[i], q, checks)
+            share = first_contact(
+                is_edge_free, resolution, chain, robot, obstacles, path[i], q, checks
+            )
             if share <= 1.0:
                 blocked = t
                 break
@@ -103,11 +109,13 @@ def cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, ch
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
-def shorten(is_edge_free, resolution, robot, obstacles, path, n, targets, checks, least):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
+def shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least):
     """Do steps 1, 2 and 3 once each, in place; return the number of waypoints."""
-    n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, checks)
+    n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
-    n = pull_forward(is_edge_free, resolution, robot, obstacles, path, n, targets, checks)
+    n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
-    return cut_corners(is_edge_free, resolution, robot, obstacles, path, n, targets, checks, least)
+    return cut_corners(
+        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least
+    )

@@ -7,6 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, npy_rng, void
 import numpy as np
 from rrth_planner.kernels.jit import (
+    CHAIN,
     EDGE_CHECK,
     FREE_RADIUS,
     kernel,
@@ -25,14 +26,15 @@ from rrth_planner.kernels.sampling import draw_uniform
 from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
-# resolution, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two
-# trees or one, biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes, meetings,
-# best, history. best (4,): cost of the best path and row of its meeting, then number of waypoints
-# and cost of the shortened path, which RRT*-Smart alone keeps.
+# resolution, chain, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius,
+# two trees or one, biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes,
+# meetings, best, history. best (4,): cost of the best path and row of its meeting, then number of
+# waypoints and cost of the shortened path, which RRT*-Smart alone keeps.
 STAR_SIGNATURE = int64(
     EDGE_CHECK,
     FREE_RADIUS,
     float64,
+    CHAIN,
     MAT,
     MAT,
     MAT,
@@ -109,9 +111,24 @@ def shift_costs(links, costs, node, change):
 
 
 @kernel(
-    int64(EDGE_CHECK, float64, MAT, MAT, VEC, int64, float64, OUT_MAT, OUT_INT_MAT, OUT_VEC, int64)
+    int64(
+        EDGE_CHECK,
+        float64,
+        CHAIN,
+        MAT,
+        MAT,
+        VEC,
+        int64,
+        float64,
+        OUT_MAT,
+        OUT_INT_MAT,
+        OUT_VEC,
+        int64,
+    )
 )
-def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes, links, costs, n):
+def add_node(
+    is_edge_free, resolution, chain, robot, obstacles, q, near, radius, nodes, links, costs, n
+):
     """
     Add q to a tree of n nodes: best parent first, then rewire; return 0 where it is not reached.
 
@@ -119,7 +136,7 @@ def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes,
     parent unless one within the radius makes a shorter way (ChooseParent); afterwards q becomes
     the parent of those to which it makes one (Rewire).
     """
-    if not is_edge_free(nodes[near], q, resolution, robot, obstacles):
+    if not is_edge_free(nodes[near], q, resolution, chain, robot, obstacles):
         return 0
     neighbours, lengths = np.empty(n, np.int64), np.empty(n)
     n_near = 0
@@ -134,7 +151,7 @@ def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes,
     for row in range(n_near):
         i, length = neighbours[row], lengths[row]
         is_shorter = i != near and costs[i] + length < cost - GAIN
-        if is_shorter and is_edge_free(nodes[i], q, resolution, robot, obstacles):
+        if is_shorter and is_edge_free(nodes[i], q, resolution, chain, robot, obstacles):
             parent, cost = i, costs[i] + length
     nodes[n] = q
     links[CHILD, n] = -1
@@ -143,7 +160,7 @@ def add_node(is_edge_free, resolution, robot, obstacles, q, near, radius, nodes,
     for row in range(n_near):
         i, length = neighbours[row], lengths[row]
         is_shorter = i != parent and cost + length < costs[i] - GAIN
-        if is_shorter and is_edge_free(q, nodes[i], resolution, robot, obstacles):
+        if is_shorter and is_edge_free(q, nodes[i], resolution, chain, robot, obstacles):
             detach(links, i)
             attach(links, i, n)
             shift_costs(links, costs, i, cost + length - costs[i])
@@ -192,6 +209,7 @@ def trace_path(tree_q, links, from_start, from_goal, path):
         EDGE_CHECK,
         FREE_RADIUS,
         float64,
+        CHAIN,
         MAT,
         MAT,
         float64,
@@ -212,6 +230,7 @@ def extend(
     is_edge_free,
     free_radius,
     resolution,
+    chain,
     robot,
     obstacles,
     step_size,
@@ -240,12 +259,13 @@ def extend(
     q_near, q_new, new = tree_q[side, near], np.empty(dof), sizes[side]
     if new >= tree_q.shape[1] or distance(q_near, q) == 0.0:
         return False
-    step = adapted_step(free_radius, robot, obstacles, q_near, step_size, clearance_gain)
+    step = adapted_step(free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain)
     steer(q_near, q, step, q_new)
     radius = near_radius(new, dof, rewire_radius, step_size)
     if not add_node(
         is_edge_free,
         resolution,
+        chain,
         robot,
         obstacles,
         q_new,
@@ -265,7 +285,7 @@ def extend(
             continue
         if is_bidirectional and cost >= best[0] - GAIN:
             continue
-        if is_edge_free(tree_q[other, i], q_new, resolution, robot, obstacles):
+        if is_edge_free(tree_q[other, i], q_new, resolution, chain, robot, obstacles):
             meetings[sizes[N_MEETINGS], side], meetings[sizes[N_MEETINGS], other] = new, i
             sizes[N_MEETINGS] += 1
     before = best[0]
@@ -278,6 +298,7 @@ def advance(
     is_edge_free,
     free_radius,
     resolution,
+    chain,
     robot,
     obstacles,
     bounds,
@@ -315,6 +336,7 @@ def advance(
             is_edge_free,
             free_radius,
             resolution,
+            chain,
             robot,
             obstacles,
             step_size,

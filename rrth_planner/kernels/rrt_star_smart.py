@@ -6,14 +6,14 @@ import math
 
 from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
+from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
 from rrth_planner.kernels.tree import path_length
 
 
-@kernel(int64(EDGE_CHECK, float64, MAT, MAT, OUT_MAT, int64))
-def skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64))
+def skip_waypoints(is_edge_free, resolution, chain, robot, obstacles, path, n):
     """
     Drop the waypoints that are not needed, in place; return how many are left.
 
@@ -24,7 +24,7 @@ def skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n):
     while i < n - 1:
         ahead = n - 1
         while ahead > i + 1 and not is_edge_free(
-            path[i], path[ahead], resolution, robot, obstacles
+            path[i], path[ahead], resolution, chain, robot, obstacles
         ):
             ahead -= 1
         path[kept] = path[ahead]
@@ -38,6 +38,7 @@ def advance(
     is_edge_free,
     free_radius,
     resolution,
+    chain,
     robot,
     obstacles,
     bounds,
@@ -82,6 +83,7 @@ def advance(
             is_edge_free,
             free_radius,
             resolution,
+            chain,
             robot,
             obstacles,
             step_size,
@@ -101,7 +103,7 @@ def advance(
         if is_better or best[0] < math.inf and best[3] == math.inf:
             row = int64(best[1])
             n = trace_path(tree_q, links, meetings[row, 0], meetings[row, 1], path)
-            n = skip_waypoints(is_edge_free, resolution, robot, obstacles, path, n)
+            n = skip_waypoints(is_edge_free, resolution, chain, robot, obstacles, path, n)
             length = path_length(path, n)
             if n > 0 and length < best[3]:
                 shortened[:n] = path[:n]

@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels.jit import (
+    CHAIN,
     FREE_RADIUS,
     kernel,
     MAT,
@@ -57,8 +58,8 @@ def steer(q_near, q_towards, step_size, q_new):
         q_new[k] = q_towards[k] if share == 1.0 else q_near[k] + share * (q_towards[k] - q_near[k])
 
 
-@kernel(float64(FREE_RADIUS, MAT, MAT, VEC, float64, float64))
-def adapted_step(free_radius, robot, obstacles, q, step_size, clearance_gain):
+@kernel(float64(FREE_RADIUS, CHAIN, MAT, MAT, VEC, float64, float64))
+def adapted_step(free_radius, chain, robot, obstacles, q, step_size, clearance_gain):
     """
     Return the step from q: shorter where obstacles are near (after Cai, as the paper cites it).
 
@@ -67,7 +68,7 @@ def adapted_step(free_radius, robot, obstacles, q, step_size, clearance_gain):
     """
     if clearance_gain == 0.0:
         return step_size
-    step = clearance_gain * free_radius(q, robot, obstacles)
+    step = clearance_gain * free_radius(q, chain, robot, obstacles)
     return min(step_size, max(step, 0.1 * step_size))
 
 

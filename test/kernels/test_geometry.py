@@ -7,8 +7,9 @@ from itertools import product
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels.geometry import bar_box_distance, bar_touches_boxes, hull_is_apart
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS
+from rrth_planner.box_tree import pack_boxes
+from rrth_planner.kernels.geometry import bar_box_distance, open_lanes, touched_lanes
+from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.oracle import bar_box_touch
 from worlds import examples, random_rotation
 
@@ -16,12 +17,25 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def packed(center, rotation, half):
-    """Return one box as a column of the kernels."""
+    """Return one box as a group of the kernels."""
     rows = np.empty((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = rotation.T.ravel()
     rows[BOX_OFFSET:BOX_HALF, 0] = -rotation.T @ center
     rows[BOX_HALF:, 0] = half
-    return rows
+    return pack_boxes(rows)[0]
+
+
+def touches(a, b, radius, boxes):
+    """Return whether the bar a-b touches any box of the only group."""
+    return touched_lanes(np.array([*a, 0.0, *b, radius]), 0, boxes, 0) != 0
+
+
+def is_open(points, bow_start, bow_end, radius, boxes):
+    """Return whether the hull of a bar, points (2, 6), is not proven apart from the only box."""
+    rows = np.zeros((4, 4))
+    rows[:, :3] = points.reshape(4, 3)
+    rows[1::2, 3] = radius
+    return open_lanes(rows.ravel(), 0, 8, bow_start, bow_end, boxes, 0) != 0
 
 
 def kernel_distance(a, b, center, rotation, half):
@@ -77,7 +91,7 @@ def test_contact_is_that_of_clipping(cases):
         signed = kernel_distance(a, b, center, rotation, half)
         if abs(signed) < 1e-9:
             continue
-        got = bar_touches_boxes(*a, *b, 0.0, packed(center, rotation, half))
+        got = touches(a, b, 0.0, packed(center, rotation, half))
         assert got == bar_box_touch(np.stack([a, b]), center, rotation, half), k
         assert got == (signed < 0.0), k
         n_touching += got
@@ -89,21 +103,23 @@ def test_contact_is_that_of_clipping(cases):
 def test_a_radius_grows_the_box(cases):
     for a, b, center, rotation, half in list(zip(*cases, strict=True))[:2000]:
         boxes, fat = packed(center, rotation, half), packed(center, rotation, half + 0.07)
-        assert bar_touches_boxes(*a, *b, 0.07, boxes) == bar_touches_boxes(*a, *b, 0.0, fat)
+        assert touches(a, b, 0.07, boxes) == touches(a, b, 0.0, fat)
 
 
-def test_one_box_of_many_is_enough_and_none_touches_nothing(cases):
+def test_each_lane_is_judged_as_if_it_were_alone(cases):
+    n = LANES - 1
     a, b, center, rotation, half = (part[:60] for part in cases)
-    boxes = np.ascontiguousarray(
-        np.hstack([packed(c, r, h) for c, r, h in zip(center, rotation, half, strict=True)])
-    )
+    groups = [packed(c, r, h) for c, r, h in zip(center, rotation, half, strict=True)]
     for p, q in zip(a, b, strict=True):
-        alone = [
-            bar_touches_boxes(*p, *q, 0.0, np.ascontiguousarray(boxes[:, j : j + 1]))
-            for j in range(60)
-        ]
-        assert bar_touches_boxes(*p, *q, 0.0, boxes) == any(alone)
-        assert not bar_touches_boxes(*p, *q, 0.0, np.empty((BOX_ROWS, 0)))
+        for first in range(0, 60 - n, n):
+            together = np.full((BOX_ROWS, LANES), -np.inf)
+            for lane, group in enumerate(groups[first : first + n]):
+                together[:, lane] = group.reshape(BOX_ROWS, LANES)[:, 0]
+            alone = [touches(p, q, 0.0, group) for group in groups[first : first + n]]
+            together[:BOX_HALF, n:] = 0.0
+            points = np.array([*p, 0.0, *q, 0.0])
+            bits = touched_lanes(points, 0, together.reshape(1, -1), 0)
+            assert [bool(bits >> lane & 1) for lane in range(LANES)] == [*alone, False]
 
 
 def test_a_bar_is_as_far_from_a_box_from_either_of_its_ends():
@@ -197,7 +213,7 @@ def test_a_rigid_motion_of_bar_and_box_changes_nothing(seed):
     moved = (R @ a + shift, R @ b + shift, R @ center + shift, R @ rotation, half)
     assert kernel_distance(*moved) == pytest.approx(before, abs=1e-12)
     if abs(before) > 1e-9:
-        got = bar_touches_boxes(*moved[0], *moved[1], 0.0, packed(*moved[2:]))
+        got = touches(moved[0], moved[1], 0.0, packed(*moved[2:]))
         assert got == (before < 0.0)
 
 
@@ -223,7 +239,7 @@ def test_distance_of_bars_along_faces_and_edges_is_known(a, b, expected):
     half = np.array([1.0, 2.0, 3.0])
     got = kernel_distance(a, b, np.zeros(3), np.eye(3), half)
     assert got == pytest.approx(expected, abs=1e-12)
-    assert bar_touches_boxes(*a, *b, 0.0, packed(np.zeros(3), np.eye(3), half)) == (expected < 0)
+    assert touches(a, b, 0.0, packed(np.zeros(3), np.eye(3), half)) == (expected < 0)
 
 
 @pytest.mark.parametrize(
@@ -236,14 +252,14 @@ def test_a_bar_in_the_plane_of_a_face_touches_and_a_hair_outside_does_not(axis, 
     a, b = np.zeros(3), np.zeros(3)
     a[axis] = b[axis] = half[axis]
     a[along], b[along] = (-4.0, 4.0) if is_long else (0.0, 0.125)
-    assert bar_touches_boxes(*a, *b, 0.0, boxes)
+    assert touches(a, b, 0.0, boxes)
     assert kernel_distance(a, b, np.zeros(3), np.eye(3), half) == 0.0
     a[axis] = b[axis] = half[axis] + 1e-12
-    assert not bar_touches_boxes(*a, *b, 0.0, boxes)
+    assert not touches(a, b, 0.0, boxes)
     # In the plane of the face, beside it.
     a[axis] = b[axis] = half[axis]
     a[along], b[along] = half[along] + 0.125, half[along] + 1.0
-    assert not bar_touches_boxes(*a, *b, 0.0, boxes)
+    assert not touches(a, b, 0.0, boxes)
     got = kernel_distance(a, b, np.zeros(3), np.eye(3), half)
     assert got == pytest.approx(0.125, abs=1e-15)
 
@@ -253,15 +269,12 @@ def test_a_number_that_is_none_counts_as_contact():
     for k in range(6):
         ends = np.zeros(6)
         ends[k] = np.nan
-        assert bar_touches_boxes(*ends, 0.0, boxes)
-    for row in range(BOX_ROWS):
-        broken = boxes.copy()
-        broken[row] = np.nan
-        # Of the others one axis may still prove that the bar is apart.
-        if row >= BOX_OFFSET:
-            close = packed(np.zeros(3), np.eye(3), np.ones(3))
-            close[row] = np.nan
-            assert bar_touches_boxes(0.0, 0.0, 0.0, 0.5, 0.1, 0.1, 0.0, close)
+        assert touches(ends[:3], ends[3:], 0.0, boxes)
+    # Of the rotation one axis may still prove that the bar is apart.
+    for row in range(BOX_OFFSET, BOX_ROWS):
+        close = packed(np.zeros(3), np.eye(3), np.ones(3))
+        close[0, LANES * row] = np.nan
+        assert touches(np.zeros(3), [0.5, 0.1, 0.1], 0.0, close)
 
 
 @examples(400)
@@ -276,7 +289,7 @@ def test_a_hull_that_is_apart_contains_no_bar_that_touches(seed):
         points = rng.uniform(-1, 1, (2, 6))
         points[1] = points[0] + rng.choice([0.01, 0.1, 1.0]) * rng.uniform(-1, 1, 6)
         bows = rng.choice([0.0, 0.01, 0.1], 2)
-        if not hull_is_apart(points, 0, 1, 0, *bows, radius, boxes, 0):
+        if is_open(points, *bows, radius, boxes):
             continue
         share = rng.random((40, 1, 1))
         share[:3] = [[[0.0]], [[1.0]], [[0.5]]]
@@ -290,7 +303,7 @@ def test_a_hull_that_is_apart_contains_no_bar_that_touches(seed):
 def test_a_hull_well_away_is_seen_to_be_apart():
     boxes = packed(np.zeros(3), np.eye(3), np.full(3, 0.5))
     points = np.array([[1.0, -2.0, 0.0, 1.0, 2.0, 0.0], [1.2, -2.0, 0.1, 1.1, 2.0, 0.2]])
-    assert hull_is_apart(points, 0, 1, 0, 0.1, 0.1, 0.1, boxes, 0)
-    assert not hull_is_apart(points, 0, 1, 0, 0.6, 0.1, 0.0, boxes, 0)
-    assert not hull_is_apart(points, 0, 1, 0, 0.1, 0.6, 0.0, boxes, 0)
-    assert not hull_is_apart(points, 0, 1, 0, 0.1, 0.1, 0.6, boxes, 0)
+    assert not is_open(points, 0.1, 0.1, 0.1, boxes)
+    assert is_open(points, 0.6, 0.1, 0.0, boxes)
+    assert is_open(points, 0.1, 0.6, 0.0, boxes)
+    assert is_open(points, 0.1, 0.1, 0.6, boxes)

@@ -6,11 +6,21 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.kernels.chain import chain_source
 from rrth_planner.kernels.kinematics import sine_cosine
 from rrth_planner.oracle import frames
+from rrth_planner.reach import bar_ends
 from rrth_planner.scene import Scene
-from rrth_planner.world import arm_world
-from worlds import examples, kernel_bars, oracle_bars, random_chain, table_1_arm, wearer_world
+from rrth_planner.world import arm_world, robot_rows
+from worlds import (
+    compiled_chain,
+    examples,
+    kernel_bars,
+    oracle_bars,
+    random_chain,
+    table_1_arm,
+    wearer_world,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -41,9 +51,34 @@ def test_bars_of_the_paper_arm_are_those_of_the_oracle():
 
 @examples(150)
 @given(seed=SEEDS, has_tail=st.booleans())
-def test_bars_of_any_chain_are_those_of_the_oracle(seed, has_tail):
+def test_the_chain_written_for_any_arm_is_the_oracles(seed, has_tail):
     rng = np.random.default_rng(seed)
     arm = random_chain(rng, has_tail)
+    rows = robot_rows(arm, 0.8)
+    # The same lines, interpreted: to compile them for each arm would take minutes.
+    text = chain_source(rows).replace('scratch.floats', 'np.empty')
+    lines = [line for line in text.splitlines() if not line.startswith(('@', 'from'))]
+    space = {'np': np, 'sine_cosine': sine_cosine}
+    exec('\n'.join(lines), space)
+    n = len(bar_ends(arm))
+    points = np.full(4 * n + 8, np.nan)
+    for q in rng.uniform(*arm.bounds, (5, arm.dof)):
+        assert space['chain'](q, 0.8, points, 2) == n
+        got = points[2:-2].reshape(n + 1, 4)
+        ends = got[:, :3] @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
+        expected = oracle_bars(arm, q, 0.8)[0]
+        assert np.abs(ends[:-1] - expected[:, 0]).max() < 1e-12
+        assert np.abs(ends[1:] - expected[:, 1]).max() < 1e-12
+        assert np.array_equal(got[1:, 3], [arm.radii[row] for row, _ in bar_ends(arm)])
+        assert np.isnan(points[:2]).all()
+        assert np.isnan(points[-2:]).all()
+
+
+@examples(60)
+@given(seed=SEEDS, has_tail=st.booleans())
+def test_bars_of_any_compiled_chain_are_those_of_the_oracle(seed, has_tail):
+    rng = np.random.default_rng(seed)
+    arm = compiled_chain(rng, has_tail)
     world = arm_world(arm, Scene(()), 0.0, 0.8)
     for q in rng.uniform(*arm.bounds, (5, arm.dof)):
         got = kernel_bars(arm, world, q, 0.8)

@@ -1,0 +1,228 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Forward kinematics written out for one arm: its constants are known to the compiler."""
+
+import hashlib
+import importlib.util
+import math
+import os
+from pathlib import Path
+import sys
+from typing import Any
+
+from numba.core.types import float64, int64
+from rrth_planner.kernels.jit import (
+    A,
+    CACHE_FOLDER,
+    COS_ALPHA,
+    D,
+    first_class,
+    kernel,
+    KIND,
+    NO_BAR,
+    OFFSET,
+    OUT_VEC,
+    PRISMATIC,
+    RADIUS_A,
+    RADIUS_D,
+    REVOLUTE,
+    SIN_ALPHA,
+    VEC,
+)
+
+# Sines and cosines nearer than this to 0 or 1 are rounding of a right angle.
+ROUNDING = 1e-15
+# A number known to the compiler, or the name of a variable, perhaps with a minus in front.
+Term = float | str
+
+HEADER = '''"""Points of one arm, written out from its Denavit-Hartenberg rows."""
+
+from numba.core.types import float64, int64
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.jit import kernel, OUT_VEC, VEC
+from rrth_planner.kernels.kinematics import sine_cosine
+
+
+@kernel(int64(VEC, float64, OUT_VEC, int64))
+def chain(q, ray_length, points, at):
+    angles, sines, cosines = scratch.floats({room}), scratch.floats({room}), scratch.floats({room})
+'''
+
+# All angles at once: the compiler makes vectors of them.
+ALL_ANGLES = """    for i in range({room}):
+        sines[i], cosines[i] = sine_cosine(angles[i])
+"""
+
+
+@kernel(int64(VEC, float64, OUT_VEC, int64))
+def no_chain(q, ray_length, points, at):
+    """Stand in for the chain where the robot is a point: it has no bars."""
+    return 0
+
+
+NO_CHAIN = first_class(no_chain)
+_COMPILED: dict[str, Any] = {}
+
+
+class _Source:
+    """Lines of a straight-line program that leaves out what is 0, 1 or constant."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.n_names = 0
+
+    def let(self, expression: str) -> str:
+        """Return the name of a new variable with that value."""
+        self.n_names += 1
+        name = f'v{self.n_names}'
+        self.lines.append(f'    {name} = {expression}')
+        return name
+
+    def total(self, *products: tuple[Term, Term]) -> Term:
+        """Return the sum of some products."""
+        constant, parts = 0.0, []
+        for left, right in products:
+            if isinstance(left, float) and isinstance(right, float):
+                constant += left * right
+            elif isinstance(left, float) or isinstance(right, float):
+                factor, name = (left, right) if isinstance(left, float) else (right, left)
+                if factor != 0.0:
+                    parts.append(
+                        {1.0: f'{name}', -1.0: f'-({name})'}.get(
+                            float(factor), f'{factor!r} * {name}'
+                        )
+                    )
+            else:
+                parts.append(f'{left} * {right}')
+        if not parts:
+            return constant
+        if constant != 0.0:
+            parts.append(repr(constant))
+        if len(parts) == 1 and parts[0].isidentifier():
+            return parts[0]
+        return self.let(' + '.join(parts))
+
+
+def _snapped(value: float) -> float:
+    for exact in (0.0, 1.0, -1.0):
+        if abs(value - exact) < ROUNDING:
+            return exact
+    return value
+
+
+def _turned(sine: Term, cosine: Term, quarters: int) -> tuple[Term, Term]:
+    """Return sine and cosine of an angle that is some quarter turns further on."""
+    for _ in range(quarters % 4):
+        sine, cosine = cosine, f'-{sine}' if isinstance(sine, str) else -sine
+        cosine = cosine.removeprefix('--') if isinstance(cosine, str) else cosine
+    return sine, cosine
+
+
+def chain_source(rows: Any) -> str:
+    """
+    Return the text of the module whose kernel `chain` writes the bars of an arm.
+
+    rows (dof + 1, >= 8): DH rows, columns as in `jit`; Craig's T = Rx(alpha) Tx(a) Rz(theta)
+    Tz(d) each.
+    The kernel `chain(q, ray_length, points, at)` writes four numbers a point from points[at] on:
+    x, y, z in the arm's base frame [m], and the radius of the bar that ends there [m]; first the
+    start of the first bar. It returns the number of bars.
+    """
+    source = _Source()
+    p: list[Term] = [0.0, 0.0, 0.0]
+    x: list[Term] = [1.0, 0.0, 0.0]
+    y: list[Term] = [0.0, 1.0, 0.0]
+    z: list[Term] = [0.0, 0.0, 1.0]
+    angles: list[str] = []
+    written = 0
+
+    def write(radius: float) -> None:
+        nonlocal written
+        for k, value in enumerate((*p, radius)):
+            source.lines.append(f'    points[at + {4 * written + k}] = {value}')
+        written += 1
+
+    for i, row in enumerate(rows):
+        is_last = i == len(rows) - 1
+        if written == 0 and row[RADIUS_A] != NO_BAR:
+            write(0.0)
+        p = [source.total((1.0, p[k]), (float(row[A]), x[k])) for k in range(3)]
+        if row[RADIUS_A] != NO_BAR:
+            write(float(row[RADIUS_A]))
+        ca, sa = _snapped(float(row[COS_ALPHA])), _snapped(float(row[SIN_ALPHA]))
+        m = [source.total((ca, y[k]), (sa, z[k])) for k in range(3)]
+        z = [source.total((ca, z[k]), (-sa, y[k])) for k in range(3)]
+        quarters = float(row[OFFSET]) / (0.5 * math.pi)
+        is_square = abs(quarters - round(quarters)) < 1e-14
+        sine: Term
+        cosine: Term
+        if not is_last and row[KIND] == REVOLUTE:
+            n = len(angles)
+            shift = '' if is_square else f' + {float(row[OFFSET])!r}'
+            angles.append(f'q[{i}]{shift}')
+            source.lines.append(f'    s{i}, c{i} = sines[{n}], cosines[{n}]')
+            sine, cosine = _turned(f's{i}', f'c{i}', round(quarters) if is_square else 0)
+        elif is_square:
+            sine, cosine = _turned(0.0, 1.0, round(quarters))
+        else:
+            sine, cosine = math.sin(row[OFFSET]), math.cos(row[OFFSET])
+        minus = -sine if isinstance(sine, float) else sine[1:] if sine[0] == '-' else f'-{sine}'
+        x, y = (
+            [source.total((cosine, x[k]), (sine, m[k])) for k in range(3)],
+            [source.total((cosine, m[k]), (minus, x[k])) for k in range(3)],
+        )
+        d: Term = float(row[D])
+        if is_last:
+            d = 'ray_length'
+        elif row[KIND] == PRISMATIC:
+            d = source.let(f'q[{i}] + {d!r}')
+        if written == 0 and row[RADIUS_D] != NO_BAR:
+            write(0.0)
+        p = [source.total((1.0, p[k]), (d, z[k])) for k in range(3)]
+        if row[RADIUS_D] != NO_BAR:
+            write(float(row[RADIUS_D]))
+    # Whole vectors of the machine, the rest of the last one filled with zeros.
+    room = -(-max(1, len(angles)) // 4) * 4
+    angles += ['0.0'] * (room - len(angles))
+    given = ''.join(f'    angles[{n}] = {angle}\n' for n, angle in enumerate(angles))
+    return (
+        HEADER.format(room=room)
+        + given
+        + ALL_ANGLES.format(room=room)
+        + '\n'.join([*source.lines, f'    return {written - 1}', ''])
+    )
+
+
+def chain_of(rows: Any) -> Any:
+    """
+    Return the compiled `chain` of an arm, kept from process to process.
+
+    rows: as in `chain_source`.
+    """
+    text = chain_source(rows)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    if digest not in _COMPILED:
+        name = f'chain_{digest}'
+        space: dict[str, Any] = {'__name__': f'rrth_planner.kernels.{name}'}
+        if CACHE_FOLDER is None:
+            exec(compile(text, f'<{name}>', 'exec'), space)  # noqa: S102
+        else:
+            space = vars(_module(CACHE_FOLDER / f'{name}.py', text))
+        _COMPILED[digest] = first_class(space['chain'])
+    return _COMPILED[digest]
+
+
+def _module(file: Path, text: str) -> Any:
+    """Return the module of a file that is written if it is not there."""
+    # numba keeps compiled code by the file's path and time, so it is written once.
+    if not file.exists():
+        draft = file.with_suffix(f'.{os.getpid()}')
+        draft.write_text(text, encoding='utf-8')
+        draft.replace(file)
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # What numba kept of its kernels looks their module up by name.
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
