@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The goal manifold of an arm: the configurations whose ray meets a target."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +9,13 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import pointing
+from rrth_planner.kernels import jit, pointing
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
 # Draws of the free joints: a few give good postures at once; many, before none is said to be free.
 FEW, MANY = 128, 4096
+SLIDE_GOAL = jit.first_class(pointing.slide_goal)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -106,31 +106,6 @@ def goal_configurations(
     )
 
 
-def goal_slider(
-    arm: ArmModel, goal: PointingGoal, world: World
-) -> Callable[[Array, int, float], float]:
-    """Return the `slide_goal` of a PlanningProblem for a pointing goal."""
-    target = target_in_mount(arm, goal)
-
-    def slide(path: Array, n_waypoints: int, finest: float) -> float:
-        return float(
-            pointing.slide_goal(
-                world.edge_check,
-                world.resolution,
-                world.chain,
-                world.robot,
-                world.obstacles,
-                world.bounds,
-                target,
-                path,
-                n_waypoints,
-                finest,
-            )
-        )
-
-    return slide
-
-
 def pointing_problem(
     arm: ArmModel, goal: PointingGoal, world: World, q_start: Array, goals: GoalSet
 ) -> PlanningProblem:
@@ -139,7 +114,8 @@ def pointing_problem(
         world=world,
         q_start=q_start,
         q_goals=goals.q_goals,
-        slide_goal=goal_slider(arm, goal, world),
+        slide_goal=SLIDE_GOAL,
+        target=target_in_mount(arm, goal),
     )
 
 

@@ -23,12 +23,16 @@ class Deadline:
 
     def __init__(self, time_limit: float, should_stop: Callable[[], bool]) -> None:
         """Start the clock."""
-        self._start = time.perf_counter()
+        self.start = time.perf_counter()
         self._time_limit, self._should_stop = time_limit, should_stop
 
     def elapsed(self) -> float:
         """Return the time since the plan began [s]."""
-        return time.perf_counter() - self._start
+        return time.perf_counter() - self.start
+
+    def within(self, span: float) -> float:
+        """Return the time a span from now, or the end of the plan if that comes first [s]."""
+        return min(time.perf_counter() + span, self.start + self._time_limit)
 
     def status(self) -> PlanStatus | None:
         """Return why planning must end now, or None."""

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels import reuse, rrt, tree
+from rrth_planner.kernels import reuse, rrt, rrt_h, tree
 from rrth_planner.options import RRTHOptions, TreeOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.result import PlanResult, Tree
 from rrth_planner.status import PlanStatus
+from rrth_planner.workspace import MAX_NODES, Workspace, workspace
 
-MAX_WAYPOINTS = 4096
 # Draws between two looks at the clock.
 BATCH = 250
-# Nodes that a tree has room for, at most.
-MAX_NODES = 200_000
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -117,36 +115,21 @@ def grow(
         if isinstance(options, RRTHOptions)
         else (0.0, 0, 0.0)
     )
-    capacity = min(2 * budget, MAX_NODES) + len(roots) + sum(len(t.nodes) for t in previous) + 2
-    tree_q = np.empty((2, capacity, dof))
-    parents = np.empty((2, capacity), dtype=np.int64)
-    parents[0, 0] = parents[1, : len(roots)] = -1
-    sizes = np.array([1, len(roots), 0, len(roots)], dtype=np.int64)
-    tree_q[0, 0] = problem.q_start
-    tree_q[1, : len(roots)] = roots
-    meeting = np.full(2, -1, dtype=np.int64)
-    seam = (world.resolution, world.chain, world.robot, world.obstacles)
-    for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
-        sizes[side] = reuse.transplant(
-            world.edge_check,
-            *seam,
-            old.nodes,
-            old.parents,
-            sizes[side],
-            tree_q[side],
-            parents[side],
-        )
-    if previous:
-        reuse.join(world.edge_check, *seam, options.step_size, tree_q, sizes, meeting)
+    room = workspace(dof, room_for(options, len(roots), previous, budget))
     drawn, stopped = 0, None
-    while meeting[0] < 0 and drawn < budget and sizes[:2].max() < capacity - 1:
+    tree_q, parents, sizes = room.tree_q[0], room.parents[0], room.sizes[0]
+    plant(problem, roots, options, room, previous)
+    while room.meeting[0] < 0 and drawn < budget and sizes[:2].max() < tree_q.shape[1] - 1:
         stopped = deadline.status()
         if stopped is not None:
             break
         drawn += rrt.advance(
             world.edge_check,
             world.free_radius,
-            *seam,
+            world.resolution,
+            world.chain,
+            world.robot,
+            world.obstacles,
             world.bounds,
             options.step_size,
             options.clearance_gain,
@@ -162,19 +145,49 @@ def grow(
             tree_q,
             parents,
             sizes,
-            meeting,
+            room.meeting,
         )
     waypoints = None
-    if meeting[0] >= 0:
-        path = np.empty((MAX_WAYPOINTS, dof))
-        n = tree.trace_path(tree_q, parents, meeting[0], meeting[1], path)
+    if room.meeting[0] >= 0:
+        path = room.paths[rrt_h.WORK]
+        n = tree.trace_path(tree_q, parents, room.meeting[0], room.meeting[1], path)
         waypoints = path[:n].copy() if n else None
     return Growth(
-        waypoints=waypoints,
-        n_samples=drawn,
-        stopped=stopped,
-        trees=tuple(
-            Tree(nodes=tree_q[side, : sizes[side]], parents=parents[side, : sizes[side]])
-            for side in range(2 if options.is_bidirectional else 1)
-        ),
+        waypoints=waypoints, n_samples=drawn, stopped=stopped, trees=grown_trees(room, 0, options)
+    )
+
+
+def room_for(options: TreeOptions, n_roots: int, previous: tuple[Tree, ...], budget: int) -> int:
+    """Return how many nodes a tree may come to have."""
+    return min(2 * budget, MAX_NODES) + n_roots + sum(len(t.nodes) for t in previous) + 2
+
+
+def plant(
+    problem: PlanningProblem,
+    roots: Array,
+    options: TreeOptions,
+    room: Workspace,
+    previous: tuple[Tree, ...],
+) -> None:
+    """Begin the trees of a growth, with what is still free of the previous ones."""
+    world, tree_q, parents, sizes = problem.world, room.tree_q[0], room.parents[0], room.sizes[0]
+    rrt_h.plant(roots, problem.q_start, len(roots), tree_q, parents, sizes)
+    if not previous:
+        return
+    seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
+    for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
+        sizes[side] = reuse.transplant(
+            *seam, old.nodes, old.parents, sizes[side], tree_q[side], parents[side]
+        )
+    reuse.join(*seam, options.step_size, tree_q, sizes, room.meeting)
+
+
+def grown_trees(room: Workspace, pair: int, options: TreeOptions) -> tuple[Tree, ...]:
+    """Return the trees of one pair as they are."""
+    return tuple(
+        Tree(
+            nodes=room.tree_q[pair, side, : room.sizes[pair, side]],
+            parents=room.parents[pair, side, : room.sizes[pair, side]],
+        )
+        for side in range(2 if options.is_bidirectional else 1)
     )

@@ -3,16 +3,15 @@
 """What a planner is asked: a world, where to start, and where it may end."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import RrthError
+from rrth_planner.kernels import jit, tree
 from rrth_planner.world import World
 
-
-def _stay(path: Array, n_waypoints: int, finest: float) -> float:
-    """Leave the goal where it is."""
-    return 0.0
+STAY = jit.first_class(tree.stay)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -27,17 +26,19 @@ class PlanningProblem:
         A valid configuration [rad].
     q_goals : array_like, shape (n, dof)
         Valid configurations, nearest to q_start first [rad].
-    slide_goal : callable
-        (path buffer, number of waypoints, finest step [rad]) -> gain [rad]: moves the last
-        waypoint along the goal manifold in place, by edges that the world allows. Default: the
-        goals are points.
+    slide_goal : compiled function
+        The seam `kernels.jit.SLIDE`: moves the last waypoint along the goal manifold in place, by
+        edges that the world allows. Default: the goals are points.
+    target : ndarray, shape (3,)
+        What `slide_goal` keeps aiming at, in the arm's base frame [m].
 
     """
 
     world: World
     q_start: Array
     q_goals: Array
-    slide_goal: Callable[[Array, int, float], float] = _stay
+    slide_goal: Callable[..., float] = STAY
+    target: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Validate and freeze."""

@@ -22,6 +22,7 @@ READ_INTS = types.Array(int64, 1, 'C', readonly=True)
 OUT_VEC = types.Array(float64, 1, 'C')
 OUT_MAT = types.Array(float64, 2, 'C')
 OUT_CUBE = types.Array(float64, 3, 'C')
+OUT_CUBES = types.Array(float64, 4, 'C')
 OUT_FLAGS = types.Array(types.int8, 1, 'C')
 OUT_INTS = types.Array(int64, 1, 'C')
 OUT_INT_MAT = types.Array(int64, 2, 'C')
@@ -38,6 +39,16 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, CHAIN, MAT, MAT
 # A second one: (q, chain, robot, obstacles) -> radius of a ball of joint space round q that is
 # free [rad].
 FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
+
+# A third: (edge check, resolution, chain, robot, obstacles, path, n, spacings) -> number of
+# waypoints of the path, made shorter in place.
+SHORTEN = types.FunctionType(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
+
+# A fourth: (edge check, resolution, chain, robot, obstacles, bounds, target, path, n, finest) ->
+# by how much the path got shorter as its last waypoint moved along the goal manifold.
+SLIDE = types.FunctionType(
+    float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64)
+)
 
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.

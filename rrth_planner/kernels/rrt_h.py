@@ -1,164 +1,334 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H: the three steps that pull a path taut (Zou et al. 2024, section 2, corrected)."""
+"""RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
 
-from numba.core.types import boolean, float64, int64, void
-import numpy as np
+import math
+
+from numba.core.types import float64, int64, npy_rng, void
+from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
     CHAIN,
     EDGE_CHECK,
+    FREE_RADIUS,
     kernel,
     MAT,
+    N_GOALS,
+    OUT_CUBE,
+    OUT_CUBES,
+    OUT_INT_CUBE,
+    OUT_INT_MAT,
+    OUT_INTS,
     OUT_MAT,
+    SHORTEN,
+    SLIDE,
     VEC,
 )
-from rrth_planner.kernels.tree import distance, path_length
+from rrth_planner.kernels.rrt import advance as grow
+from rrth_planner.kernels.taut import TAUT
+from rrth_planner.kernels.tree import distance, path_length, trace_path
 
-# What a gain in length must exceed to be worth another round, relative.
-TAUT = 1e-5
+# Entries of `settings`: those of the options, and by when improvement ends [s].
+STEP, GAIN, BIAS, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(7)
+MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, SPACINGS = range(7, 12)
+# Entries of `state`: growths begun, whether one is on its way, draws of it and in all, waypoints
+# of the best and of the first raw path, points of the club, rows of the history, in which of the
+# two pairs of trees growth goes on, which one led to the best path, why the search ended.
+BEGUN, GROWING, DRAWN, SAMPLES, N_BEST, N_RAW, N_CLUB, N_HISTORY, PAIR, BEST_PAIR, END = range(11)
+STATE_SIZE = 11
+# Values of state[END]: not yet, all growths done, no path found, no time left to improve.
+RUNNING, DONE, FAILED, CLOCK = range(4)
+# Rows of `paths`.
+WORK, BEST, RAW = range(3)
+# Columns of `history`: cost of the best path [rad], draws until then, time [s].
+COST, DRAWS, TIME = range(3)
+# Roots of the goal tree: more goals than this only slow its nearest-neighbour search.
+MAX_ROOTS = 64
+# Draws between two looks at the clock.
+BATCH = 100
+# Finest step of a goal along its manifold [rad].
+FINEST_SLIDE = 2e-3
+MAX_SLIDES = 100
 
 
-@kernel(int64(OUT_MAT, int64, int64))
-def remove_waypoint(path, n, i):
-    """Remove waypoint i; return how many are left."""
-    for j in range(i, n - 1):
-        path[j] = path[j + 1]
-    return n - 1
-
-
-@kernel(void(OUT_MAT, int64))
-def reverse_path(path, n):
-    """Reverse the first n waypoints."""
-    for i in range(n // 2):
-        for k in range(path.shape[1]):
-            path[i, k], path[n - 1 - i, k] = path[n - 1 - i, k], path[i, k]
-
-
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
-    """
-    Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 as far as P_i sees it.
-
-    Where P_i sees all of the segment, P_i+1 goes and P_i stays for the next pair (moving on, as
-    printed, leaves corners). The farthest P_T still seen is found by bisection, to `spacing`.
-    Step 2 is the same on the reversed path.
-    """
-    dof = path.shape[1]
-    q_seen, q_try = np.empty(dof), np.empty(dof)
-    i = 0
-    while i + 2 < n:
-        if is_edge_free(path[i], path[i + 2], resolution, chain, robot, obstacles):
-            n = remove_waypoint(path, n, i + 1)
-            continue
-        length = distance(path[i + 1], path[i + 2])
-        low, high = 0.0, 1.0
-        while (high - low) * length > spacing:
-            share = 0.5 * (low + high)
-            for k in range(dof):
-                q_try[k] = path[i + 1, k] + share * (path[i + 2, k] - path[i + 1, k])
-            # The rest of the old segment stays an edge, so it is proven again on its own.
-            if is_edge_free(path[i], q_try, resolution, chain, robot, obstacles) and is_edge_free(
-                q_try, path[i + 2], resolution, chain, robot, obstacles
-            ):
-                low = share
-                q_seen[:] = q_try
-            else:
-                high = share
-        if low > 0.0:
-            path[i + 1] = q_seen
-        i += 1
+@kernel(int64(EDGE_CHECK, SHORTEN, SLIDE, CHAIN, float64, MAT, MAT, MAT, VEC, VEC, OUT_MAT, int64))
+def finish(
+    is_edge_free,
+    shorten,
+    slide_goal,
+    chain,
+    resolution,
+    robot,
+    obstacles,
+    bounds,
+    target,
+    spacings,
+    path,
+    n,
+):
+    """Pull a path taut and slide its goal, in turn, until nothing is gained; return its size."""
+    n = shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings)
+    for _ in range(MAX_SLIDES):
+        gain = slide_goal(
+            is_edge_free,
+            resolution,
+            chain,
+            robot,
+            obstacles,
+            bounds,
+            target,
+            path,
+            n,
+            FINEST_SLIDE,
+        )
+        if gain < TAUT:
+            break
+        n = shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings)
     return n
 
 
-@kernel(boolean(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC, VEC))
-def is_corner_free(is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out):
-    """Return whether waypoint i may be replaced by the chord q_in -> q_out: all three edges."""
-    return (
-        is_edge_free(q_in, q_out, resolution, chain, robot, obstacles)
-        and is_edge_free(path[i - 1], q_in, resolution, chain, robot, obstacles)
-        and is_edge_free(q_out, path[i + 1], resolution, chain, robot, obstacles)
+@kernel(void(OUT_CUBE, int64, int64, OUT_INTS, OUT_MAT))
+def keep_best(paths, n, pair, state, history):
+    """Keep the path at work as the best one, and when it was found."""
+    for i in range(n):
+        for k in range(paths.shape[2]):
+            paths[BEST, i, k] = paths[WORK, i, k]
+    state[N_BEST], state[BEST_PAIR] = n, pair
+    row = state[N_HISTORY]
+    if row < history.shape[0]:
+        history[row, COST] = path_length(paths[BEST], n)
+        history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
+        state[N_HISTORY] += 1
+
+
+@kernel(
+    void(
+        EDGE_CHECK,
+        SHORTEN,
+        SLIDE,
+        CHAIN,
+        float64,
+        MAT,
+        MAT,
+        MAT,
+        VEC,
+        VEC,
+        MAT,
+        VEC,
+        OUT_CUBE,
+        OUT_INTS,
+        OUT_MAT,
     )
-
-
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+)
+def go_straight(
+    is_edge_free,
+    shorten,
+    slide_goal,
+    chain,
+    resolution,
+    robot,
+    obstacles,
+    bounds,
+    target,
+    q_start,
+    goals,
+    settings,
+    paths,
+    state,
+    history,
+):
     """
-    Do step 3 of RRT-H in place, from both sides: replace each corner by its largest free chord.
+    Take the straight edge to the nearest goal that has a free one as the best path.
 
-    The chord's two ends lie equally far from the corner, then the one on the longer side moves on
-    alone. Bisection to half of `spacing`, the paper's k: a shorter cut is not worth a waypoint.
+    goals (n, dof): nearest to the start first, so no path to a later one can be shorter.
     """
-    dof = path.shape[1]
-    q_in, q_out = np.empty(dof), np.empty(dof)
-    share = np.empty(2)
-    lengths = np.empty(2)
-    i = 1
-    while i < n - 1:
-        lengths[0], lengths[1] = distance(path[i - 1], path[i]), distance(path[i], path[i + 1])
-        shorter = min(lengths[0], lengths[1])
-        if shorter < 1e-9:
-            n = remove_waypoint(path, n, i)
-            continue
-        # Phase 0 moves both ends, phases 1 and 2 one of them.
-        share[0] = share[1] = 0.0
-        for phase in range(3):
-            low = 0.0 if phase == 0 else share[phase - 1]
-            high, unit = 1.0, shorter if phase == 0 else lengths[phase - 1]
-            at = 0.5 * (low + high) if phase == 0 else high
-            while (high - low) * unit > 0.5 * spacing:
-                s_in = at * shorter / lengths[0] if phase == 0 else share[0]
-                s_out = at * shorter / lengths[1] if phase == 0 else share[1]
-                if phase == 1:
-                    s_in = at
-                elif phase == 2:
-                    s_out = at
-                for k in range(dof):
-                    q_in[k] = path[i, k] + s_in * (path[i - 1, k] - path[i, k])
-                    q_out[k] = path[i, k] + s_out * (path[i + 1, k] - path[i, k])
-                if is_corner_free(
-                    is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out
-                ):
-                    low = at
-                    share[0], share[1] = s_in, s_out
-                else:
-                    high = at
-                if low == high:
-                    break
-                at = 0.5 * (low + high)
-            if phase == 0 and share[0] * lengths[0] < 0.5 * spacing:
-                break
-        if share[0] == 0.0 or n >= path.shape[0]:
-            i += 1
-            continue
-        for k in range(dof):
-            q_in[k] = path[i, k] + share[0] * (path[i - 1, k] - path[i, k])
-            q_out[k] = path[i, k] + share[1] * (path[i + 1, k] - path[i, k])
-        for j in range(n, i + 1, -1):
-            path[j] = path[j - 1]
-        path[i], path[i + 1] = q_in, q_out
+    for i in range(goals.shape[0]):
+        if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
+            for k in range(goals.shape[1]):
+                paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
+            n = finish(
+                is_edge_free,
+                shorten,
+                slide_goal,
+                chain,
+                resolution,
+                robot,
+                obstacles,
+                bounds,
+                target,
+                settings[SPACINGS:],
+                paths[WORK],
+                2,
+            )
+            keep_best(paths, n, 0, state, history)
+            break
+
+
+@kernel(int64(MAT, VEC, float64))
+def count_useful(goals, q_start, cost):
+    """Return how many of the goals, nearest first, a path shorter than that can lead to."""
+    n = 0
+    while n < min(goals.shape[0], MAX_ROOTS):
+        if distance(goals[n], q_start) >= cost * (1.0 - TAUT):
+            break
         n += 1
-        i += 2
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, int64))
-def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, max_rounds):
-    """
-    Repeat the three steps until the path gets no shorter; return its number of waypoints.
+@kernel(void(MAT, VEC, int64, OUT_CUBE, OUT_INT_MAT, OUT_INTS))
+def plant(goals, q_start, n_goals, tree_q, parents, sizes):
+    """Begin the tree of the start, and that of the first n_goals goals."""
+    sizes[0], sizes[1], sizes[N_GOALS] = 1, n_goals, n_goals
+    tree_q[0, 0] = q_start
+    parents[0, 0] = -1
+    for i in range(n_goals):
+        tree_q[1, i] = goals[i]
+        parents[1, i] = -1
 
-    Every edge that enters the path has been proven by the edge check; the path never gets longer.
+
+@kernel(void(OUT_CUBE, int64, OUT_MAT, OUT_INTS))
+def remember(paths, n, club, state):
+    """Add the inner points of a raw path to the path club, and keep the first raw path."""
+    if state[N_RAW] == 0:
+        for i in range(n):
+            for k in range(paths.shape[2]):
+                paths[RAW, i, k] = paths[WORK, i, k]
+        state[N_RAW] = n
+    for i in range(1, n - 1):
+        if state[N_CLUB] < club.shape[0]:
+            for k in range(paths.shape[2]):
+                club[state[N_CLUB], k] = paths[WORK, i, k]
+            state[N_CLUB] += 1
+
+
+@kernel(
+    void(
+        EDGE_CHECK,
+        FREE_RADIUS,
+        SHORTEN,
+        SLIDE,
+        CHAIN,
+        float64,
+        MAT,
+        MAT,
+        MAT,
+        VEC,
+        VEC,
+        MAT,
+        VEC,
+        float64,
+        npy_rng,
+        OUT_CUBES,
+        OUT_INT_CUBE,
+        OUT_INT_MAT,
+        OUT_INTS,
+        OUT_MAT,
+        OUT_CUBE,
+        OUT_INTS,
+        OUT_MAT,
+    )
+)
+def advance(
+    is_edge_free,
+    free_radius,
+    shorten,
+    slide_goal,
+    chain,
+    resolution,
+    robot,
+    obstacles,
+    bounds,
+    target,
+    q_start,
+    goals,
+    settings,
+    until,
+    rng,
+    tree_q,
+    parents,
+    sizes,
+    meeting,
+    club,
+    paths,
+    state,
+    history,
+):
     """
-    length = path_length(path, n)
-    for _ in range(max_rounds):
-        if n < 3:
+    Grow first paths and pull each taut, until state[END] says why it ended or time is `until` [s].
+
+    Growths after the first path keep away from the path club, the points of all raw paths, and
+    draw only where a shorter path can lead. tree_q (2, 2, capacity, dof): the pair of trees at
+    work and the one that led to the best path.
+    """
+    while state[END] == RUNNING:
+        cost = math.inf
+        if state[N_BEST] > 0:
+            cost = history[state[N_HISTORY] - 1, COST]
+        pair = state[PAIR]
+        if state[GROWING] == 0:
+            # The first path, unless a straight edge is one, does not count as an attempt.
+            if state[BEGUN] > 0 and state[N_BEST] == 0:
+                state[END] = FAILED
+                break
+            n_useful = count_useful(goals, q_start, cost)
+            if n_useful == 0 or state[BEGUN] >= settings[ATTEMPTS]:
+                state[END] = DONE
+                break
+            if state[N_BEST] > 0 and now() > settings[IMPROVE_UNTIL]:
+                state[END] = CLOCK
+                break
+            plant(goals, q_start, n_useful, tree_q[pair], parents[pair], sizes[pair])
+            state[GROWING], state[DRAWN], meeting[0] = 1, 0, -1
+            state[BEGUN] += 1
+        budget = int64(settings[MAX_SAMPLES if state[N_BEST] == 0 else CLUB_BUDGET])
+        if meeting[0] < 0:
+            n_drawn = grow(
+                is_edge_free,
+                free_radius,
+                resolution,
+                chain,
+                robot,
+                obstacles,
+                bounds,
+                settings[STEP],
+                settings[GAIN],
+                settings[BIAS],
+                settings[TWO_TREES] != 0.0,
+                cost,
+                club[: state[N_CLUB]],
+                settings[CLUB_RADIUS],
+                int64(settings[CLUB_COUNT]),
+                settings[CLUB_PROBABILITY],
+                min(BATCH, budget - state[DRAWN]),
+                rng,
+                tree_q[pair],
+                parents[pair],
+                sizes[pair],
+                meeting,
+            )
+            state[DRAWN] += n_drawn
+            state[SAMPLES] += n_drawn
+        if meeting[0] >= 0:
+            state[GROWING] = 0
+            n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
+            remember(paths, n, club, state)
+            n = finish(
+                is_edge_free,
+                shorten,
+                slide_goal,
+                chain,
+                resolution,
+                robot,
+                obstacles,
+                bounds,
+                target,
+                settings[SPACINGS:],
+                paths[WORK],
+                n,
+            )
+            if n > 0 and path_length(paths[WORK], n) < cost:
+                keep_best(paths, n, pair, state, history)
+                state[PAIR] = 1 - pair
+        elif state[DRAWN] >= budget or max(sizes[pair, 0], sizes[pair, 1]) >= tree_q.shape[2] - 1:
+            state[GROWING] = 0
+        if now() > until:
             break
-        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
-        reverse_path(path, n)
-        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
-        reverse_path(path, n)
-        n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
-        shorter = path_length(path, n)
-        if shorter > length * (1.0 - TAUT):
-            break
-        length = shorter
-    return n

@@ -5,7 +5,7 @@
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
-from rrth_planner.kernels.rrt_h import remove_waypoint, reverse_path
+from rrth_planner.kernels.taut import remove_waypoint, reverse_path
 from rrth_planner.kernels.tree import distance
 
 MAX_CUTS = 1000
@@ -109,9 +109,14 @@ def cut_corners(
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
-def shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least):
-    """Do steps 1, 2 and 3 once each, in place; return the number of waypoints."""
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
+def shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings):
+    """
+    Do steps 1, 2 and 3 once each, in place; return the number of waypoints.
+
+    spacings (3,): k of the paper, distance between points P_T, between points P_C [rad].
+    """
+    least, targets, checks = spacings[0], spacings[1], spacings[2]
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)

@@ -8,7 +8,7 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 import numpy as np
-from rrth_planner.kernels.jit import OUT_POOL, OUT_VEC
+from rrth_planner.kernels.jit import OUT_INTS, OUT_POOL, OUT_VEC
 
 
 def _on_stack(array: Any) -> Any:
@@ -50,4 +50,4 @@ if config.DISABLE_JIT:
         return np.empty(size, np.int32)
 
 else:
-    floats, ints = _on_stack(OUT_VEC), _on_stack(OUT_POOL)
+    floats, ints, longs = _on_stack(OUT_VEC), _on_stack(OUT_POOL), _on_stack(OUT_INTS)

@@ -7,6 +7,7 @@ import math
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels.jit import (
     CHAIN,
+    EDGE_CHECK,
     FREE_RADIUS,
     kernel,
     MAT,
@@ -56,6 +57,12 @@ def steer(q_near, q_towards, step_size, q_new):
     share = 1.0 if length <= step_size else step_size / length
     for k in range(q_new.shape[0]):
         q_new[k] = q_towards[k] if share == 1.0 else q_near[k] + share * (q_towards[k] - q_near[k])
+
+
+@kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))
+def stay(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path, n, finest):
+    """Leave the last waypoint where it is (`SLIDE`): the goal is a point."""
+    return 0.0
 
 
 @kernel(float64(FREE_RADIUS, CHAIN, MAT, MAT, VEC, float64, float64))

@@ -1,0 +1,167 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The three steps of RRT-H that pull a path taut (Zou et al. 2024, section 2, corrected)."""
+
+from numba.core.types import boolean, float64, int64, void
+import numpy as np
+from rrth_planner.kernels.jit import (
+    CHAIN,
+    EDGE_CHECK,
+    kernel,
+    MAT,
+    OUT_MAT,
+    VEC,
+)
+from rrth_planner.kernels.tree import distance, path_length
+
+# What a gain in length must exceed to be worth another round, relative.
+TAUT = 1e-5
+# Rounds of the three steps; they stop by themselves when nothing is gained.
+MAX_ROUNDS = 100
+
+
+@kernel(int64(OUT_MAT, int64, int64))
+def remove_waypoint(path, n, i):
+    """Remove waypoint i; return how many are left."""
+    for j in range(i, n - 1):
+        path[j] = path[j + 1]
+    return n - 1
+
+
+@kernel(void(OUT_MAT, int64))
+def reverse_path(path, n):
+    """Reverse the first n waypoints."""
+    for i in range(n // 2):
+        for k in range(path.shape[1]):
+            path[i, k], path[n - 1 - i, k] = path[n - 1 - i, k], path[i, k]
+
+
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
+def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+    """
+    Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 as far as P_i sees it.
+
+    Where P_i sees all of the segment, P_i+1 goes and P_i stays for the next pair (moving on, as
+    printed, leaves corners). The farthest P_T still seen is found by bisection, to `spacing`.
+    Step 2 is the same on the reversed path.
+    """
+    dof = path.shape[1]
+    q_seen, q_try = np.empty(dof), np.empty(dof)
+    i = 0
+    while i + 2 < n:
+        if is_edge_free(path[i], path[i + 2], resolution, chain, robot, obstacles):
+            n = remove_waypoint(path, n, i + 1)
+            continue
+        length = distance(path[i + 1], path[i + 2])
+        low, high = 0.0, 1.0
+        while (high - low) * length > spacing:
+            share = 0.5 * (low + high)
+            for k in range(dof):
+                q_try[k] = path[i + 1, k] + share * (path[i + 2, k] - path[i + 1, k])
+            # The rest of the old segment stays an edge, so it is proven again on its own.
+            if is_edge_free(path[i], q_try, resolution, chain, robot, obstacles) and is_edge_free(
+                q_try, path[i + 2], resolution, chain, robot, obstacles
+            ):
+                low = share
+                q_seen[:] = q_try
+            else:
+                high = share
+        if low > 0.0:
+            path[i + 1] = q_seen
+        i += 1
+    return n
+
+
+@kernel(boolean(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC, VEC))
+def is_corner_free(is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out):
+    """Return whether waypoint i may be replaced by the chord q_in -> q_out: all three edges."""
+    return (
+        is_edge_free(q_in, q_out, resolution, chain, robot, obstacles)
+        and is_edge_free(path[i - 1], q_in, resolution, chain, robot, obstacles)
+        and is_edge_free(q_out, path[i + 1], resolution, chain, robot, obstacles)
+    )
+
+
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
+def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+    """
+    Do step 3 of RRT-H in place, from both sides: replace each corner by its largest free chord.
+
+    The chord's two ends lie equally far from the corner, then the one on the longer side moves on
+    alone. Bisection to half of `spacing`, the paper's k: a shorter cut is not worth a waypoint.
+    """
+    dof = path.shape[1]
+    q_in, q_out = np.empty(dof), np.empty(dof)
+    share = np.empty(2)
+    lengths = np.empty(2)
+    i = 1
+    while i < n - 1:
+        lengths[0], lengths[1] = distance(path[i - 1], path[i]), distance(path[i], path[i + 1])
+        shorter = min(lengths[0], lengths[1])
+        if shorter < 1e-9:
+            n = remove_waypoint(path, n, i)
+            continue
+        # Phase 0 moves both ends, phases 1 and 2 one of them.
+        share[0] = share[1] = 0.0
+        for phase in range(3):
+            low = 0.0 if phase == 0 else share[phase - 1]
+            high, unit = 1.0, shorter if phase == 0 else lengths[phase - 1]
+            at = 0.5 * (low + high) if phase == 0 else high
+            while (high - low) * unit > 0.5 * spacing:
+                s_in = at * shorter / lengths[0] if phase == 0 else share[0]
+                s_out = at * shorter / lengths[1] if phase == 0 else share[1]
+                if phase == 1:
+                    s_in = at
+                elif phase == 2:
+                    s_out = at
+                for k in range(dof):
+                    q_in[k] = path[i, k] + s_in * (path[i - 1, k] - path[i, k])
+                    q_out[k] = path[i, k] + s_out * (path[i + 1, k] - path[i, k])
+                if is_corner_free(
+                    is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out
+                ):
+                    low = at
+                    share[0], share[1] = s_in, s_out
+                else:
+                    high = at
+                if low == high:
+                    break
+                at = 0.5 * (low + high)
+            if phase == 0 and share[0] * lengths[0] < 0.5 * spacing:
+                break
+        if share[0] == 0.0 or n >= path.shape[0]:
+            i += 1
+            continue
+        for k in range(dof):
+            q_in[k] = path[i, k] + share[0] * (path[i - 1, k] - path[i, k])
+            q_out[k] = path[i, k] + share[1] * (path[i + 1, k] - path[i, k])
+        for j in range(n, i + 1, -1):
+            path[j] = path[j - 1]
+        path[i], path[i + 1] = q_in, q_out
+        n += 1
+        i += 2
+    return n
+
+
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
+def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings):
+    """
+    Repeat the three steps until the path gets no shorter; return its number of waypoints.
+
+    spacings: k of the paper [rad]. Every edge that enters the path has been proven by the edge
+    check; the path never gets longer.
+    """
+    length, spacing = path_length(path, n), spacings[0]
+    for _ in range(MAX_ROUNDS):
+        if n < 3:
+            break
+        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        reverse_path(path, n)
+        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        reverse_path(path, n)
+        n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        shorter = path_length(path, n)
+        if shorter > length * (1.0 - TAUT):
+            break
+        length = shorter
+    return n
