@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arrays that a frozen value may hold."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rrth_planner.errors import RrthError
@@ -27,17 +29,23 @@ def frozen_array(
         Raised when the shape differs or an element is not a finite number.
 
     """
-    wanted = '(' + ', '.join('n' if n is None else str(n) for n in shape) + ')'
     try:
         array = np.array(value, dtype=np.float64, order='C')
     except (TypeError, ValueError) as problem:
-        raise error(f'{name}: {value!r}, expected numbers of shape {wanted} [{unit}]') from problem
+        raise error(
+            f'{name}: {value!r}, expected numbers of shape {_wanted(shape)} [{unit}]'
+        ) from problem
     fits = array.ndim == len(shape) and all(
         n is None or n == given for n, given in zip(shape, array.shape, strict=True)
     )
     if not fits:
-        raise error(f'{name}: shape {array.shape}, expected {wanted} [{unit}]')
-    if not np.isfinite(array).all():
+        raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
+    # The sum is finite where all elements are, but for a sum that overflows.
+    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')
     array.setflags(write=False)
     return array
+
+
+def _wanted(shape: tuple[int | None, ...]) -> str:
+    return '(' + ', '.join('n' if n is None else str(n) for n in shape) + ')'

@@ -8,7 +8,8 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.kernels import reuse, rrt, rrt_h, tree
-from rrth_planner.options import RRTHOptions, TreeOptions
+from rrth_planner.kernels.random import random_state
+from rrth_planner.options import GrowthOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.result import PlanResult, Tree
@@ -44,7 +45,7 @@ class Growth:
 
 def search(
     problem: PlanningProblem,
-    options: TreeOptions,
+    options: GrowthOptions,
     rng: np.random.Generator,
     deadline: Deadline,
     previous: tuple[Tree, ...],
@@ -77,7 +78,7 @@ def search(
 def grow(
     problem: PlanningProblem,
     roots: Array,
-    options: TreeOptions,
+    options: GrowthOptions,
     rng: np.random.Generator,
     deadline: Deadline,
     *,
@@ -94,7 +95,7 @@ def grow(
     problem : PlanningProblem
     roots : ndarray, shape (n, dof)
         Goals to aim for [rad].
-    options : TreeOptions
+    options : GrowthOptions
     rng : numpy.random.Generator
     deadline : Deadline
     previous : tuple of Tree
@@ -116,7 +117,7 @@ def grow(
         else (0.0, 0, 0.0)
     )
     room = workspace(dof, room_for(options, len(roots), previous, budget))
-    drawn, stopped = 0, None
+    drawn, stopped, bits = 0, None, random_state(rng)
     tree_q, parents, sizes = room.tree_q[0], room.parents[0], room.sizes[0]
     plant(problem, roots, options, room, previous)
     while room.meeting[0] < 0 and drawn < budget and sizes[:2].max() < tree_q.shape[1] - 1:
@@ -134,6 +135,7 @@ def grow(
             options.step_size,
             options.clearance_gain,
             options.goal_bias,
+            options.near_bias,
             options.is_bidirectional,
             best_cost,
             club,
@@ -141,7 +143,7 @@ def grow(
             count,
             probability,
             min(BATCH, budget - drawn),
-            rng,
+            bits,
             tree_q,
             parents,
             sizes,
@@ -157,7 +159,7 @@ def grow(
     )
 
 
-def room_for(options: TreeOptions, n_roots: int, previous: tuple[Tree, ...], budget: int) -> int:
+def room_for(options: GrowthOptions, n_roots: int, previous: tuple[Tree, ...], budget: int) -> int:
     """Return how many nodes a tree may come to have."""
     return min(2 * budget, MAX_NODES) + n_roots + sum(len(t.nodes) for t in previous) + 2
 
@@ -165,7 +167,7 @@ def room_for(options: TreeOptions, n_roots: int, previous: tuple[Tree, ...], bud
 def plant(
     problem: PlanningProblem,
     roots: Array,
-    options: TreeOptions,
+    options: GrowthOptions,
     room: Workspace,
     previous: tuple[Tree, ...],
 ) -> None:
@@ -182,7 +184,7 @@ def plant(
     reuse.join(*seam, options.step_size, tree_q, sizes, room.meeting)
 
 
-def grown_trees(room: Workspace, pair: int, options: TreeOptions) -> tuple[Tree, ...]:
+def grown_trees(room: Workspace, pair: int, options: GrowthOptions) -> tuple[Tree, ...]:
     """Return the trees of one pair as they are."""
     return tuple(
         Tree(

@@ -54,7 +54,16 @@ class TreeOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RRTOptions(TreeOptions):
+class GrowthOptions(TreeOptions):
+    """What RRT and RRT-H have in common: growth to a first path."""
+
+    near_bias: float = _option(
+        0.9, 0.0, 1.0, '-', 'chance that a draw is near an end of the path, at first'
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RRTOptions(GrowthOptions):
     """RRT (LaValle 1998), or RRT-Connect (Kuffner and LaValle 2000): the first path."""
 
 
@@ -83,7 +92,7 @@ class RRTStarSmartOptions(RRTStarOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RRTHOptions(TreeOptions):
+class RRTHOptions(GrowthOptions):
     """RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways."""
 
     corner_spacing: float = _option(

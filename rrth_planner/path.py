@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import RrthError
+from rrth_planner.kernels import tree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,4 +33,4 @@ class Path:
     @property
     def length(self) -> float:
         """Sum of the edge lengths in joint space [rad]."""
-        return float(np.linalg.norm(np.diff(self.waypoints, axis=0), axis=1).sum())
+        return float(tree.path_length(self.waypoints, len(self.waypoints)))

@@ -9,6 +9,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grown_trees, plant, room_for
 from rrth_planner.kernels import jit, rrt_h, taut
+from rrth_planner.kernels.random import random_state
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -65,6 +66,8 @@ def search(
     elif previous and settings[rrt_h.ATTEMPTS] > 0:
         plant(problem, problem.q_goals[:n_roots], options, room, previous)
         room.state[rrt_h.GROWING] = room.state[rrt_h.BEGUN] = 1
+    is_done = room.state[rrt_h.END] != rrt_h.RUNNING
+    bits = None if is_done else random_state(rng)
     while room.state[rrt_h.END] == rrt_h.RUNNING:
         stopped = deadline.status()
         if stopped is not None:
@@ -75,7 +78,7 @@ def search(
             *given,
             settings,
             deadline.within(SLICE),
-            rng,
+            bits,
             room.tree_q,
             room.parents,
             room.sizes,
@@ -96,6 +99,7 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
             options.step_size,
             options.clearance_gain,
             options.goal_bias,
+            options.near_bias,
             options.is_bidirectional,
             options.club_radius,
             options.club_count,

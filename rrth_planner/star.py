@@ -9,6 +9,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import BATCH
 from rrth_planner.kernels import informed_rrt_star, reuse, rrt_star, rrt_star_smart
+from rrth_planner.kernels.random import random_state
 from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -125,7 +126,7 @@ def search(
     radius = options.rewire_factor * optimal_radius(world.bounds)
     cost = np.inf
     history: list[tuple[float, int, float]] = []
-    drawn, stopped, is_cut = 0, None, False
+    drawn, stopped, is_cut, bits = 0, None, False, random_state(rng)
     first_time = np.inf
     while drawn < options.max_samples:
         stopped = deadline.status()
@@ -154,7 +155,7 @@ def search(
             bias,
             trees.shortened,
             len(costs),
-            rng,
+            bits,
             trees.tree_q,
             trees.links,
             trees.costs,

@@ -7,6 +7,7 @@ import math
 from numba.core.types import int64
 import numpy as np
 from rrth_planner.kernels.jit import kernel, N_GOALS
+from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
 from rrth_planner.kernels.sampling import draw_informed, draw_uniform
 
@@ -47,12 +48,12 @@ def advance(
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0
-        goal = int64(rng.random() * sizes[N_GOALS])
+        goal = int64(uniform(rng) * sizes[N_GOALS])
         history[draw] = best[0]
         if best[0] < math.inf:
             if not draw_informed(bounds, tree_q[0, 0], tree_q[1, goal], best[0], rng, q):
                 continue
-        elif rng.random() < goal_bias:
+        elif uniform(rng) < goal_bias:
             q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
         else:
             draw_uniform(bounds, rng, q)

@@ -27,6 +27,7 @@ OUT_FLAGS = types.Array(types.int8, 1, 'C')
 OUT_INTS = types.Array(int64, 1, 'C')
 OUT_INT_MAT = types.Array(int64, 2, 'C')
 OUT_INT_CUBE = types.Array(int64, 3, 'C')
+RNG = types.Array(types.uint64, 1, 'C')
 OUT_POOL = types.Array(int32, 1, 'C')
 
 # An arm's forward kinematics: (q, ray_length, points, at) -> number of bars (`chain.py`).

@@ -4,7 +4,7 @@
 
 import math
 
-from numba.core.types import boolean, float64, int64, npy_rng
+from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import (
     CHAIN,
@@ -16,20 +16,25 @@ from rrth_planner.kernels.jit import (
     OUT_CUBE,
     OUT_INT_MAT,
     OUT_INTS,
+    RNG,
     VEC,
 )
-from rrth_planner.kernels.sampling import draw_informed, draw_uniform
+from rrth_planner.kernels.random import uniform
+from rrth_planner.kernels.sampling import draw_informed, draw_near, draw_uniform
 from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
 
+# With so many nodes the share of draws near the ends has fallen to a half.
+FEW_NODES = 64
 
-@kernel(boolean(VEC, MAT, float64, int64, float64, npy_rng))
+
+@kernel(boolean(VEC, MAT, float64, int64, float64, RNG))
 def is_rejected_by_club(q, club, radius, count, probability, rng):
     """Return whether the path club turns a new point away (Zou et al. 2024, section 4)."""
     n_near = 0
     for i in range(club.shape[0]):
         if distance(q, club[i]) < radius:
             n_near += 1
-    return n_near > count and rng.random() < probability
+    return n_near > count and uniform(rng) < probability
 
 
 @kernel(
@@ -44,6 +49,7 @@ def is_rejected_by_club(q, club, radius, count, probability, rng):
         float64,
         float64,
         float64,
+        float64,
         boolean,
         float64,
         MAT,
@@ -51,7 +57,7 @@ def is_rejected_by_club(q, club, radius, count, probability, rng):
         int64,
         float64,
         int64,
-        npy_rng,
+        RNG,
         OUT_CUBE,
         OUT_INT_MAT,
         OUT_INTS,
@@ -69,6 +75,7 @@ def advance(
     step_size,
     clearance_gain,
     goal_bias,
+    near_bias,
     is_bidirectional,
     best_cost,
     club,
@@ -90,27 +97,42 @@ def advance(
     towards each draw, and joins a goal within a step (LaValle 1998). Two: they take turns, and the
     other one reaches for each new node, at once or step by step (Kuffner and LaValle 2000). On
     success `meeting` holds the two nodes that an edge joins, otherwise -1. Draws that cannot
-    shorten a path of best_cost are not made.
+    shorten a path of best_cost are not made. near_bias: chance that a draw is near an end, where
+    a tree that grows from there fails more often; it falls as the trees grow.
     """
     dof, capacity = tree_q.shape[2], tree_q.shape[1]
     q, q_new = np.empty(dof), np.empty(dof)
     meeting[0] = meeting[1] = -1
     n_goals = sizes[N_GOALS]
+    # Draws near the start and near the goals, and how many of them led to a new node.
+    n_tried, n_grown = np.ones(2), np.zeros(2)
     for draw in range(n_draws):
         if sizes[0] >= capacity - 1 or sizes[1] >= capacity - 1:
             return n_draws
-        side = draw & 1 if is_bidirectional else 0
-        other = 1 - side
-        goal = int64(rng.random() * n_goals)
-        if rng.random() < goal_bias:
-            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+        side = draw & 1
+        goal = int64(uniform(rng) * n_goals)
+        q_goal = tree_q[1, goal]
+        n_nodes = sizes[0] + sizes[1] - n_goals
+        is_near = uniform(rng) * (FEW_NODES + n_nodes) < near_bias * FEW_NODES
+        if uniform(rng) < goal_bias:
+            q[:] = q_goal if side == 0 or not is_bidirectional else tree_q[0, 0]
+        elif is_near:
+            hard_0 = 1.0 - n_grown[0] / n_tried[0]
+            hard_1 = 1.0 - n_grown[1] / n_tried[1]
+            side = 0 if uniform(rng) * (hard_0 + hard_1) < hard_0 else 1
+            n_tried[side] += 1.0
+            near, far = (tree_q[0, 0], q_goal) if side == 0 else (q_goal, tree_q[0, 0])
+            if not draw_near(near, far, best_cost, bounds, rng, q):
+                continue
         elif best_cost < math.inf:
-            if not draw_informed(bounds, tree_q[0, 0], tree_q[1, goal], best_cost, rng, q):
+            if not draw_informed(bounds, tree_q[0, 0], q_goal, best_cost, rng, q):
                 continue
         else:
             draw_uniform(bounds, rng, q)
-        near = nearest(tree_q[side], sizes[side], q)
-        q_near = tree_q[side, near]
+        end, side = side, side if is_bidirectional else 0
+        other = 1 - side
+        nearby = nearest(tree_q[side], sizes[side], q)
+        q_near = tree_q[side, nearby]
         if distance(q_near, q) == 0.0:
             continue
         step = adapted_step(
@@ -121,12 +143,14 @@ def advance(
             continue
         if not is_edge_free(q_near, q_new, resolution, chain, robot, obstacles):
             continue
+        n_grown[end] += is_near
         new = sizes[side]
         tree_q[side, new] = q_new
-        parents[side, new] = near
+        parents[side, new] = nearby
         sizes[side] += 1
         reached = nearest(tree_q[other], sizes[other], q_new)
-        is_close = is_bidirectional or distance(tree_q[other, reached], q_new) <= step_size
+        gap = distance(tree_q[other, reached], q_new)
+        is_close = is_bidirectional or gap <= step_size
         is_joined = is_close and is_edge_free(
             tree_q[other, reached], q_new, resolution, chain, robot, obstacles
         )
@@ -135,10 +159,11 @@ def advance(
             step = adapted_step(
                 free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
             )
+            # What is left of the way is known to be blocked.
+            if distance(q_near, q_new) <= step:
+                break
             steer(q_near, q_new, step, q)
-            if distance(q, q_new) == 0.0 or is_rejected_by_club(
-                q, club, club_radius, club_count, club_probability, rng
-            ):
+            if is_rejected_by_club(q, club, club_radius, club_count, club_probability, rng):
                 break
             if not is_edge_free(q_near, q, resolution, chain, robot, obstacles):
                 break

@@ -4,7 +4,7 @@
 
 import math
 
-from numba.core.types import float64, int64, npy_rng, void
+from numba.core.types import float64, int64, void
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
     CHAIN,
@@ -19,6 +19,7 @@ from rrth_planner.kernels.jit import (
     OUT_INT_MAT,
     OUT_INTS,
     OUT_MAT,
+    RNG,
     SHORTEN,
     SLIDE,
     VEC,
@@ -28,8 +29,8 @@ from rrth_planner.kernels.taut import TAUT
 from rrth_planner.kernels.tree import distance, path_length, trace_path
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].
-STEP, GAIN, BIAS, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(7)
-MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, SPACINGS = range(7, 12)
+STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)
+MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, SPACINGS = range(8, 13)
 # Entries of `state`: growths begun, whether one is on its way, draws of it and in all, waypoints
 # of the best and of the first raw path, points of the club, rows of the history, in which of the
 # two pairs of trees growth goes on, which one led to the best path, why the search ended.
@@ -216,7 +217,7 @@ def remember(paths, n, club, state):
         MAT,
         VEC,
         float64,
-        npy_rng,
+        RNG,
         OUT_CUBES,
         OUT_INT_CUBE,
         OUT_INT_MAT,
@@ -292,6 +293,7 @@ def advance(
                 settings[STEP],
                 settings[GAIN],
                 settings[BIAS],
+                settings[NEAR],
                 settings[TWO_TREES] != 0.0,
                 cost,
                 club[: state[N_CLUB]],

@@ -4,7 +4,7 @@
 
 import math
 
-from numba.core.types import boolean, float64, int64, npy_rng, void
+from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
     CHAIN,
@@ -20,8 +20,10 @@ from rrth_planner.kernels.jit import (
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
+    RNG,
     VEC,
 )
+from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.sampling import draw_uniform
 from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
 
@@ -46,7 +48,7 @@ STAR_SIGNATURE = int64(
     int64,
     OUT_MAT,
     int64,
-    npy_rng,
+    RNG,
     OUT_CUBE,
     OUT_INT_CUBE,
     OUT_MAT,
@@ -327,8 +329,8 @@ def advance(
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0
-        if rng.random() < goal_bias:
-            goal = int64(rng.random() * sizes[N_GOALS])
+        if uniform(rng) < goal_bias:
+            goal = int64(uniform(rng) * sizes[N_GOALS])
             q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
         else:
             draw_uniform(bounds, rng, q)

@@ -7,6 +7,7 @@ import math
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
+from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
 from rrth_planner.kernels.tree import path_length
@@ -72,10 +73,10 @@ def advance(
         side = draw & 1 if is_bidirectional else 0
         n_beacons = int64(best[2]) - 2
         if n_beacons > 0 and draw % bias == 0:
-            beacon = 1 + int64(rng.random() * n_beacons)
+            beacon = 1 + int64(uniform(rng) * n_beacons)
             draw_ball(shortened[beacon], 0.5 * step_size, bounds, rng, q)
-        elif rng.random() < goal_bias:
-            goal = int64(rng.random() * sizes[N_GOALS])
+        elif uniform(rng) < goal_bias:
+            goal = int64(uniform(rng) * sizes[N_GOALS])
             q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
         else:
             draw_uniform(bounds, rng, q)

@@ -4,30 +4,59 @@
 
 import math
 
-from numba.core.types import boolean, float64, npy_rng, void
-from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, VEC
+from numba.core.types import boolean, float64, void
+from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, RNG, VEC
+from rrth_planner.kernels.random import normal, uniform
+from rrth_planner.kernels.tree import distance
+
+# Draws near an end: from this share of the way to the other end on.
+NEAREST = 0.1
 
 
-@kernel(void(MAT, npy_rng, OUT_VEC))
+@kernel(void(MAT, RNG, OUT_VEC))
 def draw_uniform(bounds, rng, q):
     """Draw a configuration uniformly within the bounds (2, dof)."""
     for k in range(q.shape[0]):
-        q[k] = bounds[0, k] + (bounds[1, k] - bounds[0, k]) * rng.random()
+        q[k] = bounds[0, k] + (bounds[1, k] - bounds[0, k]) * uniform(rng)
 
 
-@kernel(void(VEC, float64, MAT, npy_rng, OUT_VEC))
+@kernel(void(VEC, float64, MAT, RNG, OUT_VEC))
 def draw_ball(centre, radius, bounds, rng, q):
     """Draw uniformly from a ball, moved to the bounds where it sticks out."""
     norm = 0.0
     for k in range(q.shape[0]):
-        q[k] = rng.standard_normal()
+        q[k] = normal(rng)
         norm += q[k] * q[k]
-    scale = radius * rng.random() ** (1.0 / q.shape[0]) / math.sqrt(norm)
+    scale = radius * uniform(rng) ** (1.0 / q.shape[0]) / math.sqrt(norm)
     for k in range(q.shape[0]):
         q[k] = min(bounds[1, k], max(bounds[0, k], centre[k] + scale * q[k]))
 
 
-@kernel(boolean(MAT, VEC, VEC, float64, npy_rng, OUT_VEC))
+@kernel(boolean(VEC, VEC, float64, MAT, RNG, OUT_VEC))
+def draw_near(q_end, q_far, best_cost, bounds, rng, q):
+    """
+    Draw at any scale round one end of a path: the way out of a tight place is short.
+
+    The logarithm of the distance is uniform, up to the distance of the other end. False where 8
+    draws all fell outside the bounds, or beyond what could shorten a path of best_cost.
+    """
+    span = distance(q_end, q_far)
+    for _ in range(8):
+        norm = 0.0
+        for k in range(q.shape[0]):
+            q[k] = normal(rng)
+            norm += q[k] * q[k]
+        scale = span * NEAREST ** uniform(rng) / math.sqrt(norm)
+        is_inside = True
+        for k in range(q.shape[0]):
+            q[k] = q_end[k] + scale * q[k]
+            is_inside &= (q[k] >= bounds[0, k]) & (q[k] <= bounds[1, k])
+        if is_inside and distance(q, q_end) + distance(q, q_far) < best_cost:
+            return True
+    return False
+
+
+@kernel(boolean(MAT, VEC, VEC, float64, RNG, OUT_VEC))
 def draw_informed(bounds, q_start, q_goal, best_cost, rng, q):
     """
     Draw uniformly from the ellipsoid of points through which a shorter path could lead.
@@ -48,9 +77,9 @@ def draw_informed(bounds, q_start, q_goal, best_cost, rng, q):
     for _ in range(32):
         norm = 0.0
         for k in range(dof):
-            q[k] = rng.standard_normal()
+            q[k] = normal(rng)
             norm += q[k] * q[k]
-        radius = rng.random() ** (1.0 / dof) / math.sqrt(norm)
+        radius = uniform(rng) ** (1.0 / dof) / math.sqrt(norm)
         # Reflection across the plane square to v = line - e_0; |v|^2 = 2 (1 - line_0).
         along, v_squared = 0.0, 0.0
         for k in range(dof):

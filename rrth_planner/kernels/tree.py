@@ -5,6 +5,7 @@
 import math
 
 from numba.core.types import float64, int64, void
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
     CHAIN,
     EDGE_CHECK,
@@ -17,6 +18,9 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     VEC,
 )
+
+# Nodes that the search for the nearest one looks at in one go.
+CHUNK = 256
 
 
 @kernel(float64(VEC, VEC))
@@ -40,13 +44,29 @@ def path_length(path, n):
 @kernel(int64(MAT, int64, VEC))
 def nearest(nodes, size, q):
     """Return the index of the node nearest to q; brute force wins up to some 700 nodes."""
+    squares = scratch.floats(CHUNK)
     best, index = math.inf, 0
-    for i in range(size):
-        total = 0.0
-        for k in range(q.shape[0]):
-            total += (nodes[i, k] - q[k]) ** 2
-        if total < best:
-            best, index = total, i
+    for first in range(0, size, CHUNK):
+        n = min(CHUNK, size - first)
+        # Written out for the common sizes, and apart from the search, it is done on vectors.
+        if q.shape[0] == 4:
+            for i in range(n):
+                a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
+                c, d = nodes[first + i, 2] - q[2], nodes[first + i, 3] - q[3]
+                squares[i] = a * a + b * b + c * c + d * d
+        elif q.shape[0] == 2:
+            for i in range(n):
+                a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
+                squares[i] = a * a + b * b
+        else:
+            for i in range(n):
+                total = 0.0
+                for k in range(q.shape[0]):
+                    total += (nodes[first + i, k] - q[k]) ** 2
+                squares[i] = total
+        for i in range(n):
+            if squares[i] < best:
+                best, index = squares[i], first + i
     return index
 
 
