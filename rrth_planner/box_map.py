@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels import chain, jit, map_validity
+from rrth_planner.kernels import chain, contacts, jit, map_validity
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
 EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)
+NO_CONTACTS = jit.first_class(contacts.no_contacts)
 FREE_RADIUS = jit.first_class(map_validity.free_radius)
 
 
@@ -131,6 +132,7 @@ def map_world(box_map: BoxMap) -> World:
         obstacles=np.hstack([lower, upper]),
         edge_check=EDGE_CHECK,
         free_radius=FREE_RADIUS,
+        contacts=NO_CONTACTS,
         resolution=1.0,
         bar_names=('point',),
         box_names=tuple(f'obstacle {i}' for i in range(len(lower))),

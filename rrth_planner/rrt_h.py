@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grown_trees, plant, room_for
-from rrth_planner.kernels import jit, rrt_h, taut
+from rrth_planner.kernels import jit, lean, rrt_h
 from rrth_planner.kernels.random import random_state
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
 from rrth_planner.path import Path
@@ -17,7 +17,7 @@ from rrth_planner.result import PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import Workspace, workspace
 
-PULL_TAUT = jit.first_class(taut.pull_taut)
+TIGHTEN = jit.first_class(lean.tighten)
 # Time between two looks at whether to stop [s].
 SLICE = 0.005
 # Waypoints nearer than this are one [rad].
@@ -30,7 +30,7 @@ def search(
     rng: np.random.Generator,
     deadline: Deadline,
     previous: tuple[Tree, ...],
-    shorten: Any = PULL_TAUT,
+    shorten: Any = TIGHTEN,
 ) -> PlanResult:
     """
     Return the shortest path of some growths, each pulled taut.
@@ -46,6 +46,7 @@ def search(
     budget = max(options.max_samples, options.club_budget)
     room = workspace(len(problem.q_start), room_for(options, n_roots, previous, budget))
     given = (
+        world.contacts,
         shorten,
         problem.slide_goal,
         world.chain,
@@ -109,7 +110,7 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
             0.0,
             deadline.start + options.improve_time if options.improve_time > 0.0 else -np.inf,
             options.corner_spacing,
-            options.target_spacing if is_printed else 0.0,
+            options.target_spacing if is_printed else options.corner_moves,
             options.check_spacing if is_printed else 0.0,
         ]
     )

@@ -12,7 +12,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
-from rrth_planner.kernels import arm_sampling, arm_validity, chain, jit
+from rrth_planner.kernels import arm_sampling, arm_validity, chain, contacts, jit
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -20,6 +20,7 @@ from rrth_planner.scene import Scene
 # errors of about 1e-11 m.
 SLACK = 1e-9
 EDGE_CHECK = jit.first_class(arm_validity.is_edge_free)
+CONTACTS = jit.first_class(contacts.edge_contacts)
 FREE_RADIUS = jit.first_class(arm_sampling.free_radius)
 # Shortest interval that the proof of an edge looks at before it gives up [rad].
 RESOLUTION = 5e-4
@@ -45,6 +46,8 @@ class World:
         The seam `kernels.jit.EDGE_CHECK`.
     free_radius : compiled function
         The seam `kernels.jit.FREE_RADIUS`.
+    contacts : compiled function
+        The seam `kernels.jit.CONTACTS`.
     resolution : float
         Last argument but two of the edge check [rad].
     bar_names, box_names : tuple of str
@@ -60,6 +63,7 @@ class World:
     obstacles: Array
     edge_check: Callable[..., bool]
     free_radius: Callable[..., float]
+    contacts: Callable[..., int]
     resolution: float
     bar_names: tuple[str, ...]
     box_names: tuple[str, ...]
@@ -137,6 +141,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         obstacles=obstacles,
         edge_check=EDGE_CHECK,
         free_radius=FREE_RADIUS,
+        contacts=CONTACTS,
         resolution=RESOLUTION,
         bar_names=tuple(bar_names(arm)),
         box_names=tuple(box.name for box in scene.boxes),

@@ -41,9 +41,15 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, CHAIN, MAT, MAT
 # free [rad].
 FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 
-# A third: (edge check, resolution, chain, robot, obstacles, path, n, spacings) -> number of
-# waypoints of the path, made shorter in place.
-SHORTEN = types.FunctionType(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
+# Where an edge leans on obstacles: (q_from, q_to, chain, robot, obstacles, contacts) -> how many
+# rows of `contacts` were written (`contacts.py`).
+CONTACTS = types.FunctionType(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
+
+# A third: (edge check, contacts, resolution, chain, robot, obstacles, bounds, path, n, how) ->
+# number of waypoints of the path, made shorter in place; how: settings of its own.
+SHORTEN = types.FunctionType(
+    int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC)
+)
 
 # A fourth: (edge check, resolution, chain, robot, obstacles, bounds, target, path, n, finest) ->
 # by how much the path got shorter as its last waypoint moved along the goal manifold.

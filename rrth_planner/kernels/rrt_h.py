@@ -8,6 +8,7 @@ from numba.core.types import float64, int64, void
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
     CHAIN,
+    CONTACTS,
     EDGE_CHECK,
     FREE_RADIUS,
     kernel,
@@ -30,7 +31,7 @@ from rrth_planner.kernels.tree import distance, path_length, trace_path
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].
 STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)
-MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, SPACINGS = range(8, 13)
+MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, HOW = range(8, 13)
 # Entries of `state`: growths begun, whether one is on its way, draws of it and in all, waypoints
 # of the best and of the first raw path, points of the club, rows of the history, in which of the
 # two pairs of trees growth goes on, which one led to the best path, why the search ended.
@@ -51,9 +52,26 @@ FINEST_SLIDE = 2e-3
 MAX_SLIDES = 100
 
 
-@kernel(int64(EDGE_CHECK, SHORTEN, SLIDE, CHAIN, float64, MAT, MAT, MAT, VEC, VEC, OUT_MAT, int64))
+@kernel(
+    int64(
+        EDGE_CHECK,
+        CONTACTS,
+        SHORTEN,
+        SLIDE,
+        CHAIN,
+        float64,
+        MAT,
+        MAT,
+        MAT,
+        VEC,
+        VEC,
+        OUT_MAT,
+        int64,
+    )
+)
 def finish(
     is_edge_free,
+    find,
     shorten,
     slide_goal,
     chain,
@@ -62,12 +80,12 @@ def finish(
     obstacles,
     bounds,
     target,
-    spacings,
+    how,
     path,
     n,
 ):
     """Pull a path taut and slide its goal, in turn, until nothing is gained; return its size."""
-    n = shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings)
+    n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
     for _ in range(MAX_SLIDES):
         gain = slide_goal(
             is_edge_free,
@@ -83,7 +101,7 @@ def finish(
         )
         if gain < TAUT:
             break
-        n = shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings)
+        n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
     return n
 
 
@@ -104,6 +122,7 @@ def keep_best(paths, n, pair, state, history):
 @kernel(
     void(
         EDGE_CHECK,
+        CONTACTS,
         SHORTEN,
         SLIDE,
         CHAIN,
@@ -122,6 +141,7 @@ def keep_best(paths, n, pair, state, history):
 )
 def go_straight(
     is_edge_free,
+    find,
     shorten,
     slide_goal,
     chain,
@@ -148,6 +168,7 @@ def go_straight(
                 paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
             n = finish(
                 is_edge_free,
+                find,
                 shorten,
                 slide_goal,
                 chain,
@@ -156,7 +177,7 @@ def go_straight(
                 obstacles,
                 bounds,
                 target,
-                settings[SPACINGS:],
+                settings[HOW:],
                 paths[WORK],
                 2,
             )
@@ -205,6 +226,7 @@ def remember(paths, n, club, state):
     void(
         EDGE_CHECK,
         FREE_RADIUS,
+        CONTACTS,
         SHORTEN,
         SLIDE,
         CHAIN,
@@ -231,6 +253,7 @@ def remember(paths, n, club, state):
 def advance(
     is_edge_free,
     free_radius,
+    find,
     shorten,
     slide_goal,
     chain,
@@ -315,6 +338,7 @@ def advance(
             remember(paths, n, club, state)
             n = finish(
                 is_edge_free,
+                find,
                 shorten,
                 slide_goal,
                 chain,
@@ -323,7 +347,7 @@ def advance(
                 obstacles,
                 bounds,
                 target,
-                settings[SPACINGS:],
+                settings[HOW:],
                 paths[WORK],
                 n,
             )

@@ -4,7 +4,7 @@
 
 from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
+from rrth_planner.kernels.jit import CHAIN, CONTACTS, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
 from rrth_planner.kernels.taut import remove_waypoint, reverse_path
 from rrth_planner.kernels.tree import distance
 
@@ -109,14 +109,14 @@ def cut_corners(
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
-def shorten(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings):
+@kernel(int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC))
+def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how):
     """
     Do steps 1, 2 and 3 once each, in place; return the number of waypoints.
 
-    spacings (3,): k of the paper, distance between points P_T, between points P_C [rad].
+    how (3,): k of the paper, distance between points P_T, between points P_C [rad].
     """
-    least, targets, checks = spacings[0], spacings[1], spacings[2]
+    least, targets, checks = how[0], how[1], how[2]
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)

@@ -143,15 +143,15 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC))
-def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacings):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
+def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
     """
     Repeat the three steps until the path gets no shorter; return its number of waypoints.
 
-    spacings: k of the paper [rad]. Every edge that enters the path has been proven by the edge
+    spacing: k of the paper [rad]. Every edge that enters the path has been proven by the edge
     check; the path never gets longer.
     """
-    length, spacing = path_length(path, n), spacings[0]
+    length = path_length(path, n)
     for _ in range(MAX_ROUNDS):
         if n < 3:
             break
