@@ -17,8 +17,9 @@ CLOSE = 0.03
 SPACING = 0.04
 # Step of the differences that give the slopes [rad or m].
 STEP = 1e-6
-# Entries of a contact: where on the edge (0 to 1), gap [m], then its slope by each joint.
-SHARE, GAP, SLOPES = 0, 1, 2
+# Entries of a contact: where on the edge (0 to 1), gap [m], how hard the path presses there, then
+# the slope of the gap by each joint.
+SHARE, GAP, PRESSED, SLOPES = range(4)
 # The golden section, and how often it narrows a place down: to 0.5 % of the spacing.
 GOLDEN, N_GOLDEN = 0.6180339887498949, 10
 # Pairs of a bar and a box that an edge may lean on.
@@ -118,7 +119,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     """
     Write where the edge leans on boxes; return how many rows.
 
-    contacts (capacity, 2 + dof): for each pair of bar and box, the places on the edge where they
+    contacts (capacity, 3 + dof): for each pair of bar and box, the places on the edge where they
     are closer than on either side of it, the gap there [m], its slope by each joint [m/rad].
     """
     dof, n, n_pairs = q_from.shape[0], 0, 0

@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Taut paths that lean on boxes, moved along them to where the way round is shortest."""
 
-from numba.core.types import boolean, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.contacts import GAP, SHARE, SLOPES
+from rrth_planner.kernels.contacts import GAP, PRESSED, SHARE, SLOPES
 from rrth_planner.kernels.jit import (
     CHAIN,
     CONTACTS,
@@ -29,6 +29,8 @@ N_TRIES, SHORTER, N_CORRECTIONS = 3, 0.3, 4
 SQUARE = MAX_CORNERS * MAX_CORNERS
 # How far beyond a joint's limit a move may end before it is corrected; it is cut off there [rad].
 BEYOND = 1e-9
+# A new corner is put no nearer than this to another one [rad].
+SHORTEST_BEND = 0.03
 # Shorter edges pull no harder than one of this length [rad].
 SHORTEST = 1e-3
 # What a round must gain to be worth another one, relative.
@@ -116,7 +118,8 @@ def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
             is_low = q < bounds[0, k] - BEYOND
             if n_found >= contacts.shape[0] or not (is_low or q > bounds[1, k] + BEYOND):
                 continue
-            contacts[n_found] = 0.0
+            for column in range(contacts.shape[1]):
+                contacts[n_found, column] = 0.0
             # At the end of the edge before: the corner itself.
             edges[n_found], contacts[n_found, SHARE] = i, 1.0
             contacts[n_found, SLOPES + k] = 1.0 if is_low else -1.0
@@ -126,7 +129,7 @@ def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
     return n_found
 
 
-@kernel(void(OUT_VEC, MAT, OUT_INTS, OUT_VEC, int64, int64, OUT_MAT))
+@kernel(void(OUT_VEC, OUT_MAT, OUT_INTS, OUT_VEC, int64, int64, OUT_MAT))
 def constrain(inverse, contacts, edges, least, n, m, moves):
     """
     Change the moves of m corners, least in the sense of the springs, to keep n constraints.
@@ -134,9 +137,8 @@ def constrain(inverse, contacts, edges, least, n, m, moves):
     Dual ascent, a constraint at a time (Hildreth 1957).
     """
     dof = moves.shape[1]
-    pressed = scratch.floats(MAX_CONTACTS)
     for i in range(n):
-        pressed[i] = 0.0
+        contacts[i, PRESSED] = 0.0
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i in range(n):
@@ -161,9 +163,9 @@ def constrain(inverse, contacts, edges, least, n, m, moves):
             own *= squared
             if own < 1e-9:
                 continue
-            raised = max(0.0, pressed[i] + (least[i] - along) / own)
-            step = raised - pressed[i]
-            pressed[i] = raised
+            raised = max(0.0, contacts[i, PRESSED] + (least[i] - along) / own)
+            step = raised - contacts[i, PRESSED]
+            contacts[i, PRESSED] = raised
             for j in range(m):
                 lever = 0.0
                 if a >= 0:
@@ -190,17 +192,18 @@ def shift(bounds, path, n, moves, moved):
 
 
 @kernel(
-    boolean(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, OUT_MAT, OUT_INTS)
+    int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, OUT_MAT, OUT_INTS)
 )
 def lean(
     is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, contacts, edges
 ):
     """
-    Move all corners of a path to where it is shorter, without entering a box; return whether.
+    Move all corners of a path to where it is shorter, without entering a box.
 
     Springs between the corners pull them straight, the places where edges lean on boxes push
     back; where the moved path finds new such places, they are added and the balance is sought
-    again. The new edges are proven before they are taken.
+    again. The new edges are proven before they are taken. Returns the number of contacts that the
+    balance knew, less than 0 where no such move was found.
     """
     m, length = n - 2, path_length(path, n)
     inverse, least = scratch.floats(SQUARE), scratch.floats(MAX_CONTACTS)
@@ -243,10 +246,36 @@ def lean(
             if is_free:
                 for i in range(1, n - 1):
                     path[i] = moved[i]
-                return True
+                return n_found
         # The images of the boxes bend away: of a shorter move with the square of its length.
         share *= SHORTER
-    return False
+    return -1 - n_found
+
+
+@kernel(int64(OUT_MAT, int64, MAT, OUT_INTS, int64))
+def bend(path, n, contacts, edges, n_found):
+    """
+    Put a corner where the path presses hardest within an edge; return the new number of waypoints.
+
+    A straight edge cannot give way to what presses on its middle, two edges can.
+    """
+    hardest, row = 0.0, -1
+    for i in range(n_found):
+        share = contacts[i, SHARE]
+        if edges[i] + 1 >= n:
+            continue
+        length = distance(path[edges[i]], path[edges[i] + 1])
+        is_inside = min(share, 1.0 - share) * length > SHORTEST_BEND
+        if is_inside and contacts[i, PRESSED] > hardest:
+            hardest, row = contacts[i, PRESSED], i
+    if row < 0 or n >= min(path.shape[0], MAX_CORNERS + 2):
+        return n
+    e, share = edges[row], contacts[row, SHARE]
+    for i in range(n, e + 1, -1):
+        path[i] = path[i - 1]
+    for k in range(path.shape[1]):
+        path[e + 1, k] = path[e, k] + share * (path[e + 2, k] - path[e, k])
+    return n + 1
 
 
 @kernel(int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC))
@@ -259,11 +288,11 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
     contacts = np.empty((MAX_CONTACTS, SLOPES + path.shape[1]))
     edges = np.empty(MAX_CONTACTS, np.int64)
-    length = path_length(path, n)
+    length, is_bent = path_length(path, n), False
     for _ in range(int64(how[1])):
         if n < 3 or n > MAX_CORNERS + 2:
             break
-        if not lean(
+        n_found = lean(
             is_edge_free,
             find,
             resolution,
@@ -275,11 +304,21 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
             n,
             contacts,
             edges,
-        ):
-            break
-        n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+        )
+        if n_found >= 0:
+            n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
         shorter = path_length(path, n)
-        if shorter > length * (1.0 - ENOUGH):
-            break
+        is_done = shorter > length * (1.0 - ENOUGH)
         length = shorter
+        if not is_done:
+            is_bent = False
+            continue
+        # It leans as well as it can with these corners: one more try with another corner.
+        if is_bent:
+            break
+        n_before = n
+        n = bend(path, n, contacts, edges, n_found if n_found >= 0 else -1 - n_found)
+        is_bent = n > n_before
+        if not is_bent:
+            break
     return n

@@ -47,6 +47,9 @@ COST, DRAWS, TIME = range(3)
 MAX_ROOTS = 64
 # Draws between two looks at the clock.
 BATCH = 100
+# Draws of later growths lie where a path this much longer than the best one can lead: what is
+# first found is longer than what becomes of it.
+WIDER = 1.3
 # Finest step of a goal along its manifold [rad].
 FINEST_SLIDE = 2e-3
 MAX_SLIDES = 100
@@ -318,7 +321,7 @@ def advance(
                 settings[BIAS],
                 settings[NEAR],
                 settings[TWO_TREES] != 0.0,
-                cost,
+                WIDER * cost,
                 club[: state[N_CLUB]],
                 settings[CLUB_RADIUS],
                 int64(settings[CLUB_COUNT]),
