@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The straight line from a scene and a target to a certified trajectory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+import functools
 import time
 
 import numpy as np
@@ -31,6 +32,8 @@ SPARES = (5e-3, 1e-5)
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].
 HAIR = 2e-6
+# A wearer who holds still makes the same world from plan to plan.
+_world_of = functools.lru_cache(maxsize=8)(arm_world)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,7 +110,7 @@ def plan_motion(
 
     """
     begin = time.perf_counter()
-    world = arm_world(arm, scene, margin, ray_guard_length)
+    world = _world_of(arm, scene, margin, ray_guard_length)
     refusal = start_refusal(
         arm, grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
     ) or target_refusal(scene, goal, margin)
@@ -212,8 +215,10 @@ def _time_path(
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
     rounded = round_corners(path, grown(world, HAIR), limits)
-    stops = tuple(replace(blend, half_length=0.0) for blend in rounded)
-    trajectory = first_proven(path, (rounded, stops), limits, world)
+    choices = [rounded]
+    if any(blend.half_length > 0.0 for blend in rounded):
+        choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
+    trajectory = first_proven(path, choices, limits, world)
     if trajectory is None:
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
@@ -231,7 +236,7 @@ def _time_path(
 
 
 def first_proven(
-    path: Path, choices: tuple[tuple[Blend, ...], ...], limits: MotionLimits, world: World
+    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, world: World
 ) -> Trajectory | None:
     """
     Return the fastest trajectory along a path that is proven free, or None.
@@ -239,7 +244,7 @@ def first_proven(
     Parameters
     ----------
     path : Path
-    choices : tuple of tuple of Blend
+    choices : sequence of tuple of Blend
         Ways to take the corners.
     limits : MotionLimits
     world : World

@@ -94,6 +94,11 @@ class Trajectory:
         return float(self.times[-1])
 
 
+# The terms u^3, u^4 and u^5 that add a position, a velocity and an acceleration at u = 1, and
+# nothing at u = 0.
+_QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
+
+
 @functools.lru_cache(maxsize=8)
 def piece_coefficients(trajectory: Trajectory) -> Array:
     """
@@ -106,18 +111,19 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
         read-only, since timing and both checks share it.
 
     """
-    T = np.diff(trajectory.times)[:, None]
     p, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
-    p0, v0, a0 = p[:-1], v[:-1] * T, a[:-1] * T * T
-    # What position, velocity and acceleration at u = 1 still lack after the first three terms.
-    dp = p[1:] - p0 - v0 - 0.5 * a0
-    dv = v[1:] * T - v0 - a0
-    da = a[1:] * T * T - a0
+    T = (trajectory.times[1:] - trajectory.times[:-1])[:, None]
+    square = T * T
     c = np.empty((len(T), 6, p.shape[1]))
-    c[:, 0], c[:, 1], c[:, 2] = p0, v0, 0.5 * a0
-    c[:, 3] = 10.0 * dp - 4.0 * dv + 0.5 * da
-    c[:, 4] = -15.0 * dp + 7.0 * dv - da
-    c[:, 5] = 6.0 * dp - 3.0 * dv + 0.5 * da
+    c[:, 0], c[:, 1] = p[:-1], v[:-1] * T
+    a0 = a[:-1] * square
+    c[:, 2] = 0.5 * a0
+    # What position, velocity and acceleration at u = 1 still lack after these three terms.
+    lacks = np.empty((len(T), 3, p.shape[1]))
+    lacks[:, 0] = p[1:] - p[:-1] - c[:, 1] - c[:, 2]
+    lacks[:, 1] = v[1:] * T - c[:, 1] - a0
+    lacks[:, 2] = a[1:] * square - a0
+    np.matmul(_QUINTIC, lacks, out=c[:, 3:])
     c.setflags(write=False)
     return c
 

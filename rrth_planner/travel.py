@@ -12,8 +12,8 @@ from rrth_planner.trajectory import piece_coefficients, Trajectory
 STRETCHES = 8
 _CUTS = np.linspace(0.0, 1.0, STRETCHES + 1)
 _FIRST = np.arange(1, 6) * _CUTS[:, None] ** np.arange(5)
-# Bernstein coefficients of the third derivatives of u^3, u^4 and u^5, which bound them, and how far
-# a function can be from its chord over a stretch for each unit of its second derivative.
+# Bernstein coefficients of the third derivatives of u^3, u^4 and u^5, which bound them, and how
+# far a function can be from its chord over a stretch for each unit of its second derivative.
 _THIRD = np.array([[6.0, 0.0, 0.0], [6.0, 12.0, 0.0], [6.0, 24.0, 60.0]])
 _CHORD = 0.125 / STRETCHES**2
 
