@@ -34,6 +34,7 @@ SPARES = (5e-3, 1e-5)
 HAIR = 2e-6
 # A wearer who holds still makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)
+_grown = functools.lru_cache(maxsize=32)(grown)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -112,7 +113,7 @@ def plan_motion(
     begin = time.perf_counter()
     world = _world_of(arm, scene, margin, ray_guard_length)
     refusal = start_refusal(
-        arm, grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
+        arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
     ) or target_refusal(scene, goal, margin)
     if refusal is None:
         found = _find_path(arm, goal, world, q_start, options, seed, should_stop, begin)
@@ -171,7 +172,7 @@ def _find_path(
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
     for spare in SPARES:
-        roomy = grown(world, spare)
+        roomy = _grown(world, spare)
         if not roomy.is_valid(q_start):
             continue
         goals = goal_configurations(arm, goal, roomy, q_start, FEW)
@@ -214,7 +215,7 @@ def _time_path(
     margin: float,
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
-    rounded = round_corners(path, grown(world, HAIR), limits)
+    rounded = round_corners(path, _grown(world, HAIR), limits)
     choices = [rounded]
     if any(blend.half_length > 0.0 for blend in rounded):
         choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
@@ -271,7 +272,7 @@ def _solved(
     path = result.path
     assert path is not None
     # The world's boxes are the body's grown by margin and slack.
-    clearance = least_clearance(trajectory, grown(world, -margin))
+    clearance = least_clearance(trajectory, _grown(world, -margin))
     planning_time = time.perf_counter() - begin
     note = '' if result.is_reproducible else '; the clock ended the improvement'
     return MotionPlan(
