@@ -4,9 +4,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import functools
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import ModelError
 from rrth_planner.rotation import pose_matrix
@@ -163,37 +165,39 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
 
     """
     q = np.asarray(q, dtype=np.float64)
-    T = np.broadcast_to(arm.T_base_mount, (*q.shape[:-1], 4, 4))
-    poses = np.empty((*q.shape[:-1], arm.dof + 1, 4, 4))
-    still = np.zeros(q.shape[:-1])
-    for i, (alpha, a, offset, d) in enumerate(arm.dh):
-        slides = i < arm.dof and arm.is_prismatic[i]
-        value = q[..., i] if i < arm.dof else still
-        theta, d = (still + offset, d + value) if slides else (offset + value, d + still)
-        T = T @ _link_pose(alpha, a, theta, d)
-        poses[..., i, :, :] = T
+    constant, slides, parts = _link_parts(arm)
+    values = np.zeros((*q.shape[:-1], arm.dof + 1))
+    values[..., :-1] = q
+    theta = constant[0] + np.where(slides, 0.0, values)
+    terms = np.ones((*theta.shape, 1, 4))
+    np.cos(theta, out=terms[..., 0, 1])
+    np.sin(theta, out=terms[..., 0, 2])
+    terms[..., 0, 3] = constant[1] + np.where(slides, values, 0.0)
+    poses: Array = (terms @ parts).reshape(*theta.shape, 4, 4)
+    T = arm.T_base_mount
+    for i in range(arm.dof + 1):
+        T = poses[..., i, :, :] = T @ poses[..., i, :, :]
     return poses
 
 
-def _link_pose(alpha: float, a: float, theta: Array, d: Array) -> Array:
-    """Return the pose of link frame i in frame i - 1 (Craig 2005, eq. 3.6), (..., 4, 4) [m]."""
-    ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-    pose = np.zeros((*np.shape(theta), 4, 4))
-    pose[..., 0, 0], pose[..., 0, 1], pose[..., 0, 3] = ct, -st, a
-    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2], pose[..., 1, 3] = (
-        st * ca,
-        ct * ca,
-        -sa,
-        -d * sa,
-    )
-    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2], pose[..., 2, 3] = (
-        st * sa,
-        ct * sa,
-        ca,
-        d * ca,
-    )
-    pose[..., 3, 3] = 1.0
-    return pose
+@functools.lru_cache(maxsize=16)
+def _link_parts(arm: ArmModel) -> tuple[Array, NDArray[np.bool_], Array]:
+    """
+    Return offsets and lengths (2, dof + 1), which joints slide, and the parts of the link poses.
+
+    The pose of link frame i in frame i - 1 (Craig 2005, eq. 3.6) is the sum of its parts, of shape
+    (dof + 1, 4, 16), times 1, cos(theta), sin(theta) and d.
+    """
+    alpha, a, offset, d = arm.dh.T
+    ca, sa = np.cos(alpha), np.sin(alpha)
+    parts = np.zeros((arm.dof + 1, 4, 4, 4))
+    parts[:, 0, 0, 3], parts[:, 0, 3, 3] = a, 1.0
+    parts[:, 0, 1, 2], parts[:, 0, 2, 2] = -sa, ca
+    parts[:, 1, 0, 0], parts[:, 1, 1, 1], parts[:, 1, 2, 1] = 1.0, ca, sa
+    parts[:, 2, 0, 1], parts[:, 2, 1, 0], parts[:, 2, 2, 0] = -1.0, ca, sa
+    parts[:, 3, 1, 3], parts[:, 3, 2, 3] = -sa, ca
+    slides = np.array([*arm.is_prismatic, False])
+    return np.stack([offset, d]), slides, parts.reshape(-1, 4, 16)
 
 
 def tool_pose(arm: ArmModel, q: Array) -> Array:

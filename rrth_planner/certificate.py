@@ -8,7 +8,7 @@ from math import comb
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.kernels import arm_validity
-from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
+from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
 from rrth_planner.world import World
 
 # Instants at which the least clearance is looked for; a figure for people, not the proof [s].
@@ -68,8 +68,8 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
     powers = np.arange(1, 6)[None, :, None]
     first = coefficients[:, 1:] * powers
     second = first[:, 1:] * powers[:, :4]
-    speed = np.abs(np.einsum('ij,njk->nik', _BERNSTEIN_4, first)).max(axis=1)
-    bend = np.abs(np.einsum('ij,njk->nik', _BERNSTEIN_3, second)).max(axis=1)
+    speed = np.abs(_BERNSTEIN_4 @ first).max(axis=1)
+    bend = np.abs(_BERNSTEIN_3 @ second).max(axis=1)
     # Rounding of the conversion.
     return speed * (1 + 1e-12) + 1e-15, bend * (1 + 1e-12) + 1e-15
 
@@ -104,5 +104,4 @@ def certify(trajectory: Trajectory, world: World) -> Certificate:
 def least_clearance(trajectory: Trajectory, world: World) -> float:
     """Return the least distance from the world's boxes, looked at every 10 ms [m]."""
     times = np.append(np.arange(0.0, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
-    positions, _, _ = sample(trajectory, times)
-    return float(world.clearances(positions).min(initial=np.inf))
+    return float(world.clearances(positions_at(trajectory, times)).min(initial=np.inf))

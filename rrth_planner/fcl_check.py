@@ -2,22 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The second opinion: the same trajectory judged by the Flexible Collision Library."""
 
+from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice, pairwise
+import math
 
-import fcl
 import numpy as np
 from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
-from rrth_planner.reach import bar_ends, bar_names, reach_table
+from rrth_planner.fcl_shapes import Bar, boxes_of, DOUBT
+from rrth_planner.reach import bar_ends
 from rrth_planner.scene import Scene
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.trajectory import positions_at, Trajectory
+from rrth_planner.travel import travelled
 
-# Shortest time between two looks [s]; they are longer where the distance allows it.
+# Longest time between two instants that may be looked at [s].
 PERIOD = 0.001
-# Bars become capsules this thin, and their radius is taken off the distance: of thick ones the
-# library overestimates it by up to half a millimetre. Then it is good to a few micrometres, rarely
-# worse, so a look comes this much earlier than the distance allows [m].
-THINNEST, TOLERANCE, EARLIER = 1e-6, 3e-6, 1e-3
+# Distances this much below the margin are rounding of the library [m].
+TOLERANCE = 3e-6
+# Looks into a gap at once: where they are many, some may turn out to be needless.
+MOST_LOOKS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,74 +47,97 @@ class Touch:
     box: str
 
 
-class _Body:
-    """The boxes of a scene and the capsules of an arm as objects of the library."""
-
-    def __init__(self, arm: ArmModel, scene: Scene) -> None:
-        self.arm, self.bars, self.names = arm, bar_ends(arm), bar_names(arm)
-        self.radii = [float(arm.radii[row]) for row, _ in self.bars]
-        # Each object carries its geometry's identity, by which a result names the box.
-        geometries = [fcl.Box(*box.size) for box in scene.boxes]
-        self.box_of = {
-            id(geometry): box.name for geometry, box in zip(geometries, scene.boxes, strict=True)
-        }
-        self.boxes = fcl.DynamicAABBTreeCollisionManager()
-        self.objects = [
-            fcl.CollisionObject(geometry, fcl.Transform(box.rotation, box.center))
-            for geometry, box in zip(geometries, scene.boxes, strict=True)
-        ]
-        self.boxes.registerObjects(self.objects)
-        self.boxes.setup()
-        self.geometries = geometries
-        self.capsules: dict[int, tuple[float, fcl.CollisionObject]] = {}
-
-    def nearest(self, k: int, poses: Array, length: float) -> tuple[float, str]:
-        """
-        Return the distance of bar k from the nearest box [m], and that box.
-
-        poses (dof + 1, 4, 4): the frames of the arm; length: that of the bar [m].
-        """
-        row, end = self.bars[k]
-        # A capsule lies along its own z, centred. `a` leads along x of the frame before; `d` ends
-        # at its frame's origin, but the ray begins there.
-        pose = poses[row] if end == 'd' else poses[row - 1]
-        rotation = pose[:3, :3] if end == 'd' else pose[:3, [1, 2, 0]]
-        ahead = 0.5 * length if end == 'a' or row == self.arm.dof else -0.5 * length
-        capsule = self._capsule(k, abs(length))
-        capsule.setTransform(fcl.Transform(rotation, pose[:3, 3] + ahead * rotation[:, 2]))
-        data = fcl.DistanceData()
-        self.boxes.distance(capsule, data, fcl.defaultDistanceCallback)
-        found = data.result
-        box = self.box_of.get(id(found.o1)) or self.box_of.get(id(found.o2), 'a box')
-        return float(found.min_distance) + THINNEST - self.radii[k], box
-
-    def length(self, k: int, q: Array, ray_length: float) -> float:
-        """Return the signed length of bar k at q, shape (dof,) [m]."""
-        row, end = self.bars[k]
-        if row == self.arm.dof and end == 'd':
-            return ray_length
-        if end == 'a':
-            return float(self.arm.dh[row, 1])
-        return float(self.arm.dh[row, 3] + (q[row] if self.arm.is_prismatic[row] else 0.0))
-
-    def _capsule(self, k: int, length: float) -> fcl.CollisionObject:
-        """Return the object of bar k with a length [m]."""
-        kept, capsule = self.capsules.get(k, (-1.0, None))
-        if kept != length:
-            capsule = fcl.CollisionObject(fcl.Capsule(THINNEST, length))
-            self.capsules[k] = (length, capsule)
-        return capsule
-
-
 def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Touch:
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
-    body = _Body(arm, scene)
-    poses = forward_kinematics(arm, q)
-    looks = [
-        (*body.nearest(k, poses, body.length(k, q, ray_length)), k) for k in range(len(body.bars))
-    ]
-    distance, box, k = min(looks, key=lambda look: look[0])
-    return Touch(0.0, distance, body.names[k], box)
+    boxes, poses = boxes_of(scene), forward_kinematics(arm, q)
+    least, where = math.inf, ('', '')
+    for k in range(len(bar_ends(arm))):
+        bar = Bar(arm, k, ray_length)
+        distance, j = bar.nearest(boxes, np.full(len(boxes.names), -math.inf), q, poses)
+        if distance < least:
+            least, where = distance, (bar.name, boxes.names[j])
+    return Touch(0.0, least, *where)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Look:
+    """
+    What was seen of a bar at an instant.
+
+    Parameters
+    ----------
+    index : int
+        Of the instant.
+    way : float
+        Which the bar has moved until then, at most [m].
+    free : float
+        Which it may move before and after without coming nearer than the margin [m].
+    bounds : ndarray, shape (m,)
+        The boxes are no nearer than this [m].
+
+    """
+
+    index: int
+    way: float
+    free: float
+    bounds: Array
+
+    def bounds_at(self, way: float) -> Array:
+        """Return bounds of the distances of the boxes where the bar has moved so far [m]."""
+        return self.bounds - abs(way - self.way)
+
+
+# A bar and two looks at it: whether it is free between them is asked.
+_Gap = tuple[Bar, _Look, _Look]
+
+
+class _Watch:
+    """The looks at a trajectory, and the first touch that they have seen."""
+
+    def __init__(
+        self, arm: ArmModel, scene: Scene, trajectory: Trajectory, margin: float, ray_length: float
+    ) -> None:
+        self._arm, self._trajectory, self._margin = arm, trajectory, margin
+        self._boxes = boxes_of(scene)
+        self.last = max(1, math.ceil(trajectory.duration / PERIOD))
+        self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
+        self.ways = travelled(arm, trajectory, self._times, ray_length)
+        self.bars = [Bar(arm, k, ray_length) for k in range(len(self.ways))]
+        self._unknown = np.full(len(scene.boxes), -math.inf)
+        self.touch: Touch | None = None
+
+    def look(self, wanted: Sequence[tuple[Bar, int, tuple[_Look, ...]]]) -> list[_Look]:
+        """Return looks at bars at some instants, each with what others have seen of the bar."""
+        q = positions_at(self._trajectory, self._times[[index for _, index, _ in wanted]])
+        poses = forward_kinematics(self._arm, q)
+        looks = []
+        for (bar, index, others), one_q, one_poses in zip(wanted, q, poses, strict=True):
+            way = float(self.ways[bar.k, index])
+            bounds = self._unknown
+            for other in others:
+                bounds = np.maximum(bounds, other.bounds_at(way))
+            bounds = bounds.copy()
+            distance, j = bar.nearest(self._boxes, bounds, one_q, one_poses)
+            if distance < self._margin - TOLERANCE and (self.touch is None or index < self.last):
+                # What comes later need not be looked at any more.
+                self.last = index
+                box = self._boxes.names[j]
+                self.touch = Touch(float(self._times[index]), distance, bar.name, box)
+            looks.append(_Look(index, way, max(0.0, distance - self._margin - DOUBT), bounds))
+        return looks
+
+    def between(self, gap: _Gap) -> list[int]:
+        """Return where to look next in a gap; nowhere when the looks at its ends prove it free."""
+        bar, before, after = gap
+        begin, end = before.way + before.free, after.way - after.free
+        room = after.index - before.index - 1
+        if begin >= end or room == 0 or before.index >= self.last:
+            return []
+        # As many looks as are needed where the bar stays as far from the boxes as it is here.
+        n = math.ceil(min(MOST_LOOKS, room, (end - begin) / (before.free + after.free + 1e-9)))
+        step = (end - begin) / n
+        way, low, high = self.ways[bar.k], before.index + 1, after.index - 1
+        return sorted({bisect_left(way, begin + (j + 0.5) * step, low, high) for j in range(n)})
 
 
 def first_touch(
@@ -123,8 +151,10 @@ def first_touch(
     """
     Return where a trajectory first comes nearer than the margin, or None.
 
-    Conservative advancement: from one look to the next no point of the arm moves further than the
-    distance seen, but a look comes at the latest after `PERIOD` where the arm passes close.
+    Conservative advancement to both sides: a look proves a bar free, before and after, for as long
+    as no point of it moves further than the distance seen. What the proofs of two looks leave
+    between them is looked at again, but where the arm passes close no more often than every
+    `PERIOD`: each such instant is looked at or proven free.
 
     Parameters
     ----------
@@ -140,29 +170,21 @@ def first_touch(
         How much of it must be clear at the end [m].
 
     """
-    body = _Body(arm, scene)
-    n = max(2, int(np.ceil(trajectory.duration / PERIOD)) + 1)
-    times = np.linspace(0.0, trajectory.duration, n)
-    positions, velocities, _ = sample(trajectory, times)
-    poses = forward_kinematics(arm, positions)
-    reaches = reach_table(arm, ray_guard_length)
-    touches = []
-    for k in range(len(body.bars)):
-        # Both ends of a bar bound the speed of all its points. Between two instants the speed may
-        # be higher than at both: 5 % covers a quintic of 1 ms.
-        speeds = np.abs(velocities) @ reaches[max(0, k - 1) : k + 1].max(axis=0)
-        way = np.zeros(n)
-        way[1:] = np.cumsum(1.05 * times[1] * np.maximum(speeds[:-1], speeds[1:]))
-        i = 0
-        while True:
-            ray = max(ray_guard_length, reach) if i == n - 1 else ray_guard_length
-            distance, box = body.nearest(k, poses[i], body.length(k, positions[i], ray))
-            if distance < margin - TOLERANCE:
-                touches.append(Touch(float(times[i]), distance, body.names[k], box))
-                break
-            if i == n - 1:
-                break
-            free = distance - margin - EARLIER
-            ahead = int(np.searchsorted(way, way[i] + free, side='right')) - 1
-            i = min(max(i + 1, ahead), n - 1)
-    return min(touches, key=lambda touch: touch.time, default=None)
+    watch = _Watch(arm, scene, trajectory, margin, ray_guard_length)
+    end = watch.last
+    starts = sorted({0, end // 2, end})
+    looks = iter(watch.look([(bar, index, ()) for bar in watch.bars for index in starts]))
+    gaps: list[_Gap] = []
+    for bar in watch.bars:
+        gaps += [(bar, *pair) for pair in pairwise(list(islice(looks, len(starts))))]
+    # All looks of a round are taken in one go: the kinematics of one instant take as long as those
+    # of a dozen.
+    while inner := [(gap, places) for gap in gaps if (places := watch.between(gap))]:
+        looks = iter(watch.look([(gap[0], i, gap[1:]) for gap, places in inner for i in places]))
+        gaps = []
+        for (bar, before, after), places in inner:
+            chain = (before, *islice(looks, len(places)), after)
+            gaps += [(bar, *pair) for pair in pairwise(chain)]
+    if watch.touch is None and reach > ray_guard_length:
+        watch.look([(Bar(arm, watch.bars[-1].k, reach), end, ())])
+    return watch.touch

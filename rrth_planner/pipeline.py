@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The straight line from a scene and a target to a certified trajectory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+import functools
 import time
 
 import numpy as np
@@ -31,6 +32,9 @@ SPARES = (5e-3, 1e-5)
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].
 HAIR = 2e-6
+# A wearer who holds still makes the same world from plan to plan.
+_world_of = functools.lru_cache(maxsize=8)(arm_world)
+_grown = functools.lru_cache(maxsize=32)(grown)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,9 +111,9 @@ def plan_motion(
 
     """
     begin = time.perf_counter()
-    world = arm_world(arm, scene, margin, ray_guard_length)
+    world = _world_of(arm, scene, margin, ray_guard_length)
     refusal = start_refusal(
-        arm, grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
+        arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
     ) or target_refusal(scene, goal, margin)
     if refusal is None:
         found = _find_path(arm, goal, world, q_start, options, seed, should_stop, begin)
@@ -168,7 +172,7 @@ def _find_path(
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
     for spare in SPARES:
-        roomy = grown(world, spare)
+        roomy = _grown(world, spare)
         if not roomy.is_valid(q_start):
             continue
         goals = goal_configurations(arm, goal, roomy, q_start, FEW)
@@ -211,9 +215,11 @@ def _time_path(
     margin: float,
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
-    rounded = round_corners(path, grown(world, HAIR), limits)
-    stops = tuple(replace(blend, half_length=0.0) for blend in rounded)
-    trajectory = first_proven(path, (rounded, stops), limits, world)
+    rounded = round_corners(path, _grown(world, HAIR), limits)
+    choices = [rounded]
+    if any(blend.half_length > 0.0 for blend in rounded):
+        choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
+    trajectory = first_proven(path, choices, limits, world)
     if trajectory is None:
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
@@ -231,7 +237,7 @@ def _time_path(
 
 
 def first_proven(
-    path: Path, choices: tuple[tuple[Blend, ...], ...], limits: MotionLimits, world: World
+    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, world: World
 ) -> Trajectory | None:
     """
     Return the fastest trajectory along a path that is proven free, or None.
@@ -239,7 +245,7 @@ def first_proven(
     Parameters
     ----------
     path : Path
-    choices : tuple of tuple of Blend
+    choices : sequence of tuple of Blend
         Ways to take the corners.
     limits : MotionLimits
     world : World
@@ -266,7 +272,7 @@ def _solved(
     path = result.path
     assert path is not None
     # The world's boxes are the body's grown by margin and slack.
-    clearance = least_clearance(trajectory, grown(world, -margin))
+    clearance = least_clearance(trajectory, _grown(world, -margin))
     planning_time = time.perf_counter() - begin
     note = '' if result.is_reproducible else '; the clock ended the improvement'
     return MotionPlan(

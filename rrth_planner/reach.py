@@ -99,7 +99,8 @@ def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
     return (d,)
 
 
-def bar_ends(arm: ArmModel) -> list[tuple[int, str]]:
+@functools.lru_cache(maxsize=16)
+def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
     """
     Return the offsets of the chain that are bars of the arm, from the mount outwards.
 
@@ -116,12 +117,15 @@ def bar_ends(arm: ArmModel) -> list[tuple[int, str]]:
         if slides or not is_joint or (is_moved and arm.dh[row, 3] != 0.0):
             bars.append((row, 'd'))
         is_moved = True
-    return bars
+    return tuple(bars)
 
 
-def bar_names(arm: ArmModel) -> list[str]:
+@functools.lru_cache(maxsize=16)
+def bar_names(arm: ArmModel) -> tuple[str, ...]:
     """Return what messages call the bars of `bar_ends`."""
-    return ['pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)]
+    return tuple(
+        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
+    )
 
 
 @functools.lru_cache(maxsize=16)

@@ -65,14 +65,14 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
     """Return why a target cannot be pointed at from anywhere, or None."""
     where = ', '.join(f'{value:.3f}' for value in goal.target)
     for box in scene.boxes:
-        local = box.rotation.T @ (goal.target - box.center)
-        excess = np.abs(local) - 0.5 * box.size
-        if (excess <= 0.0).all():
+        local = (goal.target - box.center) @ box.rotation
+        excess = float((np.abs(local) - 0.5 * box.size).max())
+        if excess <= 0.0:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is inside box "{box.name}"',
             )
-        if (excess <= margin).all():
+        if excess <= margin:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is nearer to box "{box.name}" than the margin of '

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a path to a trajectory: straight edges and rounded corners, within the joints' limits."""
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -17,8 +18,11 @@ STILL, HOLD = 1e-9, 0.1
 # Messages carry whole nanoseconds; two points closer than this are one [s].
 TICK, CLOSEST = 1e-9, 1e-5
 
-# A point of a trajectory: time since the piece began [s], position, velocity, acceleration.
-Knot = tuple[float, Array, Array, Array]
+# Where the limits are looked at within a piece: the powers of u in the first and the second
+# derivative there.
+_U = np.linspace(0.0, 1.0, 33)[:, None]
+_FIRST = np.arange(1, 6) * _U ** np.arange(5)
+_SECOND = np.array([2.0, 6.0, 12.0, 20.0]) * _U ** np.arange(4)
 
 
 def parameterize(path: Path, blends: tuple[Blend, ...], limits: MotionLimits) -> Trajectory:
@@ -55,20 +59,23 @@ def parameterize(path: Path, blends: tuple[Blend, ...], limits: MotionLimits) ->
     straights = [length - cuts[i] - cuts[i + 1] for i, length in enumerate(lengths)]
     bounds = [_along(direction, limits) for direction in directions]
     speeds = _corner_speeds(straights, bounds, blends, limits)
-    zero = np.zeros(q.shape[1])
-    knots: list[Knot] = [(0.0, q[0], zero, zero)]
+    # Time, edge, and way, speed and acceleration along it; all but the edge in floats, since these
+    # are many steps with few numbers.
+    knots = [(0.0, 0, 0.0, 0.0, 0.0)]
     now = 0.0
-    for i, direction in enumerate(directions):
-        begin = q[i] + cuts[i] * direction
-        for t, s, v, a in _straight(straights[i], speeds[i], speeds[i + 1], bounds[i]):
-            knots.append((now + t, begin + s * direction, v * direction, a * direction))
+    for i, straight in enumerate(straights):
+        for t, s, v, a in _straight(straight, speeds[i], speeds[i + 1], bounds[i]):
+            knots.append((now + t, i, s, v, a))
         now = knots[-1][0]
-        if i + 1 < len(directions) and cuts[i + 1] > 0.0:
+        if cuts[i + 1] > 0.0:
             now += 2 * cuts[i + 1] / speeds[i + 1]
-            leave = q[i + 1] + cuts[i + 1] * directions[i + 1]
-            knots.append((now, leave, speeds[i + 1] * directions[i + 1], zero))
-    knots[-1] = (now, q[-1], zero, zero)
-    return _within_limits(_assemble(knots), limits)
+            knots.append((now, i + 1, 0.0, speeds[i + 1], 0.0))
+    times, edge, *along = zip(*knots, strict=True)
+    begins, ahead = q[:-1] + np.array(cuts[:-1])[:, None] * directions, directions[list(edge)]
+    ways, speeds_along, accelerations = (np.array(values)[:, None] * ahead for values in along)
+    positions = begins[list(edge)] + ways
+    positions[-1] = q[-1]
+    return _within_limits(_assemble(times, positions, speeds_along, accelerations), limits)
 
 
 def _along(direction: Array, limits: MotionLimits) -> tuple[float, float, float]:
@@ -102,18 +109,21 @@ def _corner_speeds(
 def _reachable(speed: float, distance: float, bounds: tuple[float, float, float]) -> float:
     """Return the greatest speed that a stretch allows to reach, from and to constant speed."""
     top, acceleration, jerk = bounds
-    low, high = speed, max(speed, top)
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        change = middle - speed
+
+    def is_reached(speed_to: float) -> bool:
+        change = speed_to - speed
         if change <= acceleration**2 / jerk:
             duration = 2 * math.sqrt(change / jerk)
         else:
             duration = change / acceleration + acceleration / jerk
-        if 0.5 * (speed + middle) * duration <= distance:
-            low = middle
-        else:
-            high = middle
+        return 0.5 * (speed + speed_to) * duration <= distance
+
+    low, high = speed, max(speed, top)
+    if is_reached(high):
+        return high
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_reached(middle) else (low, middle)
     return low
 
 
@@ -137,38 +147,39 @@ def _straight(
     phases = profile.profiles[0][0]
     result = []
     now = 0.0
-    for i, duration in enumerate(phases.t):
+    # Each of these attributes is a copy.
+    for duration, p, v, a in zip(phases.t, phases.p[1:], phases.v[1:], phases.a[1:], strict=True):
         if duration > 0.0:
             now += duration
-            result.append((now, phases.p[i + 1], phases.v[i + 1], phases.a[i + 1]))
+            result.append((now, p, v, a))
     result[-1] = (now, distance, v_to, 0.0)
     return result
 
 
-def _assemble(knots: list[Knot]) -> Trajectory:
+def _assemble(
+    times: Sequence[float], positions: Array, velocities: Array, accelerations: Array
+) -> Trajectory:
     """
     Return the trajectory through knots at whole nanoseconds, twins merged.
 
     Each knot moves along its own motion to the rounded time: a knot that stayed while its time
     moved by half a nanosecond would cost a short piece 1e-9 v / T^2 of acceleration.
     """
-    kept = [knots[0]]
-    for knot in knots[1:]:
-        if knot[0] - kept[-1][0] < CLOSEST and len(kept) > 1:
+    kept = [0]
+    for i in range(1, len(times)):
+        if times[i] - times[kept[-1]] < CLOSEST and len(kept) > 1:
             kept.pop()
-        kept.append(knot)
-    times = np.array([round(knot[0] / TICK) * TICK for knot in kept])
-    positions, velocities, accelerations = (
-        np.array([knot[column] for knot in kept]) for column in (1, 2, 3)
-    )
+        kept.append(i)
+    exact = np.array(times)[kept]
+    rounded = np.round(exact / TICK) * TICK
+    q, v, a = positions[kept], velocities[kept], accelerations[kept]
     # The last knot is at rest, so it is not moved.
-    shift = (times - np.array([knot[0] for knot in kept]))[:, None]
-    positions += shift * velocities + 0.5 * shift**2 * accelerations
-    velocities += shift * accelerations
-    positions[-1], velocities[-1], accelerations[-1] = kept[-1][1], 0.0, 0.0
-    return Trajectory(
-        times=times, positions=positions, velocities=velocities, accelerations=accelerations
-    )
+    shift = (rounded - exact)[:, None]
+    shift[-1] = 0.0
+    q += shift * v + 0.5 * shift**2 * a
+    v += shift * a
+    v[-1] = a[-1] = 0.0
+    return Trajectory(times=rounded, positions=q, velocities=v, accelerations=a)
 
 
 def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
@@ -181,14 +192,12 @@ def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
     excess = limit_ratio(trajectory, limits)
     if excess <= 1.0:
         return trajectory
-    knots = zip(
-        trajectory.times * excess,
+    return _assemble(
+        (trajectory.times * excess).tolist(),
         trajectory.positions,
         trajectory.velocities / excess,
         trajectory.accelerations / excess**2,
-        strict=True,
     )
-    return _assemble(list(knots))
 
 
 def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
@@ -198,16 +207,14 @@ def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
     Velocity and acceleration of each piece are looked at 33 times, where they are polynomials of
     low degree.
     """
-    c = piece_coefficients(trajectory)
-    T = np.diff(trajectory.times)[:, None, None]
-    u = np.linspace(0.0, 1.0, 33)[None, :, None]
-    c = c[:, :, None, :]
-    v = c[:, 1] + u * (2 * c[:, 2] + u * (3 * c[:, 3] + u * (4 * c[:, 4] + u * 5 * c[:, 5])))
-    a = 2 * c[:, 2] + u * (6 * c[:, 3] + u * (12 * c[:, 4] + u * 20 * c[:, 5]))
+    # Powers first: all pieces and joints in one product.
+    c = piece_coefficients(trajectory).transpose(1, 0, 2)
+    n, dof = c.shape[1:]
+    T = np.diff(trajectory.times)[:, None]
+    v = np.abs(_FIRST @ c[1:].reshape(5, -1)).max(axis=0).reshape(n, dof) / T
+    a = np.abs(_SECOND @ c[2:].reshape(4, -1)).max(axis=0).reshape(n, dof) / T**2
     # The last bits are rounding, no reason to slow down.
-    return float(
-        max(
-            (np.abs(v / T) / limits.velocity).max() / (1 + 1e-6),
-            np.sqrt((np.abs(a / T**2) / limits.acceleration).max() / (1 + 1e-4)),
-        )
+    return max(
+        float((v / limits.velocity).max()) / (1 + 1e-6),
+        math.sqrt(float((a / limits.acceleration).max()) / (1 + 1e-4)),
     )

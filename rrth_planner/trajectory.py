@@ -3,9 +3,10 @@
 """Geometry with time: quintic pieces from rest to rest, as a controller interpolates them."""
 
 from dataclasses import dataclass
+import functools
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
 
@@ -93,6 +94,12 @@ class Trajectory:
         return float(self.times[-1])
 
 
+# The terms u^3, u^4 and u^5 that add a position, a velocity and an acceleration at u = 1, and
+# nothing at u = 0.
+_QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
+
+
+@functools.lru_cache(maxsize=8)
 def piece_coefficients(trajectory: Trajectory) -> Array:
     """
     Return the polynomials of all pieces in u = (t - t_i) / (t_(i+1) - t_i), lowest power first.
@@ -100,28 +107,33 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
     Returns
     -------
     ndarray, shape (n - 1, 6, dof)
-        The quintic that fits position, velocity and acceleration at both ends of each piece [rad].
+        The quintic that fits position, velocity and acceleration at both ends of each piece [rad];
+        read-only, since timing and both checks share it.
 
     """
-    T = np.diff(trajectory.times)[:, None]
-    p0, p1 = trajectory.positions[:-1], trajectory.positions[1:]
-    v0, v1 = trajectory.velocities[:-1] * T, trajectory.velocities[1:] * T
-    a0, a1 = trajectory.accelerations[:-1] * T * T, trajectory.accelerations[1:] * T * T
-    # What position, velocity and acceleration at u = 1 still lack after the first three terms.
-    dp = p1 - p0 - v0 - 0.5 * a0
-    dv = v1 - v0 - a0
-    da = a1 - a0
-    return np.stack(
-        [
-            p0,
-            v0,
-            0.5 * a0,
-            10.0 * dp - 4.0 * dv + 0.5 * da,
-            -15.0 * dp + 7.0 * dv - da,
-            6.0 * dp - 3.0 * dv + 0.5 * da,
-        ],
-        axis=1,
-    )
+    p, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    T = (trajectory.times[1:] - trajectory.times[:-1])[:, None]
+    square = T * T
+    c = np.empty((len(T), 6, p.shape[1]))
+    c[:, 0], c[:, 1] = p[:-1], v[:-1] * T
+    a0 = a[:-1] * square
+    c[:, 2] = 0.5 * a0
+    # What position, velocity and acceleration at u = 1 still lack after these three terms.
+    lacks = np.empty((len(T), 3, p.shape[1]))
+    lacks[:, 0] = p[1:] - p[:-1] - c[:, 1] - c[:, 2]
+    lacks[:, 1] = v[1:] * T - c[:, 1] - a0
+    lacks[:, 2] = a[1:] * square - a0
+    np.matmul(_QUINTIC, lacks, out=c[:, 3:])
+    c.setflags(write=False)
+    return c
+
+
+def positions_at(trajectory: Trajectory, times: ArrayLike) -> Array:
+    """Return the positions at some times, as `sample` does, (m,) [s] -> (m, dof) [rad]."""
+    if len(trajectory.times) == 1:
+        return np.repeat(trajectory.positions, np.size(times), axis=0)
+    i, u, _ = _locate(trajectory, np.atleast_1d(np.asarray(times, dtype=np.float64)))
+    return _position(piece_coefficients(trajectory)[i], u)
 
 
 def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Array]:
@@ -141,17 +153,29 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
 
     """
     t = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    grid = trajectory.times
-    if len(grid) == 1:
+    if len(trajectory.times) == 1:
         held = np.repeat(trajectory.positions, len(t), axis=0)
         return held, np.zeros_like(held), np.zeros_like(held)
-    i = np.clip(np.searchsorted(grid, t, side='right') - 1, 0, len(grid) - 2)
-    width = np.diff(grid)[i][:, None]
-    u = (t - grid[i])[:, None] / width
-    is_outside = (u < 0.0) | (t[:, None] > grid[-1])
-    u = np.clip(u, 0.0, 1.0)
+    i, u, width = _locate(trajectory, t)
+    is_outside = ((t < 0.0) | (t > trajectory.times[-1]))[:, None]
     c = piece_coefficients(trajectory)[i]
-    q = ((((c[:, 5] * u + c[:, 4]) * u + c[:, 3]) * u + c[:, 2]) * u + c[:, 1]) * u + c[:, 0]
     v = (((5 * c[:, 5] * u + 4 * c[:, 4]) * u + 3 * c[:, 3]) * u + 2 * c[:, 2]) * u + c[:, 1]
     a = ((20 * c[:, 5] * u + 12 * c[:, 4]) * u + 6 * c[:, 3]) * u + 2 * c[:, 2]
-    return q, np.where(is_outside, 0.0, v / width), np.where(is_outside, 0.0, a / width**2)
+    return (
+        _position(c, u),
+        np.where(is_outside, 0.0, v / width),
+        np.where(is_outside, 0.0, a / width**2),
+    )
+
+
+def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """Return the piece of each time, how far in it from 0 to 1, and its width [s]."""
+    grid = trajectory.times
+    i = np.searchsorted(grid[1:-1], times, side='right')
+    width = grid[i + 1] - grid[i]
+    u = (times - grid[i]) / width
+    return i, np.minimum(np.maximum(u, 0.0), 1.0)[:, None], width[:, None]
+
+
+def _position(c: Array, u: Array) -> Array:
+    return ((((c[:, 5] * u + c[:, 4]) * u + c[:, 3]) * u + c[:, 2]) * u + c[:, 1]) * u + c[:, 0]

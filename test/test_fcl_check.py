@@ -98,6 +98,76 @@ def test_contacts_deeper_than_a_millimetre_are_found():
     assert n_free > 10
 
 
+def wiggle(rng, arm, scale):
+    """Return a motion whose joints turn back and forth: quintics through random states."""
+    n = int(rng.integers(3, 6))
+    times = np.cumsum(rng.uniform(0.02, 0.3, n))
+    states = rng.standard_normal((3, n, arm.dof)) * scale
+    middle = rng.uniform(*arm.bounds)
+    return Trajectory(
+        times=times - times[0],
+        positions=middle + 0.1 * states[0],
+        velocities=states[1],
+        accelerations=10.0 * states[2],
+    )
+
+
+def first_touch_by_brute_force(arm, scene, trajectory, margin, ray):
+    """Return the time of the first millisecond at which the library finds less, or None."""
+    n = int(np.ceil(trajectory.duration / fcl_check.PERIOD))
+    times = np.linspace(0.0, trajectory.duration, n + 1)
+    for time, q in zip(times, sample(trajectory, times)[0], strict=True):
+        if fcl_check.nearest(arm, scene, q, ray).distance < margin - fcl_check.TOLERANCE:
+            return time
+    return None
+
+
+def test_the_first_touch_is_that_of_a_look_every_millisecond():
+    rng = np.random.default_rng(24)
+    n_touching = n_free = 0
+    for i in range(120):
+        is_paper = i % 3 > 0
+        arm = table_1_arm() if is_paper else random_chain(rng, i % 2 == 0)
+        scene = varied_body(rng) if is_paper else random_boxes(rng, 3)
+        for _ in range(3):
+            scale = rng.choice([0.3, 1.0, 3.0])
+            trajectory = wiggle(rng, arm, scale)
+            start, _, _ = sample(trajectory, [0.0])
+            if fcl_check.nearest(arm, scene, start[0], 0.5).distance < 0.02:
+                continue
+            # Touching by as little as can be, and not touching by as little, too.
+            margin = rng.choice([0.0, 0.02, 0.1])
+            expected = first_touch_by_brute_force(arm, scene, trajectory, margin, 0.5)
+            touch = fcl_check.first_touch(arm, scene, trajectory, margin, 0.5, 0.5)
+            assert (touch and touch.time) == expected
+            n_touching += expected is not None
+            n_free += expected is None
+    assert n_touching > 40
+    assert n_free > 40
+
+
+def test_a_touch_of_one_instant_is_found():
+    rng = np.random.default_rng(25)
+    arm, n_found = table_1_arm(), 0
+    for _ in range(40):
+        scene = varied_body(rng)
+        trajectory = wiggle(rng, arm, 1.0)
+        n = int(np.ceil(trajectory.duration / fcl_check.PERIOD))
+        times = np.linspace(0.0, trajectory.duration, n + 1)
+        q, _, _ = sample(trajectory, times)
+        least = [fcl_check.nearest(arm, scene, one, 1.0).distance for one in q]
+        lowest = int(np.argmin(least))
+        if least[lowest] < 0.0:
+            continue
+        n_found += 1
+        margin = least[lowest] + 2 * fcl_check.TOLERANCE
+        touch = fcl_check.first_touch(arm, scene, trajectory, margin, 1.0, 1.0)
+        assert touch is not None
+        assert touch.distance == pytest.approx(least[lowest], abs=2 * fcl_check.TOLERANCE)
+        assert fcl_check.first_touch(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
+    assert n_found > 10
+
+
 def plate_beside(arm, q, gap):
     """Return a plate square to the ray's side, `gap` [m] away from it at q."""
     T = tool_pose(arm, q)

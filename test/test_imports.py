@@ -20,7 +20,7 @@ ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', '
 # What a module of the core may import beyond numpy and the standard library.
 OWN = {
     'timing': {'ruckig'},
-    'fcl_check': {'fcl'},
+    'fcl_shapes': {'fcl'},
     'resources': {'yaml', 'ament_index_python'},
     'cluster': {'tqdm', 'distributed'},
     'store': {'pyarrow'},
@@ -83,8 +83,8 @@ def test_a_module_imports_only_what_its_layer_may(module):
         is_late_by_right = (module, name) in LATE or module == REPORTER
         if name.startswith('rrth_planner') and not is_late_by_right:
             assert is_top, f'{module} imports {name} below the top'
-        if name.startswith('rrth_planner.fcl_check'):
-            assert module.endswith(('.pipeline', '.fcl_check', '.ros.requests')), (
+        if name.startswith('rrth_planner.fcl_'):
+            assert module.endswith(('.pipeline', '.fcl_check', '.fcl_shapes', '.ros.requests')), (
                 f'{module} imports {name}'
             )
 

@@ -104,5 +104,5 @@ def test_curvature_of_a_single_turning_joint_is_attained():
 
 def test_every_bar_has_a_name_and_the_mount_is_none():
     arm = table_1_arm()
-    assert bar_names(arm) == ['link 3', 'link 4', 'pointing ray']
-    assert bar_ends(arm) == [(2, 'd'), (3, 'd'), (4, 'd')]
+    assert bar_names(arm) == ('link 3', 'link 4', 'pointing ray')
+    assert bar_ends(arm) == ((2, 'd'), (3, 'd'), (4, 'd'))

@@ -25,11 +25,25 @@ from rrth_planner.trajectory import Trajectory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """What a request is answered: was a motion published, the text, the tool's path."""
+    """
+    What a request is answered.
+
+    Parameters
+    ----------
+    is_solved : bool
+        Whether a motion was published.
+    text : str
+    tool_path : callable
+        Returns the tool's path; empty where no motion was published.
+    conclude : callable
+        What is left to do when it has been answered: to show and to report it.
+
+    """
 
     is_solved: bool
     text: str
-    tool_path: Path
+    tool_path: Callable[[], Path]
+    conclude: Callable[[], None]
 
 
 class _Ticket:
@@ -88,7 +102,12 @@ class PlanQueue:
             self._open.add(ticket)
         try:
             self._worker.submit(work)
-            return await future
+            response: Response = await future
+            executor = self._node.executor
+            if executor is not None:
+                # As a task of its own: the answer is sent before the executor comes to it.
+                executor.create_task(self.prepare, response.conclude)
+            return response
         finally:
             with self._lock:
                 self._open.discard(ticket)
@@ -103,7 +122,9 @@ class PlanQueue:
                 # The request that needs it will say what is wrong.
                 self._node.get_logger().error(traceback.format_exc())
 
-        self._worker.submit(prepared)
+        with self._lock:
+            if not self._is_closed:
+                self._worker.submit(prepared)
 
     def cancel(self) -> int:
         """End the requests that have published no motion yet; return how many these are."""
@@ -121,8 +142,8 @@ class PlanQueue:
         self._worker.shutdown(wait=True, cancel_futures=True)
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
-        """Plan, publish and conclude; called in the worker's thread."""
-        figures, path, outcome = PlanReport(), Path(), None
+        """Plan and publish; called in the worker's thread."""
+        figures, shown = PlanReport(), None
         parameters = self._reporter.parameters
         try:
             outcome = self._plan_request(
@@ -134,8 +155,8 @@ class PlanQueue:
             if self._settle(ticket, outcome.trajectory, parameters):
                 if code is not ErrorCode.PREEMPTED:
                     code, sentence = ErrorCode.PREEMPTED, 'the request was cancelled'
-                outcome = None
             elif outcome.trajectory is not None:
+                shown = outcome
                 figures = replace(
                     figures,
                     response_time=time.perf_counter() - begin,
@@ -148,13 +169,18 @@ class PlanQueue:
             self._node.get_logger().error(traceback.format_exc())
             with self._lock:
                 self._open.discard(ticket)
-            code, sentence, outcome = ErrorCode.FAILURE, _in_a_sentence(problem), None
-        if self._is_closed:
-            return Response(False, answer(code, sentence), path)
-        if outcome is not None and outcome.trajectory is not None:
-            path = self._show(outcome, parameters)
-        text = self._reporter.conclude(code, sentence, figures)
-        return Response(code is ErrorCode.SUCCESS, text, path)
+            code, sentence, shown = ErrorCode.FAILURE, _in_a_sentence(problem), None
+
+        def tool_path() -> Path:
+            return Path() if shown is None else self._tool_path(shown, parameters)
+
+        def conclude() -> None:
+            self._reporter.conclude(code, sentence, figures)
+            if shown is not None:
+                self._show(shown, parameters)
+
+        is_solved = code is ErrorCode.SUCCESS and not self._is_closed
+        return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
     def _settle(
         self, ticket: _Ticket, trajectory: Trajectory | None, parameters: PlannerParameters
@@ -168,15 +194,19 @@ class PlanQueue:
             self._open.discard(ticket)
             return False
 
-    def _show(self, outcome: Any, parameters: Any) -> Path:
-        """Publish what shows a motion; a failure of this does not unsay the motion."""
+    def _tool_path(self, outcome: Any, parameters: PlannerParameters) -> Path:
+        """Return the tool's path; a failure of this does not unsay the motion."""
         try:
-            return self._publishers.publish_view(
-                outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
-            )
+            return self._publishers.tool_path(outcome.trajectory, parameters)
         except Exception:
             self._node.get_logger().error(traceback.format_exc())
             return Path()
+
+    def _show(self, outcome: Any, parameters: PlannerParameters) -> None:
+        """Publish what shows a motion."""
+        self._publishers.publish_view(
+            outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
+        )
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9

@@ -3,6 +3,7 @@
 """The planner as a ROS 2 node: what it offers, and how it starts and ends."""
 
 from collections.abc import Callable
+import gc
 from importlib.util import find_spec
 import signal
 import sys
@@ -32,6 +33,8 @@ from std_srvs.srv import Trigger
 
 NAME = 'rrth_planner'
 BEGIN = time.monotonic()
+# After so long a thread lets another one run [s].
+SWITCH_INTERVAL = 2e-4
 
 
 class PlannerNode(Node):
@@ -124,7 +127,7 @@ class PlannerNode(Node):
             self._reporter.conclude(code, f'request of get_plan: {problem}', PlanReport())
             return response
         found = await self._queue.respond(goal)
-        response.plan = found.tool_path
+        response.plan = found.tool_path()
         return response
 
     def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
@@ -143,6 +146,7 @@ def main(args: list[str] | None = None) -> int:
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = PlannerNode()
+        _settle_interpreter()
         _on_signals(_leave_to_ros)
         install_signal_handlers(SignalHandlerOptions.ALL)
         executor = SingleThreadedExecutor()
@@ -161,6 +165,16 @@ def main(args: list[str] | None = None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _settle_interpreter() -> None:
+    """Keep what would hold up a plan for milliseconds short."""
+    # The collector need not look again and again at what lives as long as the node: half a million
+    # objects of numba and ROS.
+    gc.collect()
+    gc.freeze()
+    # The worker and the executor hand the interpreter to each other; the default is 5 ms.
+    sys.setswitchinterval(SWITCH_INTERVAL)
 
 
 def _on_signals(handler: Callable[..., None]) -> None:

@@ -37,13 +37,16 @@ class PlanPublishers:
             joint_trajectory_to_msg(trajectory, parameters.arm.joint_names, parameters.base_frame)
         )
 
+    def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
+        """Return the tool's path along a motion."""
+        return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
+
     def publish_view(
         self, trajectory: Trajectory, parameters: PlannerParameters, scene: Scene, target: Array
-    ) -> Path:
-        """Publish what shows a motion, and return the tool's path."""
-        path = tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
+    ) -> None:
+        """Publish what shows a motion."""
+        path = self.tool_path(trajectory, parameters)
         self._tool_path.publish(path)
         self._markers.publish(
             plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
         )
-        return path

@@ -468,7 +468,38 @@ def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
 
     monkeypatch.setattr(queue, '_show', cancel_first)
     assert stranger.answer().success
+    stranger.wait_until(lambda: ended)
     assert ended == [0]
+
+
+def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue, is_answered = planner._queue, threading.Event()
+    show = queue._show
+
+    def show_late(*args):
+        assert is_answered.wait(30.0)
+        show(*args)
+
+    monkeypatch.setattr(queue, '_show', show_late)
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    assert not stranger.heard['rrth_planner/markers']
+    is_answered.set()
+    stranger.wait_until(lambda: stranger.heard['rrth_planner/markers'])
+
+
+def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+
+    def fail(*args):
+        raise RuntimeError('no colours')
+
+    monkeypatch.setattr(planner._queue, '_show', fail)
+    for _ in range(2):
+        assert stranger.answer().success
 
 
 def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
