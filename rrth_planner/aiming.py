@@ -6,16 +6,51 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import pointing
+from rrth_planner.kernels import jit, pointing, pointing_numerically
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
-# Draws of the free joints: a few give good postures at once; many, before none is said to be free.
+# Draws of joints: a few give good postures at once; many, before none is said to be free.
 FEW, MANY = 128, 4096
+# A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.
+LEAST_MOVE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointingKernels:
+    """
+    How the goal manifold of an arm is computed.
+
+    Parameters
+    ----------
+    goal_candidates : compiled function
+        The seam `kernels.jit.CANDIDATES`.
+    slide_goal : compiled function
+        The seam `kernels.jit.SLIDE`.
+    n_solved : int
+        How many of the last joints `goal_candidates` solves for; the others are drawn.
+
+    """
+
+    goal_candidates: Callable[..., int]
+    slide_goal: Callable[..., float]
+    n_solved: int
+
+
+CLOSED_FORM = PointingKernels(
+    goal_candidates=jit.first_class(pointing.goal_candidates),
+    slide_goal=jit.first_class(pointing.slide_goal),
+    n_solved=2,
+)
+NUMERICAL = PointingKernels(
+    goal_candidates=jit.first_class(pointing_numerically.goal_candidates),
+    slide_goal=jit.first_class(pointing_numerically.slide_goal),
+    n_solved=0,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,18 +77,35 @@ class GoalSet:
     blocked_reaches: Array
 
 
-def check_pointing_arm(arm: ArmModel) -> None:
+def pointing_kernels(arm: ArmModel) -> PointingKernels:
     """
-    Raise ModelError unless the goal manifold of an arm is known in closed form.
+    Return how an arm aims: in closed form if its last two joints are a pan and tilt unit.
 
-    The last two joints must be revolute, square to each other and to the ray, without `a` offset.
+    That is revolute joints, square to each other and to the ray, without `a` offset.
     """
     tail = arm.dh[-2:]
     is_square = np.abs(np.cos(tail[:, 0])).max() < 1e-9 and np.abs(tail[:, 1]).max() < 1e-12
-    if arm.dof < 2 or any(arm.is_prismatic[-2:]) or not is_square:
+    is_unit = arm.dof >= 2 and not any(arm.is_prismatic[-2:]) and is_square
+    return CLOSED_FORM if is_unit else NUMERICAL
+
+
+def check_pointing_arm(arm: ArmModel) -> None:
+    """
+    Raise ModelError if the ray of an arm sweeps no more than a surface, whatever the joints do.
+
+    To reach the targets beside it, the joints must move a point of the ray both ways across it.
+    """
+    share = (0.5 + np.arange(64)[:, None] * _spreading_ratios(arm.dof)) % 1.0
+    T = forward_kinematics(arm, arm.bounds[0] + share * (arm.bounds[1] - arm.bounds[0]))
+    point = T[:, -1:, :3, 3] + T[:, -1:, :3, 2]
+    z, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
+    moves = np.where(np.array(arm.is_prismatic)[:, None], z, np.cross(z, point - origin))
+    slopes = np.linalg.svd(moves @ T[:, -1, :3, :2], compute_uv=False)
+    n_directions = int((slopes.max(axis=0) > LEAST_MOVE).sum())
+    if n_directions < 2:
         raise ModelError(
-            'arm: the last two joints are no pan and tilt unit, expected two revolute joints with '
-            'alpha = +-pi/2 [rad] and a = 0 [m] in the rows of the last joint and of the tool'
+            f'arm: its joints move the pointing ray across itself in {n_directions} direction(s), '
+            'expected 2: the ray sweeps a surface at most, and meets no target beside it'
         )
 
 
@@ -79,16 +131,17 @@ def goal_configurations(
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
-        How many values of the joints before the last two are tried, both branches each.
+        Half of the number of candidates that are tried.
 
     """
+    kernels = pointing_kernels(arm)
     candidates, reaches = np.empty((2 * n_draws, arm.dof)), np.empty(2 * n_draws)
-    n = pointing.goal_candidates(
+    n = kernels.goal_candidates(
         world.robot,
         world.bounds,
         target_in_mount(arm, goal),
         q_near,
-        _spreading_ratios(arm.dof - 2),
+        _spreading_ratios(arm.dof - kernels.n_solved),
         n_draws,
         candidates,
         reaches,
@@ -110,11 +163,11 @@ def goal_slider(
     arm: ArmModel, goal: PointingGoal, world: World
 ) -> Callable[[Array, int, float], float]:
     """Return the `slide_goal` of a PlanningProblem for a pointing goal."""
-    target = target_in_mount(arm, goal)
+    kernels, target = pointing_kernels(arm), target_in_mount(arm, goal)
 
     def slide(path: Array, n_waypoints: int, finest: float) -> float:
         return float(
-            pointing.slide_goal(
+            kernels.slide_goal(
                 world.edge_check,
                 world.resolution,
                 world.robot,

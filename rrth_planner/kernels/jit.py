@@ -36,6 +36,16 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, MAT, MAT))
 # free [rad].
 FREE_RADIUS = types.FunctionType(float64(VEC, MAT, MAT))
 
+# How an arm aims: (robot rows, bounds, target, q_near, ratios, n_draws, candidates, reaches)
+# -> how many candidates it wrote; `ratios` has an entry for each joint that is drawn.
+CANDIDATES = types.FunctionType(int64(MAT, MAT, VEC, VEC, VEC, int64, OUT_MAT, OUT_VEC))
+
+# How its goal slides: (edge check, resolution, robot rows, obstacle rows, bounds, target, path,
+# number of waypoints, finest step) -> gain [rad].
+SLIDE = types.FunctionType(
+    float64(EDGE_CHECK, float64, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64)
+)
+
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
 N_START, N_GOAL, N_MEETINGS, N_GOALS = range(4)
