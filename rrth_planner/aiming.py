@@ -2,20 +2,59 @@
 # SPDX-License-Identifier: Apache-2.0
 """The goal manifold of an arm: the configurations whose ray meets a target."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+import functools
 
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import jit, pointing
+from rrth_planner.kernels import jit, pointing, pointing_numerically
+from rrth_planner.kernels.goals import find_goals
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
-# Draws of the free joints: a few give good postures at once; many, before none is said to be free.
+# Draws of joints: a few give good postures at once; many, before none is said to be free.
 FEW, MANY = 128, 4096
-SLIDE_GOAL = jit.first_class(pointing.slide_goal)
+# Goals that are kept, and postures that touch.
+MOST, MOST_BLOCKED = 256, 512
+# A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.
+LEAST_MOVE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointingKernels:
+    """
+    How the goal manifold of an arm is computed.
+
+    Parameters
+    ----------
+    goal_candidates : compiled function
+        The seam `kernels.jit.CANDIDATES`.
+    slide_goal : compiled function
+        The seam `kernels.jit.SLIDE`.
+    n_solved : int
+        How many of the last joints `goal_candidates` solves for; the others are drawn.
+
+    """
+
+    goal_candidates: Callable[..., int]
+    slide_goal: Callable[..., float]
+    n_solved: int
+
+
+CLOSED_FORM = PointingKernels(
+    goal_candidates=jit.first_class(pointing.goal_candidates),
+    slide_goal=jit.first_class(pointing.slide_goal),
+    n_solved=2,
+)
+NUMERICAL = PointingKernels(
+    goal_candidates=jit.first_class(pointing_numerically.goal_candidates),
+    slide_goal=jit.first_class(pointing_numerically.slide_goal),
+    n_solved=0,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -27,6 +66,8 @@ class GoalSet:
     ----------
     q_goals : ndarray, shape (n, dof)
         The free ones [rad].
+    n_bent : int
+        So many of the first ones are not reached by a straight free edge.
     n_aiming : int
         How many aim at all, free or not.
     q_blocked : ndarray, shape (m, dof)
@@ -37,23 +78,42 @@ class GoalSet:
     """
 
     q_goals: Array
+    n_bent: int
     n_aiming: int
     q_blocked: Array
     blocked_reaches: Array
 
 
-def check_pointing_arm(arm: ArmModel) -> None:
+@functools.lru_cache(maxsize=16)
+def pointing_kernels(arm: ArmModel) -> PointingKernels:
     """
-    Raise ModelError unless the goal manifold of an arm is known in closed form.
+    Return how an arm aims: in closed form if its last two joints are a pan and tilt unit.
 
-    The last two joints must be revolute, square to each other and to the ray, without `a` offset.
+    That is revolute joints, square to each other and to the ray, without `a` offset.
     """
     tail = arm.dh[-2:]
     is_square = np.abs(np.cos(tail[:, 0])).max() < 1e-9 and np.abs(tail[:, 1]).max() < 1e-12
-    if arm.dof < 2 or any(arm.is_prismatic[-2:]) or not is_square:
+    is_unit = arm.dof >= 2 and not any(arm.is_prismatic[-2:]) and is_square
+    return CLOSED_FORM if is_unit else NUMERICAL
+
+
+def check_pointing_arm(arm: ArmModel) -> None:
+    """
+    Raise ModelError if the ray of an arm sweeps no more than a surface, whatever the joints do.
+
+    To reach the targets beside it, the joints must move a point of the ray both ways across it.
+    """
+    share = (0.5 + np.arange(64)[:, None] * _spreading_ratios(arm.dof)) % 1.0
+    T = forward_kinematics(arm, arm.bounds[0] + share * (arm.bounds[1] - arm.bounds[0]))
+    point = T[:, -1:, :3, 3] + T[:, -1:, :3, 2]
+    z, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
+    moves = np.where(np.array(arm.is_prismatic)[:, None], z, np.cross(z, point - origin))
+    slopes = np.linalg.svd(moves @ T[:, -1, :3, :2], compute_uv=False)
+    n_directions = int((slopes.max(axis=0) > LEAST_MOVE).sum())
+    if n_directions < 2:
         raise ModelError(
-            'arm: the last two joints are no pan and tilt unit, expected two revolute joints with '
-            'alpha = +-pi/2 [rad] and a = 0 [m] in the rows of the last joint and of the tool'
+            f'arm: its joints move the pointing ray across itself in {n_directions} direction(s), '
+            'expected 2: the ray sweeps a surface at most, and meets no target beside it'
         )
 
 
@@ -70,6 +130,9 @@ def goal_configurations(
     """
     Return the free configurations that aim at a target, nearest to q_near first.
 
+    The list ends with the first one that a straight free edge reaches, if there is one: no path to
+    a farther one is shorter.
+
     Parameters
     ----------
     arm : ArmModel
@@ -79,30 +142,39 @@ def goal_configurations(
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
-        How many values of the joints before the last two are tried, both branches each.
+        Half of the number of candidates that are tried.
 
     """
-    candidates, reaches = np.empty((2 * n_draws, arm.dof)), np.empty(2 * n_draws)
-    n = pointing.goal_candidates(
+    kernels, dof = pointing_kernels(arm), arm.dof
+    goals, reaches = np.empty((MOST, dof)), np.empty(MOST)
+    blocked, blocked_reaches = np.empty((MOST_BLOCKED, dof)), np.empty(MOST_BLOCKED)
+    counts = np.empty(3, dtype=np.int64)
+    find_goals(
+        kernels.goal_candidates,
+        world.edge_check,
+        world.chain,
+        world.resolution,
         world.robot,
+        world.obstacles,
         world.bounds,
         target_in_mount(arm, goal),
         q_near,
-        _spreading_ratios(arm.dof - 2),
+        _spreading_ratios(dof - kernels.n_solved),
         n_draws,
-        candidates,
+        goals,
         reaches,
+        blocked,
+        blocked_reaches,
+        counts,
     )
-    order = np.argsort(np.linalg.norm(candidates[:n] - q_near, axis=1), kind='stable')
-    candidates, reaches = candidates[order], reaches[order]
-    flags = np.empty(n, dtype=np.int8)
-    pointing.find_free_goals(world.chain, world.robot, world.obstacles, candidates, reaches, flags)
-    is_free = flags.astype(bool)
+    n_free, n_blocked = int(counts[0]), int(counts[1])
+    n_kept = min(n_blocked, MOST_BLOCKED)
     return GoalSet(
-        q_goals=candidates[is_free],
-        n_aiming=n,
-        q_blocked=candidates[~is_free][:512],
-        blocked_reaches=reaches[~is_free][:512],
+        q_goals=goals[:n_free],
+        n_bent=n_free - int(counts[2]),
+        n_aiming=n_free + n_blocked,
+        q_blocked=blocked[:n_kept],
+        blocked_reaches=blocked_reaches[:n_kept],
     )
 
 
@@ -114,14 +186,18 @@ def pointing_problem(
         world=world,
         q_start=q_start,
         q_goals=goals.q_goals,
-        slide_goal=SLIDE_GOAL,
+        n_bent=goals.n_bent,
+        slide_goal=pointing_kernels(arm).slide_goal,
         target=target_in_mount(arm, goal),
     )
 
 
+@functools.lru_cache(maxsize=32)
 def _spreading_ratios(n: int) -> Array:
     """Return the steps 1/phi, 1/phi^2, ... with phi^(n+1) = phi + 1 (Roberts 2018)."""
     phi = 2.0
     for _ in range(64):
         phi = (1.0 + phi) ** (1.0 / (n + 1))
-    return phi ** -np.arange(1.0, n + 1.0)
+    ratios: Array = phi ** -np.arange(1.0, n + 1.0)
+    ratios.setflags(write=False)
+    return ratios

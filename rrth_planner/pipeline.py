@@ -8,7 +8,14 @@ import functools
 import time
 
 import numpy as np
-from rrth_planner.aiming import FEW, goal_configurations, GoalSet, MANY, pointing_problem
+from rrth_planner.aiming import (
+    check_pointing_arm,
+    FEW,
+    goal_configurations,
+    GoalSet,
+    MANY,
+    pointing_problem,
+)
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.blend import Blend, round_corners
@@ -137,7 +144,16 @@ def plan_motion(
 
 
 def warm_up(arm: ArmModel, options: TreeOptions) -> None:
-    """Plan once round a small box, so that every kernel is compiled and loaded."""
+    """
+    Plan once round a small box, so that every kernel is compiled and loaded.
+
+    Raises
+    ------
+    ModelError
+        The arm cannot point.
+
+    """
+    check_pointing_arm(arm)
     q_start = arm.bounds.mean(axis=0)
     T = tool_pose(arm, q_start)
     far = T[:3, 3] + 100.0 * T[:3, 0]

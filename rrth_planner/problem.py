@@ -26,6 +26,8 @@ class PlanningProblem:
         A valid configuration [rad].
     q_goals : array_like, shape (n, dof)
         Valid configurations, nearest to q_start first [rad].
+    n_bent : int
+        So many of the first goals are known not to be reached by a straight free edge.
     slide_goal : compiled function
         The seam `kernels.jit.SLIDE`: moves the last waypoint along the goal manifold in place, by
         edges that the world allows. Default: the goals are points.
@@ -37,6 +39,7 @@ class PlanningProblem:
     world: World
     q_start: Array
     q_goals: Array
+    n_bent: int = 0
     slide_goal: Callable[..., float] = STAY
     target: Array = field(default_factory=lambda: np.zeros(3))
 

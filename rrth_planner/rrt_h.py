@@ -59,7 +59,9 @@ def search(
         problem.q_goals,
     )
     settings = _settings(options, deadline)
-    rrt_h.go_straight(world.edge_check, *given, settings, room.paths, room.state, room.history)
+    rrt_h.go_straight(
+        world.edge_check, *given, problem.n_bent, settings, room.paths, room.state, room.history
+    )
     is_straight = room.state[rrt_h.N_BEST] > 0
     settings[rrt_h.ATTEMPTS] = options.club_attempts + (not is_straight)
     if is_straight and _is_best(problem, room):

@@ -160,9 +160,9 @@ def random_boxes(rng, n, spread=1.0, largest=0.4):
     )
 
 
-def random_chain(rng, has_tail):
-    """Return an arm of 3 to 7 joints, at times one of them prismatic; a pan-tilt tail or none."""
-    dof = int(rng.integers(3, 8))
+def random_chain(rng, has_tail, fewest=3):
+    """Return an arm of up to 7 joints, at times one of them prismatic; a pan-tilt tail or none."""
+    dof = int(rng.integers(fewest, 8))
     angles = np.array([0.0, QUARTER, -QUARTER, HALF_TURN])
     dh = np.zeros((dof + 1, 4))
     dh[:, 0] = np.where(

@@ -57,6 +57,13 @@ SLIDE = types.FunctionType(
     float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64)
 )
 
+# How an arm aims: (robot, bounds, target, q_near, ratios, first, n_draws, longest, candidates,
+# reaches) -> how many candidates no farther from q_near than `longest` it wrote, of the draws from
+# `first` on; `ratios` has an entry for each joint that is drawn.
+CANDIDATES = types.FunctionType(
+    int64(MAT, MAT, VEC, VEC, VEC, int64, int64, float64, OUT_MAT, OUT_VEC)
+)
+
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
 N_START, N_GOAL, N_MEETINGS, N_GOALS = range(4)

@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.arm_validity import is_configuration_free
 from rrth_planner.kernels.jit import (
     A,
@@ -17,7 +18,6 @@ from rrth_planner.kernels.jit import (
     KIND,
     MAT,
     OFFSET,
-    OUT_FLAGS,
     OUT_MAT,
     OUT_VEC,
     PRISMATIC,
@@ -30,14 +30,14 @@ from rrth_planner.kernels.tree import distance
 TURN = 2.0 * math.pi
 
 
-@kernel(void(MAT, int64, OUT_MAT))
+@kernel(void(MAT, int64, OUT_VEC))
 def tilt_frame(robot, i, frame):
-    """Apply Tx(a) Rx(alpha) of row i; frame (4, 3) = x, y, z axes and origin as rows."""
+    """Apply Tx(a) Rx(alpha) of row i; frame (12,) = x, y, z axes and origin."""
     for k in range(3):
-        frame[3, k] += robot[i, A] * frame[0, k]
-        y, z = frame[1, k], frame[2, k]
-        frame[1, k] = robot[i, COS_ALPHA] * y + robot[i, SIN_ALPHA] * z
-        frame[2, k] = robot[i, COS_ALPHA] * z - robot[i, SIN_ALPHA] * y
+        frame[9 + k] += robot[i, A] * frame[k]
+        y, z = frame[3 + k], frame[6 + k]
+        frame[3 + k] = robot[i, COS_ALPHA] * y + robot[i, SIN_ALPHA] * z
+        frame[6 + k] = robot[i, COS_ALPHA] * z - robot[i, SIN_ALPHA] * y
 
 
 @kernel(float64(float64, float64, float64, float64))
@@ -51,71 +51,105 @@ def unwrap(angle, near, lower, upper):
     return angle if lower <= angle <= upper else math.nan
 
 
-@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
-def aim(robot, bounds, target, q_near, branch, q):
-    """
-    Complete q so that the ray meets the target; return the ray's reach [m], or -1.
-
-    All joints but the last two are given in q; the target is in the arm's base frame. The last
-    joint's axis is square to the one before, the ray square to it, both without `a` offset: a pan
-    and tilt unit with the ray beside the pan axis by e = d of the last row. Then, seen from the
-    elbow, v . z_last = e fixes the pan (two branches) and the ray's direction the tilt
-    (`docs/algorithms.md`, section 4). -1: too near to the pan axis, or beyond a joint's limit.
-    """
+@kernel(void(MAT, VEC, VEC, OUT_VEC))
+def look_from_elbow(robot, target, q, v):
+    """Write where the target is (3,), seen from the pan joint at rest; its base is at q [m]."""
     dof = q.shape[0]
-    frame = np.zeros((4, 3))
-    frame[0, 0] = frame[1, 1] = frame[2, 2] = 1.0
+    frame = scratch.floats(12)
+    for k in range(12):
+        frame[k] = 1.0 if k % 4 == 0 and k < 9 else 0.0
     for i in range(dof - 2):
         tilt_frame(robot, i, frame)
         slides = robot[i, KIND] == PRISMATIC
         s, c = sine_cosine(robot[i, OFFSET] + (0.0 if slides else q[i]))
         d = robot[i, D] + (q[i] if slides else 0.0)
         for k in range(3):
-            x, y = frame[0, k], frame[1, k]
-            frame[0, k], frame[1, k] = c * x + s * y, c * y - s * x
-            frame[3, k] += d * frame[2, k]
-    pan, tilt = dof - 2, dof - 1
+            x, y = frame[k], frame[3 + k]
+            frame[k], frame[3 + k] = c * x + s * y, c * y - s * x
+            frame[9 + k] += d * frame[6 + k]
+    pan = dof - 2
     tilt_frame(robot, pan, frame)
-    vx = vy = vz = 0.0
+    v[0] = v[1] = v[2] = 0.0
     for k in range(3):
-        v = target[k] - frame[3, k] - robot[pan, D] * frame[2, k]
-        vx, vy, vz = vx + v * frame[0, k], vy + v * frame[1, k], vz + v * frame[2, k]
+        offset = target[k] - frame[9 + k] - robot[pan, D] * frame[6 + k]
+        v[0], v[1] = v[0] + offset * frame[k], v[1] + offset * frame[3 + k]
+        v[2] += offset * frame[6 + k]
+
+
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+def pan_and_tilt(robot, bounds, v, q_near, branch, q):
+    """
+    Write the last two joints so that the ray meets v; return the ray's reach [m], or -1.
+
+    The last joint's axis is square to the one before, the ray square to it, both without `a`
+    offset: a pan and tilt unit with the ray beside the pan axis by e = d of the last row. Then,
+    seen from the elbow, v . z_last = e fixes the pan (two branches) and the ray's direction the
+    tilt (`docs/algorithms.md`, section 4). -1: too near to the pan axis, or beyond a joint's
+    limit.
+    """
+    pan, tilt = q.shape[0] - 2, q.shape[0] - 1
+    vx, vy, vz = v[0], v[1], v[2]
     e = robot[tilt, D]
     tilt_sign, ray_sign = robot[tilt, SIN_ALPHA], robot[tilt + 1, SIN_ALPHA]
-    across = math.hypot(vx, vy)
-    if across <= abs(e):
+    squared = vx * vx + vy * vy
+    if squared <= e * e:
         return -1.0
-    rise = math.asin(tilt_sign * e / across)
-    phi = math.atan2(vy, vx) + (rise if branch == 0 else math.pi - rise)
-    s, c = math.sin(phi), math.cos(phi)
+    # Sine of phi - atan2(vy, vx), and its cosine on either branch.
+    across = math.sqrt(squared)
+    rise = tilt_sign * e / across
+    level = math.sqrt(1.0 - rise * rise) * (1.0 if branch == 0 else -1.0)
+    c, s = (vx * level - vy * rise) / across, (vy * level + vx * rise) / across
     wx = c * vx + s * vy
-    theta = math.atan2(ray_sign * wx, -ray_sign * tilt_sign * vz)
+    phi, theta = math.atan2(s, c), math.atan2(ray_sign * wx, -ray_sign * tilt_sign * vz)
     q[pan] = unwrap(phi - robot[pan, OFFSET], q_near[pan], bounds[0, pan], bounds[1, pan])
     q[tilt] = unwrap(theta - robot[tilt, OFFSET], q_near[tilt], bounds[0, tilt], bounds[1, tilt])
     if math.isnan(q[pan]) or math.isnan(q[tilt]):
         return -1.0
-    return math.hypot(wx, vz)
+    return math.sqrt(wx * wx + vz * vz)
 
 
-@kernel(int64(MAT, MAT, VEC, VEC, VEC, int64, OUT_MAT, OUT_VEC))
-def goal_candidates(robot, bounds, target, q_near, ratios, n_draws, candidates, reaches):
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+def aim(robot, bounds, target, q_near, branch, q):
     """
-    Write the aiming configurations over a low-discrepancy set of the free joints; return how many.
+    Complete q so that the ray meets the target; return the ray's reach [m], or -1.
 
-    The first draw keeps the free joints of q_near, so an arm that aims already may stay.
+    All joints but the last two are given in q; the target is in the arm's base frame.
+    """
+    v = scratch.floats(3)
+    look_from_elbow(robot, target, q, v)
+    return pan_and_tilt(robot, bounds, v, q_near, branch, q)
+
+
+@kernel(int64(MAT, MAT, VEC, VEC, VEC, int64, int64, float64, OUT_MAT, OUT_VEC))
+def goal_candidates(
+    robot, bounds, target, q_near, ratios, first, n_draws, longest, candidates, reaches
+):
+    """
+    Write the aiming configurations over a low-discrepancy set of the free joints (`CANDIDATES`).
+
+    The very first draw keeps the free joints of q_near, so an arm that aims already may stay.
     ratios (dof - 2,): steps of the additive recurrence that spreads the draws (Roberts 2018).
     candidates (2 n_draws, dof), reaches (2 n_draws,) [m].
     """
     n_free = ratios.shape[0]
+    v = scratch.floats(3)
     n = 0
-    for i in range(n_draws):
+    for i in range(first, first + n_draws):
+        squared = 0.0
+        for k in range(n_free):
+            share = (0.5 + i * ratios[k]) % 1.0
+            spread = bounds[0, k] + share * (bounds[1, k] - bounds[0, k])
+            candidates[n, k] = q_near[k] if i == 0 else spread
+            squared += (candidates[n, k] - q_near[k]) ** 2
+        if squared > longest * longest:
+            continue
+        look_from_elbow(robot, target, candidates[n], v)
         for branch in range(2):
-            for k in range(n_free):
-                share = (0.5 + i * ratios[k]) % 1.0
-                spread = bounds[0, k] + share * (bounds[1, k] - bounds[0, k])
-                candidates[n, k] = q_near[k] if i == 0 else spread
-            reach = aim(robot, bounds, target, q_near, branch, candidates[n])
-            if reach >= 0.0:
+            if branch == 1:
+                for k in range(n_free):
+                    candidates[n, k] = q_near[k] if i == 0 else candidates[n - 1, k]
+            reach = pan_and_tilt(robot, bounds, v, q_near, branch, candidates[n])
+            if reach >= 0.0 and distance(candidates[n], q_near) <= longest:
                 reaches[n] = reach
                 n += 1
     return n
@@ -126,13 +160,6 @@ def is_goal_free(chain, robot, obstacles, q, reach):
     """Return whether q is free with its ray out to the target, and as far as it is guarded."""
     ray_length = max(reach, robot[robot.shape[0] - 1, D])
     return is_configuration_free(q, ray_length, chain, obstacles)
-
-
-@kernel(void(CHAIN, MAT, MAT, MAT, VEC, OUT_FLAGS))
-def find_free_goals(chain, robot, obstacles, candidates, reaches, is_free):
-    """Write for each of the candidates (n, dof) whether it is free."""
-    for i in range(candidates.shape[0]):
-        is_free[i] = is_goal_free(chain, robot, obstacles, candidates[i], reaches[i])
 
 
 @kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))

@@ -136,6 +136,7 @@ def keep_best(paths, n, pair, state, history):
         VEC,
         VEC,
         MAT,
+        int64,
         VEC,
         OUT_CUBE,
         OUT_INTS,
@@ -155,6 +156,7 @@ def go_straight(
     target,
     q_start,
     goals,
+    n_bent,
     settings,
     paths,
     state,
@@ -163,9 +165,10 @@ def go_straight(
     """
     Take the straight edge to the nearest goal that has a free one as the best path.
 
-    goals (n, dof): nearest to the start first, so no path to a later one can be shorter.
+    goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
+    first n_bent are known to have none.
     """
-    for i in range(goals.shape[0]):
+    for i in range(n_bent, goals.shape[0]):
         if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
             for k in range(goals.shape[1]):
                 paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
