@@ -150,9 +150,8 @@ def goal_configurations(
     blocked, blocked_reaches = np.empty((MOST_BLOCKED, dof)), np.empty(MOST_BLOCKED)
     counts = np.empty(3, dtype=np.int64)
     find_goals(
-        kernels.goal_candidates,
-        world.edge_check,
-        world.chain,
+        world.functions,
+        jit.address(kernels.goal_candidates),
         world.resolution,
         world.robot,
         world.obstacles,

@@ -125,10 +125,8 @@ def grow(
         if stopped is not None:
             break
         drawn += rrt.advance(
-            world.edge_check,
-            world.free_radius,
+            world.functions,
             world.resolution,
-            world.chain,
             world.robot,
             world.obstacles,
             world.bounds,

@@ -46,10 +46,9 @@ def search(
     budget = max(options.max_samples, options.club_budget)
     room = workspace(len(problem.q_start), room_for(options, n_roots, previous, budget))
     given = (
-        world.contacts,
-        shorten,
-        problem.slide_goal,
-        world.chain,
+        world.functions,
+        jit.address(shorten),
+        jit.address(problem.slide_goal),
         world.resolution,
         world.robot,
         world.obstacles,
@@ -59,9 +58,7 @@ def search(
         problem.q_goals,
     )
     settings = _settings(options, deadline)
-    rrt_h.go_straight(
-        world.edge_check, *given, problem.n_bent, settings, room.paths, room.state, room.history
-    )
+    rrt_h.go_straight(*given, problem.n_bent, settings, room.paths, room.state, room.history)
     is_straight = room.state[rrt_h.N_BEST] > 0
     settings[rrt_h.ATTEMPTS] = options.club_attempts + (not is_straight)
     if is_straight and _is_best(problem, room):
@@ -76,8 +73,6 @@ def search(
         if stopped is not None:
             break
         rrt_h.advance(
-            world.edge_check,
-            world.free_radius,
             *given,
             settings,
             deadline.within(SLICE),

@@ -3,7 +3,7 @@
 """Where the arm may be: its rows, the wearer's rows, and the edge check between them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import functools
 from typing import Any
 
@@ -68,6 +68,13 @@ class World:
     bar_names: tuple[str, ...]
     box_names: tuple[str, ...]
     lanes: Any = ()
+
+    functions: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Look up the addresses of the seams, entries as in `kernels.jit`."""
+        found = jit.addresses(self.edge_check, self.chain, self.free_radius, self.contacts)
+        object.__setattr__(self, 'functions', found)
 
     @property
     def ray_length(self) -> float:

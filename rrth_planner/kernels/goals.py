@@ -7,14 +7,19 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
-    CANDIDATES,
+    as_candidates,
+    as_chain,
+    as_edge_check,
     CHAIN,
+    CHAIN_AT,
     EDGE_CHECK,
+    EDGE_CHECK_AT,
     kernel,
     MAT,
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
+    READ_INTS,
     VEC,
 )
 from rrth_planner.kernels.pointing import is_goal_free
@@ -108,9 +113,8 @@ def take_free(
 
 @kernel(
     void(
-        CANDIDATES,
-        EDGE_CHECK,
-        CHAIN,
+        READ_INTS,
+        int64,
         float64,
         MAT,
         MAT,
@@ -127,9 +131,8 @@ def take_free(
     )
 )
 def find_goals(
-    find_candidates,
-    is_edge_free,
-    chain,
+    functions,
+    candidates_at,
     resolution,
     robot,
     obstacles,
@@ -151,6 +154,8 @@ def find_goals(
     draws that find one bound the distance at which it is worth to look at the others. counts (3,):
     free ones, touching ones (without such a bound: all of them), whether the last is straight on.
     """
+    find_candidates = as_candidates(candidates_at)
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
     dof = q_near.shape[0]
     candidates, reaches = np.empty((2 * n_draws, dof)), np.empty(2 * n_draws)
     n_first, longest = min(FIRST_DRAWS, n_draws), math.inf

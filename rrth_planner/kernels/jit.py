@@ -11,8 +11,11 @@ from typing import Any
 import warnings
 
 from numba import config, njit, types
+from numba.core import cgutils
 from numba.core.types import float64, int32, int64
 from numba.experimental.function_type import _get_wrapper_address
+from numba.extending import intrinsic
+import numpy as np
 
 # Read-only types accept writable arrays too, and the compiler refuses to write through them:
 # a signature tells inputs (VEC, MAT) from outputs (OUT_...).
@@ -63,6 +66,10 @@ SLIDE = types.FunctionType(
 CANDIDATES = types.FunctionType(
     int64(MAT, MAT, VEC, VEC, VEC, int64, int64, float64, OUT_MAT, OUT_VEC)
 )
+
+# Entries of `functions`, by which a world hands its seams to the kernels that Python calls: to
+# hand over the functions themselves takes 4 us each, a great part of a plan.
+EDGE_CHECK_AT, CHAIN_AT, FREE_RADIUS_AT, CONTACTS_AT = range(4)
 
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
@@ -170,6 +177,11 @@ class FirstClass:
         # Where numba looks for the type of a value.
         self._numba_type_ = types.FunctionType(self._signature)
 
+    @property
+    def address(self) -> int:
+        """Address of the compiled code, for `functions`."""
+        return int(self._address)
+
     def __wrapper_address__(self) -> int:
         """Return the address of the compiled code, as numba's protocol asks."""
         return int(self._address)
@@ -186,3 +198,46 @@ class FirstClass:
 def first_class(compiled: Any) -> Any:
     """Return a kernel in the form in which it is handed to other kernels."""
     return compiled if config.DISABLE_JIT else FirstClass(compiled)
+
+
+def addresses(*seams: Any) -> Any:
+    """Return what `functions` holds: the addresses of compiled seams."""
+    if config.DISABLE_JIT:
+        return seams
+    found = np.array([seam.address for seam in seams], dtype=np.int64)
+    found.setflags(write=False)
+    return found
+
+
+def address(seam: Any) -> Any:
+    """Return the address of one compiled seam."""
+    return seam if config.DISABLE_JIT else seam.address
+
+
+def _from_address(seam: Any) -> Any:
+    """Return what makes a seam of its address, within a kernel."""
+    if config.DISABLE_JIT:
+        return lambda function: function
+
+    def typed(typing_context: Any, where: Any) -> Any:
+        """Return the type of the seam and how it is made."""
+
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            made = cgutils.create_struct_proxy(seam)(context, builder)
+            pointer = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
+            made.c_addr = pointer
+            # Nothing is ever called through these.
+            made.py_addr = made.c_addr.type(None)
+            if hasattr(made, 'jit_addr'):
+                made.jit_addr = made.c_addr.type(None)
+            return made._getvalue()
+
+        return seam(int64), generate
+
+    return intrinsic(typed)
+
+
+as_edge_check, as_chain = _from_address(EDGE_CHECK), _from_address(CHAIN)
+as_free_radius, as_contacts = _from_address(FREE_RADIUS), _from_address(CONTACTS)
+as_shorten, as_slide = _from_address(SHORTEN), _from_address(SLIDE)
+as_candidates = _from_address(CANDIDATES)

@@ -7,15 +7,19 @@ import math
 from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import (
-    CHAIN,
-    EDGE_CHECK,
-    FREE_RADIUS,
+    as_chain,
+    as_edge_check,
+    as_free_radius,
+    CHAIN_AT,
+    EDGE_CHECK_AT,
+    FREE_RADIUS_AT,
     kernel,
     MAT,
     N_GOALS,
     OUT_CUBE,
     OUT_INT_MAT,
     OUT_INTS,
+    READ_INTS,
     RNG,
     VEC,
 )
@@ -39,10 +43,8 @@ def is_rejected_by_club(q, club, radius, count, probability, rng):
 
 @kernel(
     int64(
-        EDGE_CHECK,
-        FREE_RADIUS,
+        READ_INTS,
         float64,
-        CHAIN,
         MAT,
         MAT,
         MAT,
@@ -65,10 +67,8 @@ def is_rejected_by_club(q, club, radius, count, probability, rng):
     )
 )
 def advance(
-    is_edge_free,
-    free_radius,
+    functions,
     resolution,
-    chain,
     robot,
     obstacles,
     bounds,
@@ -100,6 +100,8 @@ def advance(
     shorten a path of best_cost are not made. near_bias: chance that a draw is near an end, where
     a tree that grows from there fails more often; it falls as the trees grow.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
     dof, capacity = tree_q.shape[2], tree_q.shape[1]
     q, q_new = np.empty(dof), np.empty(dof)
     meeting[0] = meeting[1] = -1

@@ -7,10 +7,17 @@ import math
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
+    as_chain,
+    as_contacts,
+    as_edge_check,
+    as_shorten,
+    as_slide,
     CHAIN,
+    CHAIN_AT,
     CONTACTS,
+    CONTACTS_AT,
     EDGE_CHECK,
-    FREE_RADIUS,
+    EDGE_CHECK_AT,
     kernel,
     MAT,
     N_GOALS,
@@ -20,6 +27,7 @@ from rrth_planner.kernels.jit import (
     OUT_INT_MAT,
     OUT_INTS,
     OUT_MAT,
+    READ_INTS,
     RNG,
     SHORTEN,
     SLIDE,
@@ -124,11 +132,9 @@ def keep_best(paths, n, pair, state, history):
 
 @kernel(
     void(
-        EDGE_CHECK,
-        CONTACTS,
-        SHORTEN,
-        SLIDE,
-        CHAIN,
+        READ_INTS,
+        int64,
+        int64,
         float64,
         MAT,
         MAT,
@@ -144,11 +150,9 @@ def keep_best(paths, n, pair, state, history):
     )
 )
 def go_straight(
-    is_edge_free,
-    find,
-    shorten,
-    slide_goal,
-    chain,
+    functions,
+    shorten_at,
+    slide_at,
     resolution,
     robot,
     obstacles,
@@ -168,6 +172,9 @@ def go_straight(
     goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
     first n_bent are known to have none.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
+    slide_goal = as_slide(slide_at)
     for i in range(n_bent, goals.shape[0]):
         if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
             for k in range(goals.shape[1]):
@@ -230,12 +237,9 @@ def remember(paths, n, club, state):
 
 @kernel(
     void(
-        EDGE_CHECK,
-        FREE_RADIUS,
-        CONTACTS,
-        SHORTEN,
-        SLIDE,
-        CHAIN,
+        READ_INTS,
+        int64,
+        int64,
         float64,
         MAT,
         MAT,
@@ -257,12 +261,9 @@ def remember(paths, n, club, state):
     )
 )
 def advance(
-    is_edge_free,
-    free_radius,
-    find,
-    shorten,
-    slide_goal,
-    chain,
+    functions,
+    shorten_at,
+    slide_at,
     resolution,
     robot,
     obstacles,
@@ -289,6 +290,9 @@ def advance(
     draw only where a shorter path can lead. tree_q (2, 2, capacity, dof): the pair of trees at
     work and the one that led to the best path.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
+    slide_goal = as_slide(slide_at)
     while state[END] == RUNNING:
         cost = math.inf
         if state[N_BEST] > 0:
@@ -312,10 +316,8 @@ def advance(
         budget = int64(settings[MAX_SAMPLES if state[N_BEST] == 0 else CLUB_BUDGET])
         if meeting[0] < 0:
             n_drawn = grow(
-                is_edge_free,
-                free_radius,
+                functions,
                 resolution,
-                chain,
                 robot,
                 obstacles,
                 bounds,
