@@ -3,6 +3,7 @@
 """The planner: a problem and options in, a result out, whatever the algorithm."""
 
 from collections.abc import Callable
+import functools
 from importlib import import_module
 
 import numpy as np
@@ -30,6 +31,12 @@ _SEARCH = {
     RRTHOptions: 'rrt_h',
     PrintedRRTHOptions: 'printed',
 }
+
+
+@functools.cache
+def _search_of(home: str) -> Callable[..., PlanResult]:
+    search: Callable[..., PlanResult] = import_module(f'rrth_planner.{home}').search
+    return search
 
 
 def plan(
@@ -66,12 +73,9 @@ def plan(
         names = ', '.join(kind.__name__ for kind in _SEARCH)
         raise OptionsError(f'options: {type(options).__name__}, expected one of {names}')
     # Compiling, the first time, is not planning: the clock starts afterwards.
-    search = import_module(f'rrth_planner.{home}').search
+    search = _search_of(home)
     deadline = Deadline(options.time_limit, should_stop)
-    result: PlanResult = search(
-        problem, options, rng, deadline, () if previous is None else previous.trees
-    )
-    return result
+    return search(problem, options, rng, deadline, () if previous is None else previous.trees)
 
 
 __all__ = ['plan', 'PlanResult']

@@ -20,8 +20,6 @@ from rrth_planner.workspace import Workspace, workspace
 TIGHTEN = jit.first_class(lean.tighten)
 # Time between two looks at whether to stop [s].
 SLICE = 0.005
-# Waypoints nearer than this are one [rad].
-TWIN = 1e-9
 
 
 def search(
@@ -138,27 +136,13 @@ def _result(
     history = room.history[: state[rrt_h.N_HISTORY]].tolist()
     return PlanResult(
         status=PlanStatus.SOLVED if is_solved else (stopped or PlanStatus.SAMPLE_LIMIT),
-        path=Path(without_twins(room.paths[rrt_h.BEST, : state[rrt_h.N_BEST]]))
-        if is_solved
-        else None,
+        path=Path(room.paths[rrt_h.BEST, : state[rrt_h.N_BEST]]) if is_solved else None,
         raw_path=Path(room.paths[rrt_h.RAW, :n_raw]) if n_raw else None,
         trees=trees,
-        cost_history=tuple(cost for cost, _, _ in history),
-        sample_history=tuple(int(draws) for _, draws, _ in history),
-        time_history=tuple(time - deadline.start for _, _, time in history),
+        cost_history=tuple([row[rrt_h.COST] for row in history]),
+        sample_history=tuple([int(row[rrt_h.DRAWS]) for row in history]),
+        time_history=tuple([row[rrt_h.TIME] - deadline.start for row in history]),
         n_samples=state[rrt_h.SAMPLES],
         planning_time=deadline.elapsed(),
         is_reproducible=stopped is None and not is_clocked,
     )
-
-
-def without_twins(waypoints: Array) -> Array:
-    """Return the waypoints without those that stand on the one before; always both ends."""
-    steps = np.abs(np.diff(waypoints, axis=0)).max(axis=1)
-    if steps.min() > TWIN:
-        return waypoints
-    # A later twin of the last waypoint goes too, the last one stays.
-    is_kept = np.concatenate([[True], steps > TWIN])
-    is_kept[1:-1] &= np.abs(waypoints[1:-1] - waypoints[-1]).max(axis=1) > TWIN
-    is_kept[-1] = True
-    return waypoints[is_kept]

@@ -26,7 +26,7 @@ from rrth_planner.kernels.pointing import is_goal_free
 from rrth_planner.kernels.tree import distance
 
 # Draws by which a first straight way is sought, which then bounds how far the others may be.
-FIRST_DRAWS = 24
+FIRST_DRAWS = 16
 
 
 @kernel(void(VEC, OUT_INTS, int64, int64))

@@ -28,6 +28,10 @@ from rrth_planner.kernels.kinematics import sine_cosine
 from rrth_planner.kernels.tree import distance
 
 TURN = 2.0 * math.pi
+# Joints of an arm at most; steps of the search for the nearest goal, and halvings of each; the
+# step of its differences [rad or m], and the least relative gain that another step follows.
+MAX_DOF, MAX_NEWTON, MAX_HALVINGS, DIFFERENCE, FINE = 32, 12, 6, 1e-6, 1e-5
+SLOPES_ROOM = SQUARE_ROOM = MAX_DOF * MAX_DOF
 
 
 @kernel(void(MAT, int64, OUT_VEC))
@@ -137,7 +141,8 @@ def goal_candidates(
     for i in range(first, first + n_draws):
         squared = 0.0
         for k in range(n_free):
-            share = (0.5 + i * ratios[k]) % 1.0
+            share = 0.5 + i * ratios[k]
+            share -= math.floor(share)
             spread = bounds[0, k] + share * (bounds[1, k] - bounds[0, k])
             candidates[n, k] = q_near[k] if i == 0 else spread
             squared += (candidates[n, k] - q_near[k]) ** 2
@@ -162,13 +167,74 @@ def is_goal_free(chain, robot, obstacles, q, reach):
     return is_configuration_free(q, ray_length, chain, obstacles)
 
 
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
+    """
+    Move q along its branch of the goal manifold to where it is nearest to q_from.
+
+    Returns the reach there [m]. Gauss and Newton on the squared distance over the free joints, slopes by differences, the step
+    halved until the distance falls. -1: it left the manifold.
+    """
+    dof, n_free = q.shape[0], q.shape[0] - 2
+    slopes, square = scratch.floats(SLOPES_ROOM), scratch.floats(SQUARE_ROOM)
+    step, q_try = scratch.floats(MAX_DOF), scratch.floats(MAX_DOF)
+    # Views of the length of q, as the kernels expect them.
+    trial = q_try[:dof]
+    reach = aim(robot, bounds, target, q, branch, q)
+    for _ in range(MAX_NEWTON):
+        if reach < 0.0:
+            break
+        for i in range(n_free):
+            trial[:] = q
+            trial[i] += DIFFERENCE if q[i] + DIFFERENCE <= bounds[1, i] else -DIFFERENCE
+            h = trial[i] - q[i]
+            if aim(robot, bounds, target, q, branch, trial) < 0.0:
+                return reach
+            for k in range(dof):
+                slopes[MAX_DOF * i + k] = (trial[k] - q[k]) / h
+        for i in range(n_free):
+            step[i] = 0.0
+            for k in range(dof):
+                step[i] -= slopes[MAX_DOF * i + k] * (q[k] - q_from[k])
+            for j in range(n_free):
+                total = 1e-9 if i == j else 0.0
+                for k in range(dof):
+                    total += slopes[MAX_DOF * i + k] * slopes[MAX_DOF * j + k]
+                square[MAX_DOF * i + j] = total
+        # Gauss: the matrix is positive.
+        for i in range(n_free):
+            for j in range(i + 1, n_free):
+                factor = square[MAX_DOF * j + i] / square[MAX_DOF * i + i]
+                step[j] -= factor * step[i]
+                for k in range(i, n_free):
+                    square[MAX_DOF * j + k] -= factor * square[MAX_DOF * i + k]
+        for i in range(n_free - 1, -1, -1):
+            for j in range(i + 1, n_free):
+                step[i] -= square[MAX_DOF * i + j] * step[j]
+            step[i] /= square[MAX_DOF * i + i]
+        share, best, is_nearer = 1.0, distance(q, q_from), False
+        for _ in range(MAX_HALVINGS):
+            for i in range(n_free):
+                trial[i] = min(bounds[1, i], max(bounds[0, i], q[i] + share * step[i]))
+            tried = aim(robot, bounds, target, q, branch, trial)
+            if tried >= 0.0 and distance(trial, q_from) < best:
+                is_nearer, reach = distance(trial, q_from) < best - FINE * best, tried
+                q[:] = trial
+                break
+            share *= 0.5
+        if not is_nearer:
+            break
+    return reach
+
+
 @kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, VEC, OUT_MAT, int64, float64))
 def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path, n, finest):
     """
     Move the last waypoint along the goal manifold so that the path gets shorter; return the gain.
 
-    Pattern search over the free joints: the neighbours of a grid whose step halves when none is
-    better, down to `finest` [rad]. The new last edge is proven before it is taken.
+    At once to the nearest point of the manifold if that is free; otherwise pattern search over the
+    free joints: the neighbours of a grid whose step halves when none is better, down to `finest`
+    [rad]. The new last edge is proven before it is taken.
     """
     dof = path.shape[1]
     n_free = dof - 2
@@ -181,6 +247,18 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
             offset = distance(q, path[n - 1])
             if offset < closest:
                 branch, closest = b, offset
+    q[:] = path[n - 1]
+    reach = nearest_on_manifold(robot, bounds, target, before, branch, q)
+    is_nearer = distance(before, q) < cost - 1e-9
+    if reach >= 0.0 and not is_nearer:
+        return 0.0
+    if (
+        reach >= 0.0
+        and is_goal_free(chain, robot, obstacles, q, reach)
+        and is_edge_free(before, q, resolution, chain, robot, obstacles)
+    ):
+        path[n - 1] = q
+        return start_cost - distance(before, q)
     step = 0.4
     while step > finest:
         is_better = False

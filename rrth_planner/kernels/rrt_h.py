@@ -61,6 +61,8 @@ WIDER = 1.3
 # Finest step of a goal along its manifold [rad].
 FINEST_SLIDE = 2e-3
 MAX_SLIDES = 100
+# Waypoints nearer than this are one [rad].
+TWIN = 1e-9
 
 
 @kernel(
@@ -118,14 +120,21 @@ def finish(
 
 @kernel(void(OUT_CUBE, int64, int64, OUT_INTS, OUT_MAT))
 def keep_best(paths, n, pair, state, history):
-    """Keep the path at work as the best one, and when it was found."""
+    """Keep the path at work as the best one, without twins of its waypoints, and note when."""
+    m = 0
     for i in range(n):
+        # The last waypoint stays, and what is its twin goes.
+        is_twin = i < n - 1 and distance(paths[WORK, i], paths[WORK, n - 1]) < TWIN and i > 0
+        is_twin |= m > 0 and i < n - 1 and distance(paths[WORK, i], paths[BEST, m - 1]) < TWIN
+        if is_twin:
+            continue
         for k in range(paths.shape[2]):
-            paths[BEST, i, k] = paths[WORK, i, k]
-    state[N_BEST], state[BEST_PAIR] = n, pair
+            paths[BEST, m, k] = paths[WORK, i, k]
+        m += 1
+    state[N_BEST], state[BEST_PAIR] = m, pair
     row = state[N_HISTORY]
     if row < history.shape[0]:
-        history[row, COST] = path_length(paths[BEST], n)
+        history[row, COST] = path_length(paths[BEST], m)
         history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
         state[N_HISTORY] += 1
 
