@@ -5,13 +5,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import functools
+from importlib import import_module
 
 import numpy as np
 from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import jit, pointing, pointing_numerically
+from rrth_planner.kernels import jit, pointing
 from rrth_planner.kernels.goals import find_goals
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
@@ -49,11 +50,6 @@ CLOSED_FORM = PointingKernels(
     goal_candidates=jit.first_class(pointing.goal_candidates),
     slide_goal=jit.first_class(pointing.slide_goal),
     n_solved=2,
-)
-NUMERICAL = PointingKernels(
-    goal_candidates=jit.first_class(pointing_numerically.goal_candidates),
-    slide_goal=jit.first_class(pointing_numerically.slide_goal),
-    n_solved=0,
 )
 
 
@@ -94,7 +90,18 @@ def pointing_kernels(arm: ArmModel) -> PointingKernels:
     tail = arm.dh[-2:]
     is_square = np.abs(np.cos(tail[:, 0])).max() < 1e-9 and np.abs(tail[:, 1]).max() < 1e-12
     is_unit = arm.dof >= 2 and not any(arm.is_prismatic[-2:]) and is_square
-    return CLOSED_FORM if is_unit else NUMERICAL
+    return CLOSED_FORM if is_unit else numerical()
+
+
+@functools.cache
+def numerical() -> PointingKernels:
+    """Return how any arm aims; compiled when the first arm needs it."""
+    kernels = import_module('rrth_planner.kernels.pointing_numerically')
+    return PointingKernels(
+        goal_candidates=jit.first_class(kernels.goal_candidates),
+        slide_goal=jit.first_class(kernels.slide_goal),
+        n_solved=0,
+    )
 
 
 def check_pointing_arm(arm: ArmModel) -> None:

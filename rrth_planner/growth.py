@@ -3,11 +3,12 @@
 """Growth to a first path: RRT with one tree or two, and what RRT-H builds on."""
 
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels import reuse, rrt, rrt_h, tree
+from rrth_planner.kernels import rrt, rrt_h, tree
 from rrth_planner.kernels.random import random_state
 from rrth_planner.options import GrowthOptions, RRTHOptions
 from rrth_planner.path import Path
@@ -174,6 +175,8 @@ def plant(
     rrt_h.plant(roots, problem.q_start, len(roots), tree_q, parents, sizes)
     if not previous:
         return
+    # Compiled when a plan first builds on another one.
+    reuse = import_module('rrth_planner.kernels.reuse')
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
     for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
         sizes[side] = reuse.transplant(

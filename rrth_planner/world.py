@@ -12,7 +12,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
-from rrth_planner.kernels import arm_sampling, arm_validity, chain, contacts, jit
+from rrth_planner.kernels import arm_clearance, arm_validity, chain, contacts, jit
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -21,7 +21,7 @@ from rrth_planner.scene import Scene
 SLACK = 1e-9
 EDGE_CHECK = jit.first_class(arm_validity.is_edge_free)
 CONTACTS = jit.first_class(contacts.edge_contacts)
-FREE_RADIUS = jit.first_class(arm_sampling.free_radius)
+FREE_RADIUS = jit.first_class(arm_clearance.free_radius)
 # Shortest interval that the proof of an edge looks at before it gives up [rad].
 RESOLUTION = 5e-4
 
@@ -111,7 +111,7 @@ class World:
         """
         ray = self.ray_length if ray_length is None else ray_length
         distances = np.empty((len(self.bar_names), jit.LANES * len(self.obstacles)))
-        arm_validity.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)
+        arm_clearance.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)
         chosen: Array = distances[:, self.lanes]
         return chosen
 

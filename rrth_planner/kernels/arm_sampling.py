@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What others check of an arm's edge: configurations at a spacing, or points at a spacing."""
 
-import math
-
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.arm_validity import ENDS_ROOM, is_configuration_free
-from rrth_planner.kernels.geometry import bar_distance
 from rrth_planner.kernels.jit import (
     BOX_HALF,
     BOX_OFFSET,
@@ -18,7 +15,6 @@ from rrth_planner.kernels.jit import (
     LANES,
     MAT,
     OUT_VEC,
-    REACH,
     VEC,
 )
 from rrth_planner.kernels.tree import distance
@@ -87,29 +83,3 @@ def is_edge_free_at_points(q_from, q_to, resolution, chain, robot, boxes):
         if not is_configuration_free_at_points(q, chain, robot, boxes):
             return False
     return True
-
-
-@kernel(float64(VEC, CHAIN, MAT, MAT))
-def free_radius(q, chain, robot, boxes):
-    """
-    Return the radius of a ball of joint space round q that is free [rad], 0 in contact.
-
-    A joint step of length r moves no point further than r times the norm of the greatest
-    reaches (Cauchy-Schwarz), so all bars keep clear while that is less than their distance.
-    """
-    dof = q.shape[0]
-    points = scratch.floats(ENDS_ROOM)
-    n_bars = chain(q, robot[robot.shape[0] - 1, D], points, 0)
-    least = math.inf
-    for bar in range(n_bars):
-        for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
-            for j in range(LANES):
-                if boxes[g, LANES * BOX_HALF + j] > 0.0:
-                    least = min(least, bar_distance(points, 4 * bar, boxes, g, j))
-    squared = 0.0
-    for k in range(dof):
-        reach = 0.0
-        for i in range(robot.shape[0]):
-            reach = max(reach, robot[i, REACH + k], robot[i, REACH + dof + k])
-        squared += reach * reach
-    return max(least, 0.0) / math.sqrt(squared)

@@ -7,7 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.geometry import bar_distance, MAX_ENDS, open_lanes, touched_lanes
+from rrth_planner.kernels.geometry import MAX_ENDS, open_lanes, touched_lanes
 from rrth_planner.kernels.jit import (
     CHAIN,
     D,
@@ -16,7 +16,6 @@ from rrth_planner.kernels.jit import (
     LANES,
     MAT,
     NO_BAR,
-    OUT_MAT,
     OUT_POOL,
     OUT_VEC,
     PRISMATIC,
@@ -74,27 +73,6 @@ def is_configuration_free(q, ray_length, chain, boxes):
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
     return not touches(points, 0, n_bars, boxes)
-
-
-@kernel(void(MAT, float64, CHAIN, MAT, OUT_MAT))
-def clearances(positions, ray_length, chain, boxes, distances):
-    """
-    Write the least signed distance of every bar (rows) from every lane of the last groups [m].
-
-    positions (n, dof): the configurations over which the least is taken. Unused lanes: infinity.
-    """
-    points = scratch.floats(ENDS_ROOM)
-    first = (boxes.shape[0] - 1) // LANES
-    distances[:] = math.inf
-    for i in range(positions.shape[0]):
-        n_bars = chain(positions[i], ray_length, points, 0)
-        for k in range(n_bars):
-            for g in range(first, boxes.shape[0]):
-                for j in range(LANES):
-                    if boxes[g, 12 * LANES + j] > 0.0:
-                        distance = bar_distance(points, 4 * k, boxes, g, j)
-                        lane = LANES * (g - first) + j
-                        distances[k, lane] = min(distances[k, lane], distance)
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))

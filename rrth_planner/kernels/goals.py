@@ -23,7 +23,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.pointing import is_goal_free
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.tree import copy, distance
 
 # Draws by which a first straight way is sought, which then bounds how far the others may be.
 FIRST_DRAWS = 16
@@ -100,10 +100,12 @@ def take_free(
         q = candidates[row]
         if not is_goal_free(chain, robot, obstacles, q, reaches[row]):
             if is_kept and counts[1] < blocked.shape[0]:
-                blocked[counts[1]], blocked_reaches[counts[1]] = q, reaches[row]
+                copy(q, blocked[counts[1]])
+                blocked_reaches[counts[1]] = reaches[row]
             counts[1] += 1
             continue
-        goals[counts[0]], goal_reaches[counts[0]] = q, reaches[row]
+        copy(q, goals[counts[0]])
+        goal_reaches[counts[0]] = reaches[row]
         counts[0] += 1
         if is_edge_free(q_near, q, resolution, chain, robot, obstacles):
             counts[2] = 1

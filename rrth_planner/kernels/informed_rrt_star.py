@@ -10,6 +10,7 @@ from rrth_planner.kernels.jit import kernel, N_GOALS
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
 from rrth_planner.kernels.sampling import draw_informed, draw_uniform
+from rrth_planner.kernels.tree import copy
 
 
 @kernel(STAR_SIGNATURE)
@@ -54,7 +55,7 @@ def advance(
             if not draw_informed(bounds, tree_q[0, 0], tree_q[1, goal], best[0], rng, q):
                 continue
         elif uniform(rng) < goal_bias:
-            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+            copy(tree_q[1, goal] if side == 0 else tree_q[0, 0], q)
         else:
             draw_uniform(bounds, rng, q)
         extend(

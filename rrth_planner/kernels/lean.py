@@ -18,7 +18,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.taut import pull_taut
-from rrth_planner.kernels.tree import distance, path_length
+from rrth_planner.kernels.tree import copy, distance, path_length
 
 # Gap that a path is left with, for the proof of its edges to succeed [m].
 LEFT = 1e-4
@@ -214,6 +214,8 @@ def lean(
         n_found = add_constraints(
             find, chain, robot, obstacles, path, path, e, contacts, edges, least, n_found
         )
+    if n_found == 0:
+        return -1
     n_own, share = n_found, 1.0
     for _ in range(N_TRIES):
         n_found = n_own
@@ -245,7 +247,7 @@ def lean(
                     )
             if is_free:
                 for i in range(1, n - 1):
-                    path[i] = moved[i]
+                    copy(moved[i], path[i])
                 return n_found
         # The images of the boxes bend away: of a shorter move with the square of its length.
         share *= SHORTER
@@ -272,7 +274,7 @@ def bend(path, n, contacts, edges, n_found):
         return n
     e, share = edges[row], contacts[row, SHARE]
     for i in range(n, e + 1, -1):
-        path[i] = path[i - 1]
+        copy(path[i - 1], path[i])
     for k in range(path.shape[1]):
         path[e + 1, k] = path[e, k] + share * (path[e + 2, k] - path[e, k])
     return n + 1
@@ -321,4 +323,5 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
         is_bent = n > n_before
         if not is_bent:
             break
-    return n
+    # A corner that brought nothing goes again.
+    return pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])

@@ -25,7 +25,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.kinematics import sine_cosine
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.tree import copy, distance
 
 TURN = 2.0 * math.pi
 # Joints of an arm at most; steps of the search for the nearest goal, and halvings of each; the
@@ -149,8 +149,10 @@ def goal_candidates(
         if squared > longest * longest:
             continue
         look_from_elbow(robot, target, candidates[n], v)
+        n_before = n
         for branch in range(2):
-            if branch == 1:
+            # A refused branch leaves the free joints where they are.
+            if n > n_before:
                 for k in range(n_free):
                     candidates[n, k] = q_near[k] if i == 0 else candidates[n - 1, k]
             reach = pan_and_tilt(robot, bounds, v, q_near, branch, candidates[n])
@@ -172,8 +174,8 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
     """
     Move q along its branch of the goal manifold to where it is nearest to q_from.
 
-    Returns the reach there [m]. Gauss and Newton on the squared distance over the free joints, slopes by differences, the step
-    halved until the distance falls. -1: it left the manifold.
+    Returns the reach there [m]. Gauss and Newton on the squared distance over the free joints,
+    slopes by differences, the step halved until the distance falls. -1: it left the manifold.
     """
     dof, n_free = q.shape[0], q.shape[0] - 2
     slopes, square = scratch.floats(SLOPES_ROOM), scratch.floats(SQUARE_ROOM)
@@ -185,7 +187,7 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
         if reach < 0.0:
             break
         for i in range(n_free):
-            trial[:] = q
+            copy(q, trial)
             trial[i] += DIFFERENCE if q[i] + DIFFERENCE <= bounds[1, i] else -DIFFERENCE
             h = trial[i] - q[i]
             if aim(robot, bounds, target, q, branch, trial) < 0.0:
@@ -219,7 +221,7 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
             tried = aim(robot, bounds, target, q, branch, trial)
             if tried >= 0.0 and distance(trial, q_from) < best:
                 is_nearer, reach = distance(trial, q_from) < best - FINE * best, tried
-                q[:] = trial
+                copy(trial, q)
                 break
             share *= 0.5
         if not is_nearer:
@@ -242,12 +244,12 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
     start_cost = cost = distance(before, path[n - 1])
     branch, closest = 0, math.inf
     for b in range(2):
-        q[:n_free] = path[n - 1, :n_free]
+        copy(path[n - 1], q)
         if aim(robot, bounds, target, path[n - 1], b, q) >= 0.0:
             offset = distance(q, path[n - 1])
             if offset < closest:
                 branch, closest = b, offset
-    q[:] = path[n - 1]
+    copy(path[n - 1], q)
     reach = nearest_on_manifold(robot, bounds, target, before, branch, q)
     is_nearer = distance(before, q) < cost - 1e-9
     if reach >= 0.0 and not is_nearer:
@@ -257,7 +259,7 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
         and is_goal_free(chain, robot, obstacles, q, reach)
         and is_edge_free(before, q, resolution, chain, robot, obstacles)
     ):
-        path[n - 1] = q
+        copy(q, path[n - 1])
         return start_cost - distance(before, q)
     step = 0.4
     while step > finest:
@@ -277,7 +279,7 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
             if is_goal_free(chain, robot, obstacles, q, reach) and is_edge_free(
                 before, q, resolution, chain, robot, obstacles
             ):
-                path[n - 1] = q
+                copy(q, path[n - 1])
                 cost = distance(before, q)
                 is_better = True
                 break

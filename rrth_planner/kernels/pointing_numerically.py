@@ -26,7 +26,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.pointing import is_goal_free, unwrap
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.tree import copy, distance
 
 # Configurations nearer than this in every joint are one [rad or m].
 TWIN = 1e-6
@@ -92,7 +92,7 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
     while step > finest:
         is_better = False
         for direction in range(dof + 1):
-            q[:] = path[n - 1]
+            copy(path[n - 1], q)
             measure_aim(robot, target, q, work)
             for k in range(dof):
                 steepest = before[k] - q[k]
@@ -117,7 +117,7 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
             if is_goal_free(chain, robot, obstacles, q, reach) and is_edge_free(
                 before, q, resolution, chain, robot, obstacles
             ):
-                path[n - 1] = q
+                copy(q, path[n - 1])
                 cost = distance(before, q)
                 is_better = True
                 break

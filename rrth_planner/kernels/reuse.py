@@ -15,7 +15,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     READ_INTS,
 )
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.tree import copy, distance
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))
@@ -61,7 +61,7 @@ def transplant(
                 continue
         if n >= nodes.shape[0] - 1:
             return n
-        nodes[n] = old_nodes[i]
+        copy(old_nodes[i], nodes[n])
         parents[n] = parent
         moved[i] = n
         n += 1

@@ -25,7 +25,7 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.sampling import draw_informed, draw_near, draw_uniform
-from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
+from rrth_planner.kernels.tree import adapted_step, copy, distance, nearest, steer
 
 # With so many nodes the share of draws near the ends has fallen to a half.
 FEW_NODES = 64
@@ -117,7 +117,7 @@ def advance(
         n_nodes = sizes[0] + sizes[1] - n_goals
         is_near = uniform(rng) * (FEW_NODES + n_nodes) < near_bias * FEW_NODES
         if uniform(rng) < goal_bias:
-            q[:] = q_goal if side == 0 or not is_bidirectional else tree_q[0, 0]
+            copy(q_goal if side == 0 or not is_bidirectional else tree_q[0, 0], q)
         elif is_near:
             hard_0 = 1.0 - n_grown[0] / n_tried[0]
             hard_1 = 1.0 - n_grown[1] / n_tried[1]
@@ -147,7 +147,7 @@ def advance(
             continue
         n_grown[end] += is_near
         new = sizes[side]
-        tree_q[side, new] = q_new
+        copy(q_new, tree_q[side, new])
         parents[side, new] = nearby
         sizes[side] += 1
         reached = nearest(tree_q[other], sizes[other], q_new)
@@ -169,7 +169,7 @@ def advance(
                 break
             if not is_edge_free(q_near, q, resolution, chain, robot, obstacles):
                 break
-            tree_q[other, sizes[other]] = q
+            copy(q, tree_q[other, sizes[other]])
             parents[other, sizes[other]] = reached
             reached = sizes[other]
             sizes[other] += 1

@@ -35,7 +35,7 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.rrt import advance as grow
 from rrth_planner.kernels.taut import TAUT
-from rrth_planner.kernels.tree import distance, path_length, trace_path
+from rrth_planner.kernels.tree import copy, distance, path_length, trace_path
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].
 STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)
@@ -222,10 +222,10 @@ def count_useful(goals, q_start, cost):
 def plant(goals, q_start, n_goals, tree_q, parents, sizes):
     """Begin the tree of the start, and that of the first n_goals goals."""
     sizes[0], sizes[1], sizes[N_GOALS] = 1, n_goals, n_goals
-    tree_q[0, 0] = q_start
+    copy(q_start, tree_q[0, 0])
     parents[0, 0] = -1
     for i in range(n_goals):
-        tree_q[1, i] = goals[i]
+        copy(goals[i], tree_q[1, i])
         parents[1, i] = -1
 
 

@@ -6,7 +6,7 @@ from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, CONTACTS, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
 from rrth_planner.kernels.taut import remove_waypoint, reverse_path
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.tree import copy, distance
 
 MAX_CUTS = 1000
 
@@ -101,9 +101,10 @@ def cut_corners(
             i += 1
             continue
         for j in range(n, i + 1, -1):
-            path[j] = path[j - 1]
+            copy(path[j - 1], path[j])
         n += 1
-        path[i + 1], path[i + 2] = corner, q
+        copy(corner, path[i + 1])
+        copy(q, path[i + 2])
         n_cuts += 1
         i += 1
     return n

@@ -25,7 +25,7 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.sampling import draw_uniform
-from rrth_planner.kernels.tree import adapted_step, distance, nearest, steer
+from rrth_planner.kernels.tree import adapted_step, copy, distance, nearest, steer
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
 # resolution, chain, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius,
@@ -155,7 +155,7 @@ def add_node(
         is_shorter = i != near and costs[i] + length < cost - GAIN
         if is_shorter and is_edge_free(nodes[i], q, resolution, chain, robot, obstacles):
             parent, cost = i, costs[i] + length
-    nodes[n] = q
+    copy(q, nodes[n])
     links[CHILD, n] = -1
     costs[n] = cost
     attach(links, n, parent)
@@ -192,7 +192,7 @@ def trace_path(tree_q, links, from_start, from_goal, path):
         return 0
     i = from_start
     for row in range(n - 1, -1, -1):
-        path[row] = tree_q[0, i]
+        copy(tree_q[0, i], path[row])
         i = links[0, PARENT, i]
     i = from_goal
     if distance(path[n - 1], tree_q[1, i]) == 0.0:
@@ -200,7 +200,7 @@ def trace_path(tree_q, links, from_start, from_goal, path):
     while i >= 0:
         if n >= path.shape[0]:
             return 0
-        path[n] = tree_q[1, i]
+        copy(tree_q[1, i], path[n])
         n += 1
         i = links[1, PARENT, i]
     return n
@@ -331,7 +331,7 @@ def advance(
         side = draw & 1 if is_bidirectional else 0
         if uniform(rng) < goal_bias:
             goal = int64(uniform(rng) * sizes[N_GOALS])
-            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+            copy(tree_q[1, goal] if side == 0 else tree_q[0, 0], q)
         else:
             draw_uniform(bounds, rng, q)
         extend(

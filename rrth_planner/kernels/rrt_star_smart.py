@@ -10,7 +10,7 @@ from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, N_GOALS, OU
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
-from rrth_planner.kernels.tree import path_length
+from rrth_planner.kernels.tree import copy, path_length
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64))
@@ -28,7 +28,7 @@ def skip_waypoints(is_edge_free, resolution, chain, robot, obstacles, path, n):
             path[i], path[ahead], resolution, chain, robot, obstacles
         ):
             ahead -= 1
-        path[kept] = path[ahead]
+        copy(path[ahead], path[kept])
         kept += 1
         i = ahead
     return kept
@@ -77,7 +77,7 @@ def advance(
             draw_ball(shortened[beacon], 0.5 * step_size, bounds, rng, q)
         elif uniform(rng) < goal_bias:
             goal = int64(uniform(rng) * sizes[N_GOALS])
-            q[:] = tree_q[1, goal] if side == 0 else tree_q[0, 0]
+            copy(tree_q[1, goal] if side == 0 else tree_q[0, 0], q)
         else:
             draw_uniform(bounds, rng, q)
         is_better = extend(
@@ -107,7 +107,8 @@ def advance(
             n = skip_waypoints(is_edge_free, resolution, chain, robot, obstacles, path, n)
             length = path_length(path, n)
             if n > 0 and length < best[3]:
-                shortened[:n] = path[:n]
+                for i in range(n):
+                    copy(path[i], shortened[i])
                 best[2], best[3] = n, length
         history[draw] = best[3]
     return n_draws

@@ -12,7 +12,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     VEC,
 )
-from rrth_planner.kernels.tree import distance, path_length
+from rrth_planner.kernels.tree import copy, distance, path_length
 
 # What a gain in length must exceed to be worth another round, relative.
 TAUT = 1e-5
@@ -24,7 +24,7 @@ MAX_ROUNDS = 100
 def remove_waypoint(path, n, i):
     """Remove waypoint i; return how many are left."""
     for j in range(i, n - 1):
-        path[j] = path[j + 1]
+        copy(path[j + 1], path[j])
     return n - 1
 
 
@@ -63,11 +63,11 @@ def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spa
                 q_try, path[i + 2], resolution, chain, robot, obstacles
             ):
                 low = share
-                q_seen[:] = q_try
+                copy(q_try, q_seen)
             else:
                 high = share
         if low > 0.0:
-            path[i + 1] = q_seen
+            copy(q_seen, path[i + 1])
         i += 1
     return n
 
@@ -136,8 +136,9 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
             q_in[k] = path[i, k] + share[0] * (path[i - 1, k] - path[i, k])
             q_out[k] = path[i, k] + share[1] * (path[i + 1, k] - path[i, k])
         for j in range(n, i + 1, -1):
-            path[j] = path[j - 1]
-        path[i], path[i + 1] = q_in, q_out
+            copy(path[j - 1], path[j])
+        copy(q_in, path[i])
+        copy(q_out, path[i + 1])
         n += 1
         i += 2
     return n

@@ -23,6 +23,13 @@ from rrth_planner.kernels.jit import (
 CHUNK = 256
 
 
+@kernel(void(VEC, OUT_VEC))
+def copy(q, to):
+    """Write q to another place; an assignment of arrays takes the compiler ten times as long."""
+    for k in range(q.shape[0]):
+        to[k] = q[k]
+
+
 @kernel(float64(VEC, VEC))
 def distance(p, q):
     """Return the length of the straight edge between two configurations."""
@@ -116,7 +123,7 @@ def trace_path(tree_q, parents, from_start, from_goal, path):
         return 0
     i = from_start
     for row in range(n - 1, -1, -1):
-        path[row] = tree_q[0, i]
+        copy(tree_q[0, i], path[row])
         i = parents[0, i]
     i = from_goal
     if distance(path[n - 1], tree_q[1, i]) == 0.0:
@@ -124,7 +131,7 @@ def trace_path(tree_q, parents, from_start, from_goal, path):
     while i >= 0:
         if n >= path.shape[0]:
             return 0
-        path[n] = tree_q[1, i]
+        copy(tree_q[1, i], path[n])
         n += 1
         i = parents[1, i]
     return n

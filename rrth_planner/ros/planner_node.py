@@ -19,6 +19,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
 from rrth_planner.kernels.jit import is_compiled
 from rrth_planner.ros.diagnostics import PlanReport
@@ -80,6 +81,7 @@ class PlannerNode(Node):
             self.get_logger().info(
                 'compiling kernels, once for this machine: takes up to a minute'
             )
+            compile_kernels()
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 

@@ -1,0 +1,39 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compiling of what a plan needs, before it is needed: by two processes, kept for all others."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+# What either process compiles, about as much each, the one what the other does not ask for soon.
+SHARES = (('lean', 'rrt_h'), ('taut', 'rrt', 'goals', 'arm_clearance', 'chain'))
+
+
+def compile_kernels() -> bool:
+    """
+    Compile the kernels of the default planner in processes of their own; return whether they did.
+
+    The compiler keeps some 150 MB for good; so they end, and this process loads what they leave.
+    Without a folder to leave it in, each process compiles for itself.
+    """
+    folder = str(Path(__file__).parent.parent)
+    paths = os.pathsep.join(filter(None, (folder, os.environ.get('PYTHONPATH', ''))))
+    children = [
+        subprocess.Popen(
+            [
+                sys.executable,
+                '-W',
+                'ignore',
+                '-c',
+                '; '.join(f'import rrth_planner.kernels.{name}' for name in share),
+            ],
+            env={**os.environ, 'PYTHONPATH': paths},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for share in SHARES
+    ]
+    return all([child.wait() == 0 for child in children])
