@@ -18,6 +18,11 @@ def _option(default: Any, low: float, high: float, unit: str, text: str) -> Any:
     )
 
 
+def _other_default(kind: Any, name: str, default: Any) -> Any:
+    """Return a field as that of another class of options, but for its default."""
+    return field(default=default, metadata=kind.__dataclass_fields__[name].metadata)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TreeOptions:
     """
@@ -118,8 +123,13 @@ class PrintedRRTHOptions(RRTHOptions):
     """
     RRT-H with the three steps as printed, to check the paper by; its paths may touch.
 
-    P_T and P_C are the points of section 2: along the segment, and along the lines to it.
+    By default it grows as printed too: one tree, uniform draws. P_T and P_C are the points of
+    section 2: along the segment, and along the lines to it.
     """
 
+    goal_bias: float = _other_default(RRTHOptions, 'goal_bias', 0.0)
+    is_bidirectional: bool = _other_default(RRTHOptions, 'is_bidirectional', False)
+    near_bias: float = _other_default(RRTHOptions, 'near_bias', 0.0)
+    corner_moves: int = _option(0, 0, 0, '-', 'none: the three steps are all there is')
     target_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_T')
     check_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_C')

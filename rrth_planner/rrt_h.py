@@ -89,7 +89,9 @@ def search(
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
     """Return the entries of `settings` of the kernel."""
-    is_printed = isinstance(options, PrintedRRTHOptions)
+    how = (options.corner_spacing, float(options.corner_moves), 0.0)
+    if isinstance(options, PrintedRRTHOptions):
+        how = (options.corner_spacing, options.target_spacing, options.check_spacing)
     return np.array(
         [
             options.step_size,
@@ -104,9 +106,7 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
             options.club_budget,
             0.0,
             deadline.start + options.improve_time if options.improve_time > 0.0 else -np.inf,
-            options.corner_spacing,
-            options.target_spacing if is_printed else options.corner_moves,
-            options.check_spacing if is_printed else 0.0,
+            *how,
         ]
     )
 

@@ -49,7 +49,7 @@ class World:
     contacts : compiled function
         The seam `kernels.jit.CONTACTS`.
     resolution : float
-        Last argument but two of the edge check [rad].
+        Third argument of the edge check [rad].
     bar_names, box_names : tuple of str
         What messages call the arm's bars and the boxes.
     lanes : ndarray, shape (m,)

@@ -3,14 +3,19 @@
 """Where growths go with the path club and without: the paper's Figures 13 and 14."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.campaign.paper_runs import ALGORITHMS, CLUB_RADIUS, RRT_H, TWO_WAYS
+from rrth_planner.campaign.paper_runs import (
+    club_options,
+    CLUB_PROBABILITY,
+    CLUB_RADIUS,
+    TWO_WAYS,
+)
 from rrth_planner.campaign.problems import load_problem
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grow
-from rrth_planner.options import RRTHOptions
 
 # Growths after each other, and the draws of each at most.
 N_GROWTHS, BUDGET = 8, 1000
@@ -34,17 +39,14 @@ def scattered_paths(seed: int, *, club_radius: float) -> list[Array | None]:
         None where a growth spent its draws.
 
     """
-    problem, base = load_problem(TWO_WAYS).problem, ALGORITHMS[RRT_H]
-    options = RRTHOptions(
-        step_size=base.step_size,
-        goal_bias=base.goal_bias,
-        is_bidirectional=False,
-        club_radius=club_radius,
+    problem = load_problem(TWO_WAYS).problem
+    options = replace(
+        club_options(N_GROWTHS - 1, probability=CLUB_PROBABILITY), club_radius=club_radius
     )
     rng, club = np.random.default_rng(seed), np.empty((0, 2))
     paths: list[Array | None] = []
     for _ in range(N_GROWTHS):
-        deadline = Deadline(base.time_limit, lambda: False)
+        deadline = Deadline(options.time_limit, lambda: False)
         grown = grow(problem, problem.q_goals, options, rng, deadline, club=club, budget=BUDGET)
         paths.append(grown.waypoints)
         if grown.waypoints is not None and club_radius > 0.0:

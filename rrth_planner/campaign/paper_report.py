@@ -70,9 +70,9 @@ Written by `{command}`; do not edit.
 Times come from runs done one after another, those of the arm and shares over many seeds from runs
 side by side. The paper gives no coordinates, step sizes or spacings: maps, targets and options are
 ours (`config/maps`, `rrth_planner/campaign/paper_runs.py`). Where it names none, the planners have
-one tree, no goal bias and a step of 10 on maps of 100 by 100. "RRT-H" is the method as corrected,
-"as printed" its three steps word for word. Every path is judged by code that shares nothing with
-the planners.
+one tree, uniform draws and a step of 10 on maps of 100 by 100. "RRT-H" is the method's three steps
+as corrected, without what the planner adds to them (`near_bias`, `corner_moves`), "as printed" the
+same steps word for word. Every path is judged by code that shares nothing with the planners.
 Numbers are medians, with quartiles in brackets.
 
 ## The claims of section 3
@@ -102,8 +102,7 @@ a third.
 {ways_claim(extent)}
 
 {escape_claim(rows)} ({extent.seeds} seeds.) Why the last two hardly differ: from this start a
-first growth seldom takes the worse way, and our further growths draw only where a shorter path can
-lead, which by itself drives them round the other side.
+growth seldom takes the worse way, so that one more growth mostly mends it, with a club or without.
 
 {escape_table(rows)}
 

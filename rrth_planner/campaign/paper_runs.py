@@ -23,7 +23,7 @@ MAPS = ('c_shape', 'spiral', 'fence')
 NEAR, TWO_WAYS = 'c_shape_near', 'two_ways'
 STEPS = 2000
 LONG = 20_000
-# As section 2 describes them: one tree, no goal bias. No clock ends a run, its draws do.
+# As section 2 describes them: one tree, uniform draws. No clock ends a run, its draws do.
 _BASE: dict[str, Any] = {
     'step_size': 10.0,
     'goal_bias': 0.0,
@@ -31,12 +31,15 @@ _BASE: dict[str, Any] = {
     'max_samples': 100_000,
     'time_limit': 600.0,
 }
+_GROWTH: dict[str, Any] = {**_BASE, 'near_bias': 0.0}
 _STAR: dict[str, Any] = {**_BASE, 'max_samples': STEPS, 'improve_time': 600.0}
-# k and the spacings of P_T and P_C in map units: a hundredth of a map is 1.
+# The three steps alone, after one growth. k and the spacings of P_T and P_C in map units: a
+# hundredth of a map is 1.
 _RRT_H: dict[str, Any] = {
-    **_BASE,
-    'club_attempts': 0,
+    **_GROWTH,
     'corner_spacing': 0.05,
+    'corner_moves': 0,
+    'club_attempts': 0,
     'improve_time': 600.0,
 }
 _PRINTED: dict[str, Any] = {
@@ -58,7 +61,7 @@ PRINTED, PRINTED_FINE = 'RRT-H as printed', 'RRT-H as printed, fine'
 LONG_STEP, BIASED = 'RRT, step 20', 'RRT, goal bias 5 %'
 CLUB, NO_CLUB = 'RRT-H, path club', 'RRT-H, no club'
 ALGORITHMS: dict[str, TreeOptions] = {
-    RRT: RRTOptions(**_BASE),
+    RRT: RRTOptions(**_GROWTH),
     RRT_STAR: RRTStarOptions(**_STAR),
     INFORMED: InformedRRTStarOptions(**_STAR),
     SMART: RRTStarSmartOptions(**_STAR),
@@ -67,18 +70,20 @@ ALGORITHMS: dict[str, TreeOptions] = {
     PRINTED_FINE: PrintedRRTHOptions(
         **{**_PRINTED, 'corner_spacing': 0.2, 'target_spacing': 0.2, 'check_spacing': 0.2}
     ),
-    LONG_STEP: RRTOptions(**{**_BASE, 'step_size': 20.0}),
-    BIASED: RRTOptions(**{**_BASE, 'goal_bias': 0.05}),
+    LONG_STEP: RRTOptions(**{**_GROWTH, 'step_size': 20.0}),
+    BIASED: RRTOptions(**{**_GROWTH, 'goal_bias': 0.05}),
 }
-# Growths after the first one that the escape may make.
+# Growths after the first one that the escape may make, and the draws of each at most.
 ATTEMPTS = (0, 1, 2, 3, 4, 6)
-CLUB_RADIUS = 10.0
+CLUB_BUDGET = 400
+# More club points than this, so near [map units], turn a new point away with this chance.
+CLUB_COUNT, CLUB_RADIUS, CLUB_PROBABILITY = 2, 10.0, 0.9
 # The arm's step [rad]: the paper gives none; with this one RRT's paths wind as much as its do.
 ARM_STEP = 0.6
-_ARM: dict[str, Any] = {**_BASE, 'step_size': ARM_STEP, 'max_samples': 200_000}
+_ARM: dict[str, Any] = {'step_size': ARM_STEP, 'max_samples': 200_000}
 ARM_ALGORITHMS: dict[str, TreeOptions] = {
-    RRT: RRTOptions(**_ARM),
-    RRT_H: RRTHOptions(**_ARM, club_attempts=0, improve_time=600.0),
+    RRT: RRTOptions(**{**_GROWTH, **_ARM}),
+    RRT_H: RRTHOptions(**{**_RRT_H, **_ARM}),
 }
 # The paper's test, and an exact one, every 0.02 rad along an edge.
 CHECK_POINTS, SAMPLED = 'check_points:0.02', 'sampled:0.02'
@@ -142,6 +147,8 @@ def club_options(attempts: int, *, probability: float) -> RRTHOptions:
     return replace(
         options,
         club_attempts=attempts,
+        club_budget=CLUB_BUDGET,
+        club_count=CLUB_COUNT,
         club_radius=CLUB_RADIUS,
         club_probability=probability,
     )
@@ -181,7 +188,7 @@ def club_label(name: str, attempts: int) -> str:
 
 def _club_runs(extent: Extent) -> Iterable[Run]:
     for attempts in ATTEMPTS:
-        for name, probability in ((CLUB, 0.9), (NO_CLUB, 0.0)):
+        for name, probability in ((CLUB, CLUB_PROBABILITY), (NO_CLUB, 0.0)):
             options = club_options(attempts, probability=probability)
             for seed in range(extent.seeds):
                 yield Run(

@@ -22,8 +22,9 @@ from rrth_planner.result import PlanResult
 Row = dict[str, Any]
 # What decides about a row besides the run itself.
 _SOURCES = (
-    *('growth', 'star', 'rrt_h', 'planner', 'box_map', 'checking', 'aiming', 'world', 'reach'),
-    *('options', 'oracle', 'shortest', 'campaign/problems', 'campaign/runs'),
+    *('growth', 'star', 'rrt_h', 'printed', 'planner', 'workspace', 'problem', 'box_map'),
+    *('checking', 'aiming', 'world', 'box_tree', 'reach', 'options', 'oracle', 'shortest'),
+    *('campaign/problems', 'campaign/runs'),
 )
 
 
