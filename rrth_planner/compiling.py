@@ -36,4 +36,5 @@ def compile_kernels() -> bool:
         )
         for share in SHARES
     ]
-    return all([child.wait() == 0 for child in children])
+    codes = [child.wait() for child in children]
+    return not any(codes)

@@ -3,7 +3,7 @@
 """What a planner is asked: a world, where to start, and where it may end."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.arrays import Array, frozen_array
@@ -11,6 +11,7 @@ from rrth_planner.errors import RrthError
 from rrth_planner.kernels import jit, tree
 from rrth_planner.world import World
 
+NOWHERE = frozen_array(np.zeros(3), (3,), 'target', 'm', RrthError)
 STAY = jit.first_class(tree.stay)
 
 
@@ -41,13 +42,17 @@ class PlanningProblem:
     q_goals: Array
     n_bent: int = 0
     slide_goal: Callable[..., float] = STAY
-    target: Array = field(default_factory=lambda: np.zeros(3))
+    target: Array = NOWHERE
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
         dof = self.world.bounds.shape[1]
-        for name, shape in (('q_start', (dof,)), ('q_goals', (None, dof))):
-            value = frozen_array(getattr(self, name), shape, name, 'rad', RrthError)
+        for name, shape, unit in (
+            ('q_start', (dof,), 'rad'),
+            ('q_goals', (None, dof), 'rad'),
+            ('target', (3,), 'm'),
+        ):
+            value = frozen_array(getattr(self, name), shape, name, unit, RrthError)
             object.__setattr__(self, name, value)
         if len(self.q_goals) == 0:
             raise RrthError('q_goals: none, expected at least one configuration [rad]')
