@@ -72,7 +72,12 @@ def is_configuration_free(q, ray_length, chain, boxes):
     """Return whether the arm at q, with a ray of the given length [m], is clear of all boxes."""
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
-    return not touches(points, 0, n_bars, boxes)
+    if boxes.shape[0] > 1:
+        return not touches(points, 0, n_bars, boxes)
+    for k in range(n_bars - 1, -1, -1):
+        if touched_lanes(points, 4 * k, boxes, 0) != 0:
+            return False
+    return True
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))

@@ -17,7 +17,7 @@ LOCAL_ROOM = 12 * LANES
 MAX_ENDS = 64
 
 
-@kernel(int64(OUT_VEC, int64, MAT, int64))
+@kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')
 def touched_lanes(points, at, boxes, g):
     """
     Return the boxes of group g that a bar touches, bit l for lane l.
@@ -140,7 +140,7 @@ def bar_distance(points, at, boxes, g, j):
     return bar_box_distance(start, step, half) - points[at + 7]
 
 
-@kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64))
+@kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64), inline='always')
 def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
     """
     Return the boxes of group g not proven apart from the hull of a bar at two instants.

@@ -140,8 +140,13 @@ def mark_compiled() -> None:
             stamp.touch()
 
 
-def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that compiles a kernel for one signature, and keeps the result."""
+def kernel(signature: Any, inline: str = 'never') -> Callable[[Callable[..., Any]], Any]:
+    """
+    Return a decorator that compiles a kernel for one signature, and keeps the result.
+
+    inline: 'always' writes the kernel out where it is called, for the few whose call costs as much
+    as what they do; the compiler itself takes only the smallest.
+    """
 
     def decorate(function: Callable[..., Any]) -> Any:
         given = config.CACHE_DIR
@@ -154,6 +159,7 @@ def kernel(signature: Any) -> Callable[[Callable[..., Any]], Any]:
                 cache=CACHE_FOLDER is not None,
                 nogil=True,
                 error_model='numpy',
+                inline=inline,
                 fastmath={'contract', 'arcp', 'nsz'},
             )(function)
         finally:
