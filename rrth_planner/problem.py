@@ -3,7 +3,7 @@
 """What a planner is asked: a world, where to start, and where it may end."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from rrth_planner.arrays import Array, frozen_array
@@ -42,7 +42,7 @@ class PlanningProblem:
     q_goals: Array
     n_bent: int = 0
     slide_goal: Callable[..., float] = STAY
-    target: Array = NOWHERE
+    target: Array = field(default_factory=lambda: NOWHERE)
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
