@@ -23,26 +23,33 @@ _is_configuration_free = arm_validity.is_configuration_free
 
 
 @njit(nogil=True)
-def _check_configurations(positions, ray_length, robot, boxes, flags):
+def _check_configurations(positions, ray_length, chain, boxes, flags):
     for i in range(positions.shape[0]):
-        flags[i] = _is_configuration_free(positions[i], ray_length, robot, boxes)
+        flags[i] = _is_configuration_free(positions[i], ray_length, chain, boxes)
 
 
 @njit(nogil=True)
-def _check_edges(check, starts, ends, resolution, robot, boxes, flags):
+def _check_edges(check, starts, ends, resolution, chain, robot, boxes, flags):
     for i in range(starts.shape[0]):
-        flags[i] = check(starts[i], ends[i], resolution, robot, boxes)
+        flags[i] = check(starts[i], ends[i], resolution, chain, robot, boxes)
 
 
 def check_configurations(world: World, positions: Array, flags: Array) -> None:
     """Write whether each configuration, (n, dof), is free."""
-    _check_configurations(positions, world.ray_length, world.robot, world.obstacles, flags)
+    _check_configurations(positions, world.ray_length, world.chain, world.obstacles, flags)
 
 
 def check_edges(world: World, starts: Array, ends: Array, flags: Array) -> None:
     """Write whether the edge check of a world passes each edge, (n, dof) to (n, dof)."""
     _check_edges(
-        world.edge_check, starts, ends, world.resolution, world.robot, world.obstacles, flags
+        world.edge_check,
+        starts,
+        ends,
+        world.resolution,
+        world.chain,
+        world.robot,
+        world.obstacles,
+        flags,
     )
 
 
@@ -65,20 +72,20 @@ def peer_check(world: World, is_map: bool) -> Callable[..., bool]:
     """
     world = world if is_map else sampled(world, SPACING)
     check = getattr(world.edge_check, 'compiled', world.edge_check)
-    resolution = world.resolution
+    chain, resolution = getattr(world.chain, 'compiled', world.chain), world.resolution
     robot, boxes = np.array(world.robot), np.array(world.obstacles)
 
     @njit
     def check_in_plane(x, y, u, v):
         q_from, q_to = np.empty(2), np.empty(2)
         q_from[0], q_from[1], q_to[0], q_to[1] = x, y, u, v
-        return check(q_from, q_to, resolution, robot, boxes)
+        return check(q_from, q_to, resolution, chain, robot, boxes)
 
     @njit
     def check_in_joint_space(a, b, c, d, e, f, g, h):
         q_from, q_to = np.empty(4), np.empty(4)
         q_from[0], q_from[1], q_from[2], q_from[3] = a, b, c, d
         q_to[0], q_to[1], q_to[2], q_to[3] = e, f, g, h
-        return check(q_from, q_to, resolution, robot, boxes)
+        return check(q_from, q_to, resolution, chain, robot, boxes)
 
     return check_in_plane if is_map else check_in_joint_space

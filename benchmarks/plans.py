@@ -43,7 +43,7 @@ def _runs(name: str, planner: str, extent: Extent) -> list[Row]:
 def _options(query: Query, planner: str, improve_time: float) -> TreeOptions:
     if planner == RRT_H:
         return rrt_h_options(query, improve_time)
-    return RRTOptions(step_size=MAP_STEP) if query.is_map else RRTOptions()
+    return RRTOptions(step_size=MAP_STEP, near_bias=0.0) if query.is_map else RRTOptions()
 
 
 def _run(query: Query, planner: str, options: TreeOptions, seed: int) -> Row:

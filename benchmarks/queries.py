@@ -26,7 +26,7 @@ FOLDER = Path(__file__).parent / 'problems'
 MAPS = ('c_shape', 'spiral', 'fence')
 QUERIES = ('lap', 'floor_front', 'front_far', 'right_hand')
 # Longest extension of a tree and shortest cut of a corner on the maps, which measure 100 by 100.
-MAP_STEP, MAP_CORNER = 10.0, 0.05
+MAP_STEP, MAP_CORNER = 20.0, 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -122,6 +122,7 @@ def rrt_h_options(query: Query, improve_time: float) -> RRTHOptions:
         return RRTHOptions(improve_time=improve_time, club_attempts=10_000)
     return RRTHOptions(
         step_size=MAP_STEP,
+        near_bias=0.0,
         corner_spacing=MAP_CORNER,
         improve_time=improve_time,
         club_attempts=10_000,

@@ -23,7 +23,7 @@ EDGE_CHECK = jit.first_class(arm_validity.is_edge_free)
 CONTACTS = jit.first_class(contacts.edge_contacts)
 FREE_RADIUS = jit.first_class(arm_clearance.free_radius)
 # Shortest interval that the proof of an edge looks at before it gives up [rad].
-RESOLUTION = 5e-4
+RESOLUTION = 2e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
