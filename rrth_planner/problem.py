@@ -46,8 +46,12 @@ class PlanningProblem:
     def __post_init__(self) -> None:
         """Validate and freeze."""
         dof = self.world.bounds.shape[1]
-        for name, shape in (('q_start', (dof,)), ('q_goals', (None, dof))):
-            value = frozen_array(getattr(self, name), shape, name, 'rad', RrthError)
+        for name, shape, unit in (
+            ('q_start', (dof,), 'rad'),
+            ('q_goals', (None, dof), 'rad'),
+            ('target', (3,), 'm'),
+        ):
+            value = frozen_array(getattr(self, name), shape, name, unit, RrthError)
             object.__setattr__(self, name, value)
         if len(self.q_goals) == 0:
             raise RrthError('q_goals: none, expected at least one configuration [rad]')
