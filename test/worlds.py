@@ -10,7 +10,10 @@ import numpy as np
 from rrth_planner.aiming import target_in_mount
 from rrth_planner.arm import arm_from_mapping, ArmModel, tool_pose
 from rrth_planner.goal import PointingGoal
+from rrth_planner.options import RRTOptions
 from rrth_planner.oracle import bars
+from rrth_planner.planner import plan
+from rrth_planner.problem import PlanningProblem
 from rrth_planner.reach import bar_ends
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Box, Scene
@@ -257,6 +260,27 @@ def is_goal_free(arm, scene, margin, q, target):
     """Return whether the oracle finds q free with its ray out to the target and as guarded."""
     ray = max(RAY, np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
     return dense_touch(arm, scene, margin, ray, line(q, q), 1) < 0
+
+
+def blocked_pair(rng, world):
+    """Return two random valid configurations whose straight edge is not free."""
+    while True:
+        pair = np.stack([free_configuration(rng, world), free_configuration(rng, world)])
+        if not world.is_edge_valid(*pair):
+            return pair
+
+
+def raw_paths(world, rng, n):
+    """Return n first paths round what blocks the straight edge, as growth leaves them."""
+    paths = []
+    options = RRTOptions(step_size=0.5, near_bias=0.0, time_limit=1000.0, max_samples=2000)
+    while len(paths) < n:
+        pair = blocked_pair(rng, world)
+        problem = PlanningProblem(world=world, q_start=pair[0], q_goals=pair[1:])
+        path = plan(problem, options, rng).path
+        if path is not None:
+            paths.append(path.waypoints)
+    return paths
 
 
 def kernel_bars(arm, world, q, ray):
