@@ -30,6 +30,7 @@ STAR = {**COMMON, 'improve_time': 60.0}
 ALGORITHMS = {
     'rrt': RRTOptions(is_bidirectional=False, **{**COMMON, 'max_samples': 20000}),
     'rrt_two_trees': RRTOptions(**COMMON),
+    'rrt_uniform_draws': RRTOptions(near_bias=0.0, **COMMON),
     'rrt_star': RRTStarOptions(is_bidirectional=False, **STAR),
     'rrt_star_two_trees': RRTStarOptions(**STAR),
     'informed': InformedRRTStarOptions(is_bidirectional=False, **STAR),
@@ -38,6 +39,7 @@ ALGORITHMS = {
     'smart_two_trees': RRTStarSmartOptions(**STAR),
     'rrt_h': RRTHOptions(is_bidirectional=False, **{**STAR, 'max_samples': 20000}),
     'rrt_h_two_trees': RRTHOptions(**STAR),
+    'rrt_h_uniform_draws': RRTHOptions(near_bias=0.0, **STAR),
 }
 STAR_LIKE = [name for name, o in ALGORITHMS.items() if isinstance(o, RRTStarOptions)]
 # Lengths of the exact shortest paths (visibility graph on the corners).
@@ -135,6 +137,10 @@ def test_the_cost_is_the_length_and_never_rises(algorithm, name):
     assert (np.diff(result.cost_history) < 0.0).all()
     assert (np.diff(result.sample_history) >= 0).all()
     assert (np.diff(result.time_history) >= 0.0).all()
+    assert len(result.time_history) == len(result.cost_history) == len(result.sample_history)
+    assert result.time_history[0] >= 0.0
+    assert result.time_history[-1] <= result.planning_time
+    assert result.sample_history[-1] <= result.n_samples
     assert result.raw_path is None or result.path.length <= result.raw_path.length + 1e-9
 
 
@@ -248,7 +254,7 @@ def test_trees_of_the_last_plan_are_reused_where_they_are_still_free(algorithm):
     # The way out of the spiral takes more than 300 draws, unless the trees know it already. Those
     # of RRT* lean on the corners, which at times have moved into their way.
     assert n_again >= (4 if isinstance(options, RRTStarOptions) else 6)
-    assert n_anew <= 1
+    assert n_anew <= 3 < n_again
 
 
 @pytest.mark.parametrize('name', SHORTEST)
