@@ -41,7 +41,9 @@ def frozen_array(
     if not fits:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
     # The sum is finite where all elements are, but for a sum that overflows.
-    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
+    with np.errstate(over='ignore'):
+        total = array.sum()
+    if not math.isfinite(total) and not np.isfinite(array).all():
         raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')
     array.setflags(write=False)
     return array

@@ -17,9 +17,6 @@ from rrth_planner.result import PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import MAX_NODES, Workspace, workspace
 
-# Draws between two looks at the clock.
-BATCH = 250
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Growth:
@@ -141,7 +138,8 @@ def grow(
             radius,
             count,
             probability,
-            min(BATCH, budget - drawn),
+            # As RRT-H does, which so grows the same first path.
+            min(rrt_h.BATCH, budget - drawn),
             bits,
             tree_q,
             parents,

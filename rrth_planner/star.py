@@ -7,7 +7,6 @@ import math
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
-from rrth_planner.growth import BATCH
 from rrth_planner.kernels import informed_rrt_star, reuse, rrt_star, rrt_star_smart
 from rrth_planner.kernels.random import random_state
 from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
@@ -17,6 +16,8 @@ from rrth_planner.result import ordered_tree, PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import MAX_NODES, MAX_WAYPOINTS
 
+# Draws between two looks at the clock.
+BATCH = 250
 # Pairs of nodes at which the two trees meet, at most.
 MAX_MEETINGS = 65536
 

@@ -9,10 +9,10 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import sample, Trajectory
 from rrth_planner.world import arm_world
 from worlds import (
+    compiled_chain,
     dense_touch,
     free_configuration,
     random_boxes,
-    random_chain,
     table_1_arm,
     varied_body,
     wearer,
@@ -63,7 +63,7 @@ def test_nearest_of_thick_and_sliding_chains_is_the_kernels():
     rng = np.random.default_rng(22)
     n_apart = 0
     for i in range(15):
-        n_apart += check_nearest(random_chain(rng, i % 2 == 0), random_boxes(rng, 3), rng, 30)
+        n_apart += check_nearest(compiled_chain(rng, i % 2 == 0), random_boxes(rng, 3), rng, 30)
     assert n_apart > 100
 
 
@@ -127,7 +127,7 @@ def test_the_first_touch_is_that_of_a_look_every_millisecond():
     n_touching = n_free = 0
     for i in range(120):
         is_paper = i % 3 > 0
-        arm = table_1_arm() if is_paper else random_chain(rng, i % 2 == 0)
+        arm = table_1_arm() if is_paper else compiled_chain(rng, i % 2 == 0)
         scene = varied_body(rng) if is_paper else random_boxes(rng, 3)
         for _ in range(3):
             scale = rng.choice([0.3, 1.0, 3.0])

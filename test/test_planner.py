@@ -14,7 +14,7 @@ from rrth_planner.aiming import goal_configurations, pointing_problem
 from rrth_planner.arm import pointing_error, tool_pose
 from rrth_planner.errors import RrthError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.options import RRTHOptions
+from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.scene import Box, Scene
@@ -202,6 +202,98 @@ def test_a_plan_out_of_time_says_so(walled):
     assert result.status is PlanStatus.TIMEOUT
     assert result.path is None
     assert not result.is_reproducible
+
+
+def test_a_long_search_ends_soon_after_its_time_or_when_cancelled(walled):
+    options = RRTHOptions(time_limit=0.2, max_samples=10**7)
+    result = plan(walled, options, np.random.default_rng(1))
+    assert result.status is PlanStatus.TIMEOUT
+    # Far more than it takes, far less than the samples would.
+    assert 0.2 <= result.planning_time < 10.0
+    assert 0 < result.n_samples < 10**7
+    calls = []
+
+    def after_a_while():
+        calls.append(1)
+        return len(calls) > 10
+
+    options = RRTHOptions(time_limit=1000.0, max_samples=10**7)
+    result = plan(walled, options, np.random.default_rng(1), after_a_while)
+    assert result.status is PlanStatus.CANCELLED
+    assert len(calls) == 11
+    assert 0 < result.n_samples < 10**7
+    assert result.planning_time < 10.0
+
+
+def test_the_best_path_so_far_is_what_is_left_when_time_is_up(blocked):
+    options = RRTHOptions(
+        time_limit=0.3, improve_time=1000.0, club_attempts=10**4, club_budget=10**6
+    )
+    for i, problem in enumerate(blocked[:3]):
+        result = plan(problem, options, np.random.default_rng(i))
+        assert result.status is PlanStatus.SOLVED
+        assert not result.is_reproducible
+        assert result.planning_time < 10.0
+        check_path(problem, result, table_1_arm(), wearer())
+
+
+def test_improvement_ends_after_its_time(blocked):
+    options = RRTHOptions(improve_time=0.05, time_limit=1000.0, club_attempts=10**4)
+    result = plan(blocked[0], options, np.random.default_rng(1))
+    assert result.status is PlanStatus.SOLVED
+    assert result.planning_time < 10.0
+    assert not result.is_reproducible
+
+
+@pytest.mark.parametrize('near_bias', [0.0, 0.9])
+def test_the_first_raw_path_is_that_of_rrt(blocked, near_bias):
+    for i, problem in enumerate(blocked[:10]):
+        common = {'near_bias': near_bias, 'time_limit': 1000.0}
+        first = plan(problem, RRTOptions(**common), np.random.default_rng(i))
+        patient = RRTHOptions(improve_time=1000.0, **common)
+        result = plan(problem, patient, np.random.default_rng(i))
+        if first.path is None:
+            assert result.path is None
+            continue
+        assert result.raw_path.waypoints.tobytes() == first.path.waypoints.tobytes()
+        assert result.path.length <= first.path.length
+        assert (np.diff(result.time_history) >= 0.0).all()
+        assert result.time_history[0] > 0.0
+        assert result.time_history[-1] <= result.planning_time
+
+
+def test_corner_moves_never_lengthen_the_first_path(blocked):
+    n_shorter = 0
+    for i, problem in enumerate(blocked[:20]):
+        lengths = []
+        for moves in (0, 30):
+            options = RRTHOptions(improve_time=0.0, time_limit=1000.0, corner_moves=moves)
+            result = plan(problem, options, np.random.default_rng(i))
+            if result.path is not None:
+                lengths.append(result.path.length)
+                check_path(problem, result, table_1_arm(), wearer())
+        assert len(lengths) != 1
+        if lengths:
+            assert lengths[1] <= lengths[0] * (1 + 1e-12)
+            n_shorter += lengths[1] < lengths[0] * (1 - 1e-4)
+    assert n_shorter > 5
+
+
+def test_goals_known_to_be_bent_are_not_tried_straight_again():
+    world, rng = wearer_world(), np.random.default_rng(65)
+    q_start = free_configuration(rng, world)
+    q_goals = np.array([free_configuration(rng, world) for _ in range(40)])
+    q_goals = q_goals[np.argsort(np.linalg.norm(q_goals - q_start, axis=1))]
+    is_straight = [world.is_edge_valid(q_start, q) for q in q_goals]
+    first = is_straight.index(True)
+    problem = {'world': world, 'q_start': q_start, 'q_goals': q_goals}
+    options = RRTHOptions(club_attempts=0, time_limit=1000.0)
+    for n_bent in (0, first, first + 1):
+        given = PlanningProblem(n_bent=n_bent, **problem)
+        result = plan(given, options, np.random.default_rng(1))
+        later = is_straight.index(True, n_bent)
+        assert np.array_equal(result.path.waypoints, [q_start, q_goals[later]])
+        assert result.n_samples == 0
 
 
 def test_an_impossible_plan_ends_at_its_samples(walled):

@@ -30,6 +30,7 @@ STAR = {**COMMON, 'improve_time': 60.0}
 ALGORITHMS = {
     'rrt': RRTOptions(is_bidirectional=False, **{**COMMON, 'max_samples': 20000}),
     'rrt_two_trees': RRTOptions(**COMMON),
+    'rrt_uniform_draws': RRTOptions(near_bias=0.0, **COMMON),
     'rrt_star': RRTStarOptions(is_bidirectional=False, **STAR),
     'rrt_star_two_trees': RRTStarOptions(**STAR),
     'informed': InformedRRTStarOptions(is_bidirectional=False, **STAR),
@@ -38,6 +39,7 @@ ALGORITHMS = {
     'smart_two_trees': RRTStarSmartOptions(**STAR),
     'rrt_h': RRTHOptions(is_bidirectional=False, **{**STAR, 'max_samples': 20000}),
     'rrt_h_two_trees': RRTHOptions(**STAR),
+    'rrt_h_uniform_draws': RRTHOptions(near_bias=0.0, **STAR),
 }
 STAR_LIKE = [name for name, o in ALGORITHMS.items() if isinstance(o, RRTStarOptions)]
 # Lengths of the exact shortest paths (visibility graph on the corners).
@@ -135,6 +137,10 @@ def test_the_cost_is_the_length_and_never_rises(algorithm, name):
     assert (np.diff(result.cost_history) < 0.0).all()
     assert (np.diff(result.sample_history) >= 0).all()
     assert (np.diff(result.time_history) >= 0.0).all()
+    assert len(result.time_history) == len(result.cost_history) == len(result.sample_history)
+    assert result.time_history[0] >= 0.0
+    assert result.time_history[-1] <= result.planning_time
+    assert result.sample_history[-1] <= result.n_samples
     assert result.raw_path is None or result.path.length <= result.raw_path.length + 1e-9
 
 
@@ -220,8 +226,6 @@ def test_trees_of_the_last_plan_are_reused_where_they_are_still_free(algorithm):
     options = replace(_options(algorithm, 1.0), step_size=10.0, max_samples=20000, goal_bias=0.05)
     if isinstance(options, RRTStarOptions):
         options = replace(options, max_samples=4000)
-    first = plan(map_problem(box_map), options, np.random.default_rng(0))
-    assert first.status is PlanStatus.SOLVED
     moved = BoxMap(
         name='moved',
         bounds=box_map.bounds,
@@ -230,17 +234,27 @@ def test_trees_of_the_last_plan_are_reused_where_they_are_still_free(algorithm):
         goal=box_map.goal,
     )
     few = replace(options, max_samples=300)
-    anew = plan(map_problem(moved), few, np.random.default_rng(1))
-    again = plan(map_problem(moved), few, np.random.default_rng(1), previous=first)
-    # The way out of the spiral takes more than 300 draws, unless the trees know it already.
-    assert again.status is PlanStatus.SOLVED
-    assert anew.status is not PlanStatus.SOLVED or again.sample_history[0] <= anew.n_samples
-    q = again.path.waypoints
-    assert (q[0] == moved.start).all()
-    assert all(_is_box_free(moved, a, b) for a, b in zip(q[:-1], q[1:], strict=True))
-    for tree in again.trees:
-        for i in np.flatnonzero(tree.parents >= 0)[::7]:
-            assert _is_box_free(moved, tree.nodes[tree.parents[i]], tree.nodes[i])
+    n_again = n_anew = 0
+    for seed in range(6):
+        first = plan(map_problem(box_map), options, np.random.default_rng(seed))
+        assert first.status is PlanStatus.SOLVED
+        anew = plan(map_problem(moved), few, np.random.default_rng(seed + 1))
+        again = plan(map_problem(moved), few, np.random.default_rng(seed + 1), previous=first)
+        n_anew += anew.status is PlanStatus.SOLVED
+        for tree in again.trees:
+            for i in np.flatnonzero(tree.parents >= 0)[::7]:
+                assert _is_box_free(moved, tree.nodes[tree.parents[i]], tree.nodes[i])
+        if again.status is not PlanStatus.SOLVED:
+            continue
+        n_again += 1
+        assert anew.status is not PlanStatus.SOLVED or again.sample_history[0] <= anew.n_samples
+        q = again.path.waypoints
+        assert (q[0] == moved.start).all()
+        assert all(_is_box_free(moved, a, b) for a, b in zip(q[:-1], q[1:], strict=True))
+    # The way out of the spiral takes more than 300 draws, unless the trees know it already. Those
+    # of RRT* lean on the corners, which at times have moved into their way.
+    assert n_again >= (4 if isinstance(options, RRTStarOptions) else 6)
+    assert n_anew <= 3 < n_again
 
 
 @pytest.mark.parametrize('name', SHORTEST)
@@ -264,7 +278,13 @@ def test_rrt_h_is_within_a_thousandth_of_the_shortest_path(name, is_bidirectiona
 
 def test_the_path_club_finds_the_shorter_way_round():
     problem = map_problem(_map('two_ways'))
-    common = {'step_size': 10.0, 'corner_spacing': 0.05, 'club_radius': 8.0, 'time_limit': 60.0}
+    common = {
+        'step_size': 10.0,
+        'corner_spacing': 0.05,
+        'club_radius': 8.0,
+        'club_budget': 400,
+        'time_limit': 60.0,
+    }
     shortest = 98.287
     with_club, without = (
         np.mean(

@@ -205,6 +205,13 @@ def test_a_bad_problem_is_refused():
         lambda: PlanningProblem(world=world, q_start=q, q_goals=[np.full(4, np.nan)]),
         'q_goals',
     )
+    for bad in (np.zeros(2), np.full(3, np.inf)):
+        refuses(
+            RrthError,
+            lambda bad=bad: PlanningProblem(world=world, q_start=q, q_goals=[q], target=bad),
+            'target',
+            unit='m',
+        )
 
 
 def test_bad_margins_are_refused():
@@ -231,6 +238,11 @@ def test_a_frozen_array_is_a_finite_read_only_copy():
             'x:',
             unit='m',
         )
+
+
+def test_numbers_whose_sum_overflows_are_finite_without_a_warning(recwarn):
+    assert frozen_array([1e308, 1e308], (2,), 'x', 'm', RrthError).tolist() == [1e308, 1e308]
+    assert not recwarn.list
 
 
 def test_every_array_of_every_value_is_read_only():

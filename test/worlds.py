@@ -7,17 +7,22 @@ import functools
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.arm import arm_from_mapping, ArmModel
+from rrth_planner.aiming import target_in_mount
+from rrth_planner.arm import arm_from_mapping, ArmModel, tool_pose
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import RRTOptions
 from rrth_planner.oracle import bars
+from rrth_planner.planner import plan
+from rrth_planner.problem import PlanningProblem
 from rrth_planner.reach import bar_ends
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import MotionLimits
-from rrth_planner.world import arm_world, World
+from rrth_planner.world import arm_world, robot_rows, World
 
 MARGIN, RAY = 0.02, 1.0
 # Random arms of each kind that are compiled.
-N_CHAINS = 24
+N_CHAINS = 16
 HALF_TURN, QUARTER = np.pi, 0.5 * np.pi
 
 # Table 1 of Zou et al. 2024: alpha, a, offset, d, lower, upper.
@@ -199,7 +204,7 @@ def compiled_chain(rng, has_tail):
 
 @functools.cache
 def _few_chains(seed, has_tail):
-    return random_chain(np.random.default_rng(seed), has_tail)
+    return random_chain(np.random.default_rng(seed), has_tail, fewest=3 if has_tail else 2)
 
 
 def wearer_world(margin=MARGIN, ray=RAY, radius=0.0):
@@ -214,6 +219,68 @@ def free_configuration(rng, world: World):
         if world.is_valid(q):
             return q
     raise AssertionError('a world without a free configuration')
+
+
+def aiming_candidates(kernels, arm, target, q_near, n_draws, longest=np.inf):
+    """Return all postures of a number of draws that aim, and how long their rays are."""
+    ratios = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])[: arm.dof - kernels.n_solved] % 1.0
+    candidates, reaches = np.full((2 * n_draws, arm.dof), np.nan), np.full(2 * n_draws, np.nan)
+    n = kernels.goal_candidates(
+        robot_rows(arm, RAY),
+        arm.bounds,
+        target_in_mount(arm, PointingGoal(target)),
+        q_near,
+        ratios,
+        0,
+        n_draws,
+        longest,
+        candidates,
+        reaches,
+    )
+    return candidates[:n], reaches[:n]
+
+
+def slide_goal(kernels, arm, world, target, path, n, finest):
+    """Move waypoint n - 1 of a path along the goal manifold; return by how much it got shorter."""
+    return kernels.slide_goal(
+        world.edge_check,
+        world.resolution,
+        world.chain,
+        world.robot,
+        world.obstacles,
+        world.bounds,
+        target_in_mount(arm, PointingGoal(target)),
+        path,
+        n,
+        finest,
+    )
+
+
+def is_goal_free(arm, scene, margin, q, target):
+    """Return whether the oracle finds q free with its ray out to the target and as guarded."""
+    ray = max(RAY, np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
+    return dense_touch(arm, scene, margin, ray, line(q, q), 1) < 0
+
+
+def blocked_pair(rng, world):
+    """Return two random valid configurations whose straight edge is not free."""
+    while True:
+        pair = np.stack([free_configuration(rng, world), free_configuration(rng, world)])
+        if not world.is_edge_valid(*pair):
+            return pair
+
+
+def raw_paths(world, rng, n):
+    """Return n first paths round what blocks the straight edge, as growth leaves them."""
+    paths = []
+    options = RRTOptions(step_size=0.5, near_bias=0.0, time_limit=1000.0, max_samples=2000)
+    while len(paths) < n:
+        pair = blocked_pair(rng, world)
+        problem = PlanningProblem(world=world, q_start=pair[0], q_goals=pair[1:])
+        path = plan(problem, options, rng).path
+        if path is not None:
+            paths.append(path.waypoints)
+    return paths
 
 
 def kernel_bars(arm, world, q, ray):

@@ -419,10 +419,16 @@ from rrth_planner.certificate import derivative_bounds
 from rrth_planner.kernels.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.geometry import bar_box_distance
 from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.aiming import goal_configurations, pointing_problem
+from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.clock import now
+from rrth_planner.kernels.contacts import edge_contacts, SLOPES
+from rrth_planner.kernels.random import next_word, normal, random_state, uniform
+from rrth_planner.kernels.sampling import draw_near
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from worlds import FOLDED, bezier_quintic, line, wearer_world
+from worlds import FOLDED, bezier_quintic, blocked_pair, line, table_1_arm, wearer_world
 
 rng = np.random.default_rng(5)
 world = wearer_world()
@@ -444,11 +450,30 @@ free = [
     bool(is_configuration_free(q, 1.0, world.chain, world.obstacles))
     for q in (FOLDED, q_goal, np.zeros(4))
 ]
-problem = PlanningProblem(world=world, q_start=FOLDED, q_goals=[q_goal])
-options = RRTHOptions(club_attempts=0, time_limit=1000.0)
-path = plan(problem, options, np.random.default_rng(3)).path
+ends = blocked_pair(np.random.default_rng(6), world)
+problem = PlanningProblem(world=world, q_start=ends[0], q_goals=ends[1:])
+options = RRTHOptions(
+    club_attempts=1, corner_moves=3, improve_time=1000.0, time_limit=1000.0
+)
+result = plan(problem, options, np.random.default_rng(3))
+contacts = np.empty((64, SLOPES + 4))
+leans = []
+for a, b in zip(result.path.waypoints[:-1], result.path.waypoints[1:]):
+    n = edge_contacts(a, b, world.chain, world.robot, world.obstacles, contacts)
+    leans += np.delete(contacts[:n], 2, axis=1).tolist()
+bits = random_state(np.random.default_rng(4))
+words = [int(next_word(bits)) for _ in range(200)]
+numbers = [f(bits) for f in (uniform, normal) * 100]
+assert draw_near(FOLDED, q_goal, np.inf, world.bounds, bits, q := np.empty(4))
+aim = PointingGoal([1.0, 0.5, -1.0])
+goals = goal_configurations(table_1_arm(), aim, world, FOLDED, 40)
+aimed = plan(
+    pointing_problem(table_1_arm(), aim, world, FOLDED, goals), options, np.random.default_rng(5)
+)
 print(json.dumps([proofs, distances, free, [list(sine_cosine(x)) for x in (0.1, 7.0, -40.0)],
-                  None if path is None else path.waypoints.tolist()]))
+                  result.path.waypoints.tolist(), result.raw_path.waypoints.tolist(), leans, words,
+                  numbers, q.tolist(), goals.q_goals.tolist(), aimed.path.waypoints.tolist(),
+                  now() < now() + 1.0]))
 """
 
 
@@ -473,4 +498,13 @@ def test_interpreted_kernels_say_what_compiled_ones_say():
     assert np.allclose(plain[1], compiled[1], rtol=0.0, atol=1e-12)
     assert plain[2] == compiled[2]
     assert np.allclose(plain[3], compiled[3], rtol=0.0, atol=1e-15)
-    assert np.allclose(plain[4], compiled[4], rtol=0.0, atol=1e-6)
+    # A path, the raw one it came from, and where it leans.
+    assert len(plain[4]) > 2
+    assert len(plain[6]) > 0
+    for i in (4, 5, 6):
+        assert np.allclose(plain[i], compiled[i], rtol=0.0, atol=1e-6)
+    # Words, numbers drawn with them, goals and the path to one of them.
+    assert plain[7] == compiled[7]
+    for i in (8, 9, 10, 11):
+        assert np.allclose(plain[i], compiled[i], rtol=0.0, atol=1e-9 if i < 11 else 1e-6)
+    assert plain[12]

@@ -8,7 +8,6 @@ import pytest
 from rrth_planner.aiming import (
     check_pointing_arm,
     CLOSED_FORM,
-    goal_configurations,
     NUMERICAL,
     pointing_kernels,
     target_in_mount,
@@ -16,17 +15,17 @@ from rrth_planner.aiming import (
 from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.pointing import aim, unwrap
-from rrth_planner.scene import Scene
-from rrth_planner.world import arm_world
+from rrth_planner.world import arm_world, robot_rows
 from worlds import (
-    dense_touch,
+    aiming_candidates,
     edge_touches,
     examples,
     free_configuration,
-    line,
+    is_goal_free,
     MARGIN,
     random_chain,
     RAY,
+    slide_goal,
     table_1_arm,
     wearer,
 )
@@ -35,30 +34,29 @@ SEEDS = st.integers(0, 2**32 - 1)
 TURN = 2.0 * np.pi
 
 
-def aimed(arm, world, target, q_near, branch, free):
+def aimed(arm, target, q_near, branch, free):
     """Return the completed configuration and its reach."""
     q = np.full(arm.dof, np.nan)
     q[:-2] = free
-    goal = PointingGoal(target)
-    return q, aim(world.robot, world.bounds, target_in_mount(arm, goal), q_near, branch, q)
+    local = target_in_mount(arm, PointingGoal(target))
+    return q, aim(robot_rows(arm, RAY), arm.bounds, local, q_near, branch, q)
 
 
 def check_aims(arm, seed, n):
     """Check n random targets; return how many postures aim, and how many differ by branch."""
     rng = np.random.default_rng(seed)
-    world = arm_world(arm, Scene(()), 0.0, RAY)
     n_aiming = n_pairs = 0
     for _ in range(n):
         target = rng.uniform(-2.0, 2.0, 3)
         q_near, free = rng.uniform(*arm.bounds), rng.uniform(*arm.bounds)[:-2]
         found = []
         for branch in range(2):
-            q, reach = aimed(arm, world, target, q_near, branch, free)
+            q, reach = aimed(arm, target, q_near, branch, free)
             assert np.array_equal(q[:-2], free)
             if reach < 0.0:
                 assert reach == -1.0
                 continue
-            assert world.is_in_bounds(q)
+            assert ((q >= arm.bounds[0]) & (q <= arm.bounds[1])).all()
             T = tool_pose(arm, q)
             assert np.abs(T[:3, 3] + reach * T[:3, 2] - target).max() < 1e-9
             assert pointing_error(arm, q, target) < 1e-9
@@ -106,13 +104,12 @@ def test_all_four_hands_of_a_tail_are_aimed(tilt, ray):
 def test_a_posture_that_aims_is_found_again_by_one_of_the_branches():
     rng = np.random.default_rng(33)
     arm = table_1_arm()
-    world = arm_world(arm, Scene(()), 0.0, RAY)
     for q in rng.uniform(*arm.bounds, (300, 4)):
         T = tool_pose(arm, q)
         target = T[:3, 3] + 1.3 * T[:3, 2]
         gaps = []
         for branch in range(2):
-            again, reach = aimed(arm, world, target, q, branch, q[:-2])
+            again, reach = aimed(arm, target, q, branch, q[:-2])
             if reach >= 0.0:
                 gaps.append(np.abs(again - q).max())
         assert min(gaps) < 1e-9
@@ -120,13 +117,12 @@ def test_a_posture_that_aims_is_found_again_by_one_of_the_branches():
 
 def test_a_target_on_the_pan_axis_is_refused():
     arm = table_1_arm()
-    world = arm_world(arm, Scene(()), 0.0, RAY)
     q = np.array([0.2, -0.7, 0.0, 0.0])
     # The pan axis is that of link 3; the ray passes it at 38 mm.
     pose = forward_kinematics(arm, q)[2]
     for beside, is_met in ((0.0, False), (0.0379, False), (0.0381, True)):
         target = pose[:3, 3] + 0.8 * pose[:3, 2] + beside * pose[:3, 0]
-        _, reach = aimed(arm, world, target, q, 0, q[:-2])
+        _, reach = aimed(arm, target, q, 0, q[:-2])
         assert (reach >= 0.0) == is_met
 
 
@@ -173,25 +169,25 @@ def test_only_arms_with_a_pan_and_tilt_tail_aim_in_closed_form():
         assert pointing_kernels(changed(row, column, value)) is NUMERICAL
 
 
-def test_free_goals_are_free_aim_and_come_nearest_first():
-    arm, scene = table_1_arm(), wearer()
-    world = arm_world(arm, scene, MARGIN, RAY)
-    rng = np.random.default_rng(34)
-    n_goals = 0
-    for _ in range(10):
-        target = rng.uniform(-1.5, 1.5, 3)
-        q_near = free_configuration(rng, world)
-        goals = goal_configurations(arm, PointingGoal(target), world, q_near, 128)
-        distances = np.linalg.norm(goals.q_goals - q_near, axis=1)
-        assert (np.diff(distances) >= 0.0).all()
-        assert goals.n_aiming >= len(goals.q_goals) + len(goals.q_blocked)
-        for q in goals.q_goals:
-            assert world.is_in_bounds(q)
-            assert pointing_error(arm, q, target) < 1e-9
-            ray = max(RAY, np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
-            assert dense_touch(arm, scene, MARGIN, ray, line(q, q), 1) < 0
-        n_goals += len(goals.q_goals)
-    assert n_goals > 100
+@examples(60)
+@given(seed=SEEDS, has_tail=st.booleans(), n_draws=st.integers(1, 60))
+def test_candidates_aim_and_those_within_a_distance_are_those_of_all(seed, has_tail, n_draws):
+    rng = np.random.default_rng(seed)
+    arm = random_chain(rng, has_tail)
+    kernels = pointing_kernels(arm)
+    target, q_near = rng.uniform(-1.5, 1.5, 3), rng.uniform(*arm.bounds)
+    candidates, reaches = aiming_candidates(kernels, arm, target, q_near, n_draws)
+    for q, reach in zip(candidates, reaches, strict=True):
+        assert ((q >= arm.bounds[0]) & (q <= arm.bounds[1])).all()
+        T = tool_pose(arm, q)
+        assert np.abs(T[:3, 3] + reach * T[:3, 2] - target).max() < 1e-9
+    # No farther than asked for, and nothing nearer left out.
+    lengths = np.linalg.norm(candidates - q_near, axis=1)
+    longest = np.median(lengths) + 1e-9 if len(lengths) else 1.0
+    near, near_reaches = aiming_candidates(kernels, arm, target, q_near, n_draws, longest)
+    is_near = lengths <= longest
+    assert np.array_equal(near, candidates[is_near])
+    assert np.array_equal(near_reaches, reaches[is_near])
 
 
 @pytest.mark.parametrize('kernels', [CLOSED_FORM, NUMERICAL], ids=['closed form', 'numerical'])
@@ -202,26 +198,20 @@ def test_sliding_never_lengthens_and_the_goal_stays_an_aim(kernels):
     n_slid = 0
     for _ in range(150):
         target = rng.uniform(-1.5, 1.5, 3)
-        goal = PointingGoal(target)
         q_start = free_configuration(rng, world)
-        goals = goal_configurations(arm, goal, world, q_start, 32).q_goals
-        usable = [q for q in goals if world.is_edge_valid(q_start, q)]
+        candidates, _ = aiming_candidates(kernels, arm, target, q_start, 32)
+        usable = [
+            q
+            for q in candidates
+            if is_goal_free(arm, scene, MARGIN, q, target) and world.is_edge_valid(q_start, q)
+        ]
         if not usable:
             continue
         path = np.full((8, 4), np.nan)
-        path[0], path[1] = q_start, usable[-1]
+        path[0] = q_start
+        path[1] = max(usable, key=lambda q: np.linalg.norm(q - path[0]))
         before = np.linalg.norm(path[1] - path[0])
-        gain = kernels.slide_goal(
-            world.edge_check,
-            world.resolution,
-            world.robot,
-            world.obstacles,
-            world.bounds,
-            target_in_mount(arm, goal),
-            path,
-            2,
-            2e-3,
-        )
+        gain = slide_goal(kernels, arm, world, target, path, 2, 2e-3)
         after = np.linalg.norm(path[1] - path[0])
         assert gain >= 0.0
         assert before - after == pytest.approx(gain, abs=1e-12)
@@ -229,8 +219,7 @@ def test_sliding_never_lengthens_and_the_goal_stays_an_aim(kernels):
         assert np.isnan(path[2:]).all()
         assert world.is_in_bounds(path[1])
         assert pointing_error(arm, path[1], target) < 1e-9
-        ray = max(RAY, np.linalg.norm(target - tool_pose(arm, path[1])[:3, 3]))
-        assert dense_touch(arm, scene, MARGIN, ray, line(path[1], path[1]), 1) < 0
+        assert is_goal_free(arm, scene, MARGIN, path[1], target)
         assert not edge_touches(arm, scene, MARGIN, RAY, path[0], path[1])
         n_slid += gain > 0.0
     assert n_slid > 50

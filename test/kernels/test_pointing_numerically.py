@@ -8,8 +8,6 @@ import pytest
 from rrth_planner.aiming import (
     check_pointing_arm,
     CLOSED_FORM,
-    goal_configurations,
-    goal_slider,
     NUMERICAL,
     pointing_kernels,
     target_in_mount,
@@ -20,17 +18,19 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.goal_projection import measure_aim, project, WORK_ROWS
 from rrth_planner.scene import Scene
-from rrth_planner.world import arm_world
+from rrth_planner.world import arm_world, robot_rows
 from worlds import (
-    dense_touch,
+    aiming_candidates,
+    compiled_chain,
     edge_touches,
     examples,
-    line,
+    is_goal_free,
     MARGIN,
     QUARTER,
     random_boxes,
     random_chain,
     RAY,
+    slide_goal,
     table_1_arm,
 )
 
@@ -57,30 +57,12 @@ def reachable_target(arm, rng):
     return T[:3, 3] + rng.uniform(0.1, 3.0) * T[:3, 2]
 
 
-def candidates_of(kernels, arm, target, q_near, n_draws):
-    """Return the candidates of a pair of kernels, and their reaches."""
-    world = arm_world(arm, EMPTY, 0.0, RAY)
-    ratios = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0])[: arm.dof - kernels.n_solved] % 1.0
-    candidates, reaches = np.full((2 * n_draws, arm.dof), np.nan), np.full(2 * n_draws, np.nan)
-    n = kernels.goal_candidates(
-        world.robot,
-        world.bounds,
-        target_in_mount(arm, PointingGoal(target)),
-        q_near,
-        ratios,
-        n_draws,
-        candidates,
-        reaches,
-    )
-    return candidates[:n], reaches[:n]
-
-
 def projected(arm, target, q):
     """Return the projection of q onto the goal manifold, and its reach."""
-    world, q = arm_world(arm, EMPTY, 0.0, RAY), np.array(q, dtype=float)
+    q = np.array(q, dtype=float)
     local = target_in_mount(arm, PointingGoal(target))
     work = np.full((WORK_ROWS, arm.dof), np.nan)
-    return q, project(world.robot, world.bounds, local, q, work)
+    return q, project(robot_rows(arm, RAY), arm.bounds, local, q, work)
 
 
 @examples(250)
@@ -90,7 +72,7 @@ def test_candidates_of_any_arm_aim_within_limits(seed):
     arm = random_chain(rng, has_tail=False, fewest=2)
     for target in (reachable_target(arm, rng), rng.uniform(-2.0, 2.0, 3)):
         q_near = rng.uniform(*arm.bounds)
-        candidates, reaches = candidates_of(NUMERICAL, arm, target, q_near, 16)
+        candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q_near, 16)
         for q, reach in zip(candidates, reaches, strict=True):
             assert ((q >= arm.bounds[0]) & (q <= arm.bounds[1])).all()
             assert pointing_error(arm, q, target) < 1e-10
@@ -107,7 +89,7 @@ def test_what_can_be_reached_is_found():
     for _ in range(300):
         arm = random_chain(rng, has_tail=False, fewest=2)
         target = reachable_target(arm, rng)
-        assert len(candidates_of(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 16)[0]) > 0
+        assert len(aiming_candidates(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 16)[0]) > 0
 
 
 def test_a_posture_that_aims_is_the_first_candidate_as_it_is():
@@ -116,7 +98,8 @@ def test_a_posture_that_aims_is_the_first_candidate_as_it_is():
         arm = random_chain(rng, has_tail=False, fewest=2)
         q_near = rng.uniform(*arm.bounds)
         T = tool_pose(arm, q_near)
-        candidates, reaches = candidates_of(NUMERICAL, arm, T[:3, 3] + 0.7 * T[:3, 2], q_near, 2)
+        target = T[:3, 3] + 0.7 * T[:3, 2]
+        candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q_near, 2)
         assert np.abs(candidates[0] - q_near).max() < 1e-9
         assert reaches[0] == pytest.approx(0.7, abs=1e-9)
 
@@ -126,11 +109,11 @@ def test_slopes_are_the_derivatives_of_the_angle():
     n_ahead = 0
     for _ in range(100):
         arm = random_chain(rng, has_tail=False, fewest=2)
-        world = arm_world(arm, EMPTY, 0.0, RAY)
+        robot = robot_rows(arm, RAY)
         q, target = rng.uniform(*arm.bounds), rng.uniform(-2.0, 2.0, 3)
         local = target_in_mount(arm, PointingGoal(target))
         work, spare = np.empty((2, WORK_ROWS, arm.dof))
-        angle, distance = measure_aim(world.robot, local, q, work)
+        angle, distance = measure_aim(robot, local, q, work)
         T = tool_pose(arm, q)
         v = target - T[:3, 3]
         assert distance == pytest.approx(np.linalg.norm(v), abs=1e-12)
@@ -140,8 +123,8 @@ def test_slopes_are_the_derivatives_of_the_angle():
         n_ahead += 1
         for k in range(arm.dof):
             step = 1e-6 * np.eye(arm.dof)[k]
-            rise = measure_aim(world.robot, local, q + step, spare)[0]
-            fall = measure_aim(world.robot, local, q - step, spare)[0]
+            rise = measure_aim(robot, local, q + step, spare)[0]
+            fall = measure_aim(robot, local, q - step, spare)[0]
             assert -work[3, k] == pytest.approx((rise - fall) / 2e-6, abs=1e-6, rel=1e-4)
     assert n_ahead > 50
 
@@ -150,7 +133,7 @@ def test_goals_in_closed_form_are_where_a_projection_stays():
     rng, arm = np.random.default_rng(44), table_1_arm()
     for _ in range(50):
         target, q_near = rng.uniform(-1.5, 1.5, 3), rng.uniform(*arm.bounds)
-        goals, reaches = candidates_of(CLOSED_FORM, arm, target, q_near, 8)
+        goals, reaches = aiming_candidates(CLOSED_FORM, arm, target, q_near, 8)
         for goal, reach in zip(goals, reaches, strict=True):
             q, again = projected(arm, target, goal)
             assert np.abs(q - goal).max() < 1e-9
@@ -163,14 +146,12 @@ def test_the_nearest_goals_are_as_near_as_those_in_closed_form():
     excess, excess_slid = [], []
     for _ in range(100):
         target, q_near = rng.uniform(-1.5, 1.5, 3), rng.uniform(*arm.bounds)
-        local = target_in_mount(arm, PointingGoal(target))
         near, slid = [], []
         for kernels in (CLOSED_FORM, NUMERICAL):
-            goals, _ = candidates_of(kernels, arm, target, q_near, 128)
+            goals, _ = aiming_candidates(kernels, arm, target, q_near, 128)
             path = np.array([q_near, goals[np.argmin(np.linalg.norm(goals - q_near, axis=1))]])
             near.append(np.linalg.norm(path[1] - path[0]))
-            data = (world.edge_check, world.resolution, world.robot, world.obstacles, world.bounds)
-            kernels.slide_goal(*data, local, path, 2, 1e-3)
+            slide_goal(kernels, arm, world, target, path, 2, 1e-3)
             slid.append(np.linalg.norm(path[1] - path[0]))
             assert slid[-1] <= near[-1]
         excess.append(near[1] - near[0])
@@ -184,44 +165,47 @@ def test_the_nearest_goals_are_as_near_as_those_in_closed_form():
 @given(seed=SEEDS)
 def test_sliding_along_the_manifold_of_any_arm_never_lengthens(seed):
     rng = np.random.default_rng(seed)
-    arm, scene = random_chain(rng, has_tail=False, fewest=2), random_boxes(rng, 2)
+    arm, scene = compiled_chain(rng, has_tail=False), random_boxes(rng, 2)
     world = arm_world(arm, scene, MARGIN, RAY)
-    goal = PointingGoal(reachable_target(arm, rng))
-    q_start = rng.uniform(*arm.bounds)
-    goals = goal_configurations(arm, goal, world, q_start, 8).q_goals
-    usable = [q for q in goals if world.is_edge_valid(q_start, q)]
+    target, q_start = reachable_target(arm, rng), rng.uniform(*arm.bounds)
+    candidates, _ = aiming_candidates(NUMERICAL, arm, target, q_start, 8)
+    usable = [
+        q
+        for q in sorted(candidates, key=lambda q: np.linalg.norm(q - q_start))
+        if is_goal_free(arm, scene, MARGIN, q, target) and world.is_edge_valid(q_start, q)
+    ]
     for q in usable[:1] + usable[-1:]:
         path = np.full((4, arm.dof), np.nan)
         path[0], path[1] = q_start, q
         before = np.linalg.norm(path[1] - path[0])
-        gain = goal_slider(arm, goal, world)(path, 2, 2e-3)
+        gain = slide_goal(NUMERICAL, arm, world, target, path, 2, 2e-3)
         assert gain >= 0.0
         assert before - np.linalg.norm(path[1] - path[0]) == pytest.approx(gain, abs=1e-12)
         assert np.array_equal(path[0], q_start)
         assert np.isnan(path[2:]).all()
         assert world.is_in_bounds(path[1])
-        assert pointing_error(arm, path[1], goal.target) < 1e-10
-        ray = max(RAY, np.linalg.norm(goal.target - tool_pose(arm, path[1])[:3, 3]))
-        assert dense_touch(arm, scene, MARGIN, ray, line(path[1], path[1]), 1) < 0
+        assert pointing_error(arm, path[1], target) < 1e-10
+        assert is_goal_free(arm, scene, MARGIN, path[1], target)
         assert not edge_touches(arm, scene, MARGIN, RAY, path[0], path[1], 5e-3)
 
 
 def test_a_slide_ends_where_the_manifold_is_square_to_the_edge():
     rng = np.random.default_rng(46)
     n_inside = 0
-    for _ in range(60):
-        arm = random_chain(rng, has_tail=False, fewest=3)
+    for _ in range(90):
+        arm = compiled_chain(rng, has_tail=False)
         world = arm_world(arm, EMPTY, 0.0, RAY)
-        goal, q_start = PointingGoal(reachable_target(arm, rng)), rng.uniform(*arm.bounds)
-        goals = goal_configurations(arm, goal, world, q_start, 8).q_goals
-        path = np.array([q_start, goals[0]])
-        goal_slider(arm, goal, world)(path, 2, 1e-5)
+        target, q_start = reachable_target(arm, rng), rng.uniform(*arm.bounds)
+        candidates, _ = aiming_candidates(NUMERICAL, arm, target, q_start, 8)
+        nearest = min(candidates, key=lambda q: np.linalg.norm(q - q_start))
+        path = np.array([q_start, nearest])
+        slide_goal(NUMERICAL, arm, world, target, path, 2, 1e-5)
         q = path[1]
-        if (np.minimum(q - arm.bounds[0], arm.bounds[1] - q) < 1e-6).any():
+        if arm.dof == 2 or (np.minimum(q - arm.bounds[0], arm.bounds[1] - q) < 1e-6).any():
             continue
         n_inside += 1
         work = np.empty((WORK_ROWS, arm.dof))
-        measure_aim(world.robot, target_in_mount(arm, goal), q, work)
+        measure_aim(world.robot, target_in_mount(arm, PointingGoal(target)), q, work)
         # What of the edge is no combination of the two slopes leads along the manifold.
         across = np.linalg.qr(work[3:5].T)[0]
         edge = q_start - q
@@ -246,7 +230,7 @@ def test_a_target_beyond_the_limits_has_no_candidates():
         for aside in (0.0, 0.1):
             target = T[:3, 3] - away * T[:3, 2] + aside * T[:3, 0]
             q_near = rng.uniform(*arm.bounds)
-            assert len(candidates_of(NUMERICAL, arm, target, q_near, 64)[0]) == 0
+            assert len(aiming_candidates(NUMERICAL, arm, target, q_near, 64)[0]) == 0
 
 
 def test_singular_postures_give_numbers_or_nothing():
@@ -259,7 +243,7 @@ def test_singular_postures_give_numbers_or_nothing():
             T = tool_pose(arm, q)
             for along, aside in ((1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (-1.0, 1e-9), (1.0, 1.0)):
                 target = T[:3, 3] + along * T[:3, 2] + aside * T[:3, 1]
-                candidates, reaches = candidates_of(NUMERICAL, arm, target, q, 16)
+                candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q, 16)
                 assert np.isfinite(reaches).all()
                 for candidate in candidates:
                     assert pointing_error(arm, candidate, target) < 1e-9
@@ -272,7 +256,7 @@ def test_wide_limits_bring_the_turns_near_the_start_first():
     dh = [[QUARTER, 0.1, 0.0, 0.2]] * 6 + [[QUARTER, 0.1, 0.0, 0.0]]
     rng, arm = np.random.default_rng(48), simple_arm(dh, (False,) * 6, -6.28, 6.28)
     q_near = rng.uniform(-0.5, 0.5, 6)
-    candidates, _ = candidates_of(NUMERICAL, arm, np.array([1.0, 0.4, 0.8]), q_near, 64)
+    candidates, _ = aiming_candidates(NUMERICAL, arm, np.array([1.0, 0.4, 0.8]), q_near, 64)
     assert (np.abs(candidates - q_near).max(axis=1) < 4.5).mean() > 0.3
     assert (np.abs(candidates) > 4.0).any()
 
@@ -298,7 +282,7 @@ def test_arms_whose_ray_sweeps_a_surface_only_are_refused():
     rng = np.random.default_rng(49)
     for _ in range(20):
         target = reachable_target(arm, rng)
-        (q,), _ = candidates_of(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 8)
+        (q,), _ = aiming_candidates(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 8)
         assert pointing_error(arm, q, target) < 1e-10
 
 

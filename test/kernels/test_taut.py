@@ -1,0 +1,79 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Paths pulled taut: never longer, the same ends, every edge proven."""
+
+import numpy as np
+import pytest
+from rrth_planner.kernels.taut import pull_taut
+from rrth_planner.kernels.tree import path_length
+from worlds import (
+    edge_touches,
+    free_configuration,
+    MARGIN,
+    raw_paths,
+    RAY,
+    table_1_arm,
+    wearer,
+    wearer_world,
+)
+
+
+@pytest.fixture(scope='module')
+def raw():
+    """Paths as growth leaves them."""
+    return raw_paths(wearer_world(), np.random.default_rng(44), 20)
+
+
+def taut(world, waypoints, spacing=0.01, room=64):
+    path = np.full((room, 4), np.nan)
+    path[: len(waypoints)] = waypoints
+    seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
+    n = pull_taut(*seam, path, len(waypoints), spacing)
+    return path[:n]
+
+
+def test_pulling_taut_never_lengthens_and_keeps_both_ends(raw):
+    world, arm, scene = wearer_world(), table_1_arm(), wearer()
+    for path in raw:
+        for spacing in (0.3, 0.01):
+            pulled = taut(world, path, spacing)
+            before = path_length(path, len(path))
+            assert path_length(pulled, len(pulled)) <= before * (1 + 1e-12)
+            assert np.array_equal(pulled[0], path[0])
+            assert np.array_equal(pulled[-1], path[-1])
+            for a, b in zip(pulled[:-1], pulled[1:], strict=True):
+                assert not edge_touches(arm, scene, MARGIN, RAY, a, b)
+                assert world.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
+
+
+def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
+    world = wearer_world()
+    for path in raw:
+        once = taut(world, path)
+        again = taut(world, once)
+        gain = path_length(once, len(once)) - path_length(again, len(again))
+        assert gain <= 2e-3 * path_length(once, len(once))
+
+
+def test_a_detour_through_free_space_is_pulled_straight():
+    world = wearer_world()
+    rng = np.random.default_rng(45)
+    n = 0
+    while n < 20:
+        q = np.stack([free_configuration(rng, world) for _ in range(3)])
+        if all(world.is_edge_valid(q[i], q[j]) for i, j in ((0, 1), (1, 2), (0, 2))):
+            assert np.array_equal(taut(world, q), q[[0, 2]])
+            n += 1
+
+
+def test_paths_of_one_or_two_points_are_left_alone():
+    world = wearer_world()
+    q = np.stack([free_configuration(np.random.default_rng(46), world)] * 2)
+    assert np.array_equal(taut(world, q[:1]), q[:1])
+    assert np.array_equal(taut(world, q), q)
+
+
+def test_a_full_buffer_takes_no_further_waypoint(raw):
+    world = wearer_world()
+    for path in raw:
+        assert len(taut(world, path, room=len(path))) <= len(path)
