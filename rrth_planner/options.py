@@ -101,10 +101,10 @@ class RRTHOptions(GrowthOptions):
     """RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways."""
 
     corner_spacing: float = _option(
-        0.05, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
+        0.1, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
     )
     corner_moves: int = _option(
-        30, 0, 10**4, '-', 'rounds at most in which corners move along what they lean on'
+        10, 0, 10**4, '-', 'rounds at most in which corners move along what they lean on'
     )
     improve_time: float = _option(
         0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
