@@ -89,9 +89,9 @@ def search(
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
     """Return the entries of `settings` of the kernel."""
-    how = (options.corner_spacing, float(options.corner_moves), 0.0)
+    how = (options.corner_spacing, float(options.corner_moves), 0.0, 0.0)
     if isinstance(options, PrintedRRTHOptions):
-        how = (options.corner_spacing, options.target_spacing, options.check_spacing)
+        how = (options.corner_spacing, 0.0, options.target_spacing, options.check_spacing)
     return np.array(
         [
             options.step_size,

@@ -74,10 +74,12 @@ def is_configuration_free(q, ray_length, chain, boxes):
     n_bars = chain(q, ray_length, points, 0)
     if boxes.shape[0] > 1:
         return not touches(points, 0, n_bars, boxes)
+    n_touched = 0
     for k in range(n_bars - 1, -1, -1):
-        if touched_lanes(points, 4 * k, boxes, 0) != 0:
-            return False
-    return True
+        n_touched += touched_lanes(points, 4 * k, boxes, 0)
+        if n_touched != 0:
+            break
+    return n_touched == 0
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))

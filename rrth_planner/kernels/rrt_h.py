@@ -5,6 +5,7 @@
 import math
 
 from numba.core.types import float64, int64, void
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
     as_chain,
@@ -58,9 +59,16 @@ BATCH = 100
 # Draws of later growths lie where a path this much longer than the best one can lead: what is
 # first found is longer than what becomes of it.
 WIDER = 1.3
+# A taut path longer than this times the best one is not made to lean.
+PROMISING = 1.2
 # Finest step of a goal along its manifold [rad].
 FINEST_SLIDE = 2e-3
-MAX_SLIDES = 100
+# Rounds of it, and those in which the path leans; what a slide must gain to be worth another one,
+# relative.
+MAX_SLIDES, MAX_LEANS, SLID = 30, 3, 1e-3
+# Entries of the settings of `shorten`: k of the paper, moves of its corners, and, for the steps as
+# printed, the spacings of the points P_T and P_C.
+N_HOW, MOVES = 4, 1
 # Waypoints nearer than this are one [rad].
 TWIN = 1e-9
 
@@ -78,6 +86,7 @@ TWIN = 1e-9
         MAT,
         VEC,
         VEC,
+        float64,
         OUT_MAT,
         int64,
     )
@@ -94,12 +103,35 @@ def finish(
     bounds,
     target,
     how,
+    worth,
     path,
     n,
 ):
-    """Pull a path taut and slide its goal, in turn, until nothing is gained; return its size."""
-    n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
+    """
+    Pull a path taut and slide its goal, in turn, until little is gained; return its size.
+
+    It leans on the boxes only once its goal is about where it will be, and only where it is
+    shorter than `worth` by then.
+    """
+    quick = scratch.floats(N_HOW)
+    for i in range(N_HOW):
+        quick[i] = how[i]
+    quick[MOVES] = 0.0
+    n_leans = 0 if how[MOVES] > 0.0 else 1
     for _ in range(MAX_SLIDES):
+        is_leaning = n_leans > 0
+        n = shorten(
+            is_edge_free,
+            find,
+            resolution,
+            chain,
+            robot,
+            obstacles,
+            bounds,
+            path,
+            n,
+            how if is_leaning else quick,
+        )
         gain = slide_goal(
             is_edge_free,
             resolution,
@@ -112,10 +144,17 @@ def finish(
             n,
             FINEST_SLIDE,
         )
-        if gain < TAUT:
-            break
-        n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
-    return n
+        if gain < SLID * path_length(path, n):
+            if is_leaning:
+                return n
+            if path_length(path, n) > worth:
+                return n
+            n_leans = 1
+        elif is_leaning:
+            n_leans += 1
+            if n_leans > MAX_LEANS:
+                break
+    return shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
 
 
 @kernel(void(OUT_CUBE, int64, int64, OUT_INTS, OUT_MAT))
@@ -200,6 +239,7 @@ def go_straight(
                 bounds,
                 target,
                 settings[HOW:],
+                math.inf,
                 paths[WORK],
                 2,
             )
@@ -365,6 +405,7 @@ def advance(
                 bounds,
                 target,
                 settings[HOW:],
+                PROMISING * cost,
                 paths[WORK],
                 n,
             )

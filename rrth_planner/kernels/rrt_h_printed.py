@@ -115,9 +115,9 @@ def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     """
     Do steps 1, 2 and 3 once each, in place; return the number of waypoints.
 
-    how (3,): k of the paper, distance between points P_T, between points P_C [rad].
+    how (4,): k of the paper, not used, distance between points P_T, between points P_C [rad].
     """
-    least, targets, checks = how[0], how[1], how[2]
+    least, targets, checks = how[0], how[2], how[3]
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
