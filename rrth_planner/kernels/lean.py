@@ -34,7 +34,7 @@ SHORTEST_BEND = 0.03
 # Shorter edges pull no harder than one of this length [rad].
 SHORTEST = 1e-3
 # What a round must gain to be worth another one, relative.
-ENOUGH = 3e-4
+ENOUGH = 5e-4
 
 
 @kernel(void(MAT, int64, OUT_VEC))

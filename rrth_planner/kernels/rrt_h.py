@@ -65,7 +65,7 @@ PROMISING = 1.2
 FINEST_SLIDE = 2e-3
 # Rounds of it, and those in which the path leans; what a slide must gain to be worth another one,
 # relative.
-MAX_SLIDES, MAX_LEANS, SLID = 30, 3, 1e-3
+MAX_SLIDES, MAX_LEANS, SLID = 30, 1, 1e-3
 # Entries of the settings of `shorten`: k of the paper, moves of its corners, and, for the steps as
 # printed, the spacings of the points P_T and P_C.
 N_HOW, MOVES = 4, 1
