@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import check_pointing_arm, NUMERICAL, pointing_kernels
+from rrth_planner.aiming import check_pointing_arm, numerical, pointing_kernels
 from rrth_planner.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
@@ -77,7 +77,7 @@ def small_body():
 def test_motions_of_any_arm_never_touch_and_end_on_target(shape):
     arm, scene = make_arm(*shape), small_body()
     check_pointing_arm(arm)
-    assert pointing_kernels(arm) is NUMERICAL
+    assert pointing_kernels(arm) is numerical()
     world = arm_world(arm, scene, MARGIN, RAY)
     rng = np.random.default_rng(61)
     n_solved = n_bent = 0

@@ -323,5 +323,7 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
         is_bent = n > n_before
         if not is_bent:
             break
-    # A corner that brought nothing goes again.
-    return pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+    if is_bent:
+        # A corner that brought nothing goes again.
+        n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+    return n

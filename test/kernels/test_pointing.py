@@ -8,7 +8,7 @@ import pytest
 from rrth_planner.aiming import (
     check_pointing_arm,
     CLOSED_FORM,
-    NUMERICAL,
+    numerical,
     pointing_kernels,
     target_in_mount,
 )
@@ -166,7 +166,7 @@ def test_only_arms_with_a_pan_and_tilt_tail_aim_in_closed_form():
 
     assert pointing_kernels(base) is CLOSED_FORM
     for row, column, value in ((-1, 0, 1.5), (-2, 0, 1.5), (-1, 1, 0.01), (-2, 1, 0.01)):
-        assert pointing_kernels(changed(row, column, value)) is NUMERICAL
+        assert pointing_kernels(changed(row, column, value)) is numerical()
 
 
 @examples(60)
@@ -190,7 +190,7 @@ def test_candidates_aim_and_those_within_a_distance_are_those_of_all(seed, has_t
     assert np.array_equal(near_reaches, reaches[is_near])
 
 
-@pytest.mark.parametrize('kernels', [CLOSED_FORM, NUMERICAL], ids=['closed form', 'numerical'])
+@pytest.mark.parametrize('kernels', [CLOSED_FORM, numerical()], ids=['closed form', 'numerical'])
 def test_sliding_never_lengthens_and_the_goal_stays_an_aim(kernels):
     arm, scene = table_1_arm(), wearer()
     world = arm_world(arm, scene, MARGIN, RAY)

@@ -8,7 +8,7 @@ import pytest
 from rrth_planner.aiming import (
     check_pointing_arm,
     CLOSED_FORM,
-    NUMERICAL,
+    numerical,
     pointing_kernels,
     target_in_mount,
 )
@@ -72,7 +72,7 @@ def test_candidates_of_any_arm_aim_within_limits(seed):
     arm = random_chain(rng, has_tail=False, fewest=2)
     for target in (reachable_target(arm, rng), rng.uniform(-2.0, 2.0, 3)):
         q_near = rng.uniform(*arm.bounds)
-        candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q_near, 16)
+        candidates, reaches = aiming_candidates(numerical(), arm, target, q_near, 16)
         for q, reach in zip(candidates, reaches, strict=True):
             assert ((q >= arm.bounds[0]) & (q <= arm.bounds[1])).all()
             assert pointing_error(arm, q, target) < 1e-10
@@ -89,7 +89,9 @@ def test_what_can_be_reached_is_found():
     for _ in range(300):
         arm = random_chain(rng, has_tail=False, fewest=2)
         target = reachable_target(arm, rng)
-        assert len(aiming_candidates(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 16)[0]) > 0
+        assert (
+            len(aiming_candidates(numerical(), arm, target, rng.uniform(*arm.bounds), 16)[0]) > 0
+        )
 
 
 def test_a_posture_that_aims_is_the_first_candidate_as_it_is():
@@ -99,7 +101,7 @@ def test_a_posture_that_aims_is_the_first_candidate_as_it_is():
         q_near = rng.uniform(*arm.bounds)
         T = tool_pose(arm, q_near)
         target = T[:3, 3] + 0.7 * T[:3, 2]
-        candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q_near, 2)
+        candidates, reaches = aiming_candidates(numerical(), arm, target, q_near, 2)
         assert np.abs(candidates[0] - q_near).max() < 1e-9
         assert reaches[0] == pytest.approx(0.7, abs=1e-9)
 
@@ -147,7 +149,7 @@ def test_the_nearest_goals_are_as_near_as_those_in_closed_form():
     for _ in range(100):
         target, q_near = rng.uniform(-1.5, 1.5, 3), rng.uniform(*arm.bounds)
         near, slid = [], []
-        for kernels in (CLOSED_FORM, NUMERICAL):
+        for kernels in (CLOSED_FORM, numerical()):
             goals, _ = aiming_candidates(kernels, arm, target, q_near, 128)
             path = np.array([q_near, goals[np.argmin(np.linalg.norm(goals - q_near, axis=1))]])
             near.append(np.linalg.norm(path[1] - path[0]))
@@ -168,7 +170,7 @@ def test_sliding_along_the_manifold_of_any_arm_never_lengthens(seed):
     arm, scene = compiled_chain(rng, has_tail=False), random_boxes(rng, 2)
     world = arm_world(arm, scene, MARGIN, RAY)
     target, q_start = reachable_target(arm, rng), rng.uniform(*arm.bounds)
-    candidates, _ = aiming_candidates(NUMERICAL, arm, target, q_start, 8)
+    candidates, _ = aiming_candidates(numerical(), arm, target, q_start, 8)
     usable = [
         q
         for q in sorted(candidates, key=lambda q: np.linalg.norm(q - q_start))
@@ -178,7 +180,7 @@ def test_sliding_along_the_manifold_of_any_arm_never_lengthens(seed):
         path = np.full((4, arm.dof), np.nan)
         path[0], path[1] = q_start, q
         before = np.linalg.norm(path[1] - path[0])
-        gain = slide_goal(NUMERICAL, arm, world, target, path, 2, 2e-3)
+        gain = slide_goal(numerical(), arm, world, target, path, 2, 2e-3)
         assert gain >= 0.0
         assert before - np.linalg.norm(path[1] - path[0]) == pytest.approx(gain, abs=1e-12)
         assert np.array_equal(path[0], q_start)
@@ -196,10 +198,10 @@ def test_a_slide_ends_where_the_manifold_is_square_to_the_edge():
         arm = compiled_chain(rng, has_tail=False)
         world = arm_world(arm, EMPTY, 0.0, RAY)
         target, q_start = reachable_target(arm, rng), rng.uniform(*arm.bounds)
-        candidates, _ = aiming_candidates(NUMERICAL, arm, target, q_start, 8)
+        candidates, _ = aiming_candidates(numerical(), arm, target, q_start, 8)
         nearest = min(candidates, key=lambda q: np.linalg.norm(q - q_start))
         path = np.array([q_start, nearest])
-        slide_goal(NUMERICAL, arm, world, target, path, 2, 1e-5)
+        slide_goal(numerical(), arm, world, target, path, 2, 1e-5)
         q = path[1]
         if arm.dof == 2 or (np.minimum(q - arm.bounds[0], arm.bounds[1] - q) < 1e-6).any():
             continue
@@ -230,7 +232,7 @@ def test_a_target_beyond_the_limits_has_no_candidates():
         for aside in (0.0, 0.1):
             target = T[:3, 3] - away * T[:3, 2] + aside * T[:3, 0]
             q_near = rng.uniform(*arm.bounds)
-            assert len(aiming_candidates(NUMERICAL, arm, target, q_near, 64)[0]) == 0
+            assert len(aiming_candidates(numerical(), arm, target, q_near, 64)[0]) == 0
 
 
 def test_singular_postures_give_numbers_or_nothing():
@@ -243,7 +245,7 @@ def test_singular_postures_give_numbers_or_nothing():
             T = tool_pose(arm, q)
             for along, aside in ((1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (-1.0, 1e-9), (1.0, 1.0)):
                 target = T[:3, 3] + along * T[:3, 2] + aside * T[:3, 1]
-                candidates, reaches = aiming_candidates(NUMERICAL, arm, target, q, 16)
+                candidates, reaches = aiming_candidates(numerical(), arm, target, q, 16)
                 assert np.isfinite(reaches).all()
                 for candidate in candidates:
                     assert pointing_error(arm, candidate, target) < 1e-9
@@ -256,7 +258,7 @@ def test_wide_limits_bring_the_turns_near_the_start_first():
     dh = [[QUARTER, 0.1, 0.0, 0.2]] * 6 + [[QUARTER, 0.1, 0.0, 0.0]]
     rng, arm = np.random.default_rng(48), simple_arm(dh, (False,) * 6, -6.28, 6.28)
     q_near = rng.uniform(-0.5, 0.5, 6)
-    candidates, _ = aiming_candidates(NUMERICAL, arm, np.array([1.0, 0.4, 0.8]), q_near, 64)
+    candidates, _ = aiming_candidates(numerical(), arm, np.array([1.0, 0.4, 0.8]), q_near, 64)
     assert (np.abs(candidates - q_near).max(axis=1) < 4.5).mean() > 0.3
     assert (np.abs(candidates) > 4.0).any()
 
@@ -278,16 +280,16 @@ def test_arms_whose_ray_sweeps_a_surface_only_are_refused():
     slides = [[0.0, 0.0, 0.0, 0.0], [QUARTER, 0.0, QUARTER, 0.0], [QUARTER, 0.0, 0.0, 0.0]]
     arm = simple_arm(slides, (True, True))
     check_pointing_arm(arm)
-    assert pointing_kernels(arm) is NUMERICAL
+    assert pointing_kernels(arm) is numerical()
     rng = np.random.default_rng(49)
     for _ in range(20):
         target = reachable_target(arm, rng)
-        (q,), _ = aiming_candidates(NUMERICAL, arm, target, rng.uniform(*arm.bounds), 8)
+        (q,), _ = aiming_candidates(numerical(), arm, target, rng.uniform(*arm.bounds), 8)
         assert pointing_error(arm, q, target) < 1e-10
 
 
 def test_both_pairs_of_kernels_fit_the_seam():
-    for kernels in (CLOSED_FORM, NUMERICAL):
+    for kernels in (CLOSED_FORM, numerical()):
         for kernel, seam in (
             (kernels.goal_candidates, jit.CANDIDATES),
             (kernels.slide_goal, jit.SLIDE),
