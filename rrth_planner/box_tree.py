@@ -6,14 +6,16 @@ import itertools
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.arrays import Array
 from rrth_planner.errors import SceneError
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 
+Indices = NDArray[np.int64]
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
-def pack_boxes(rows: Array) -> tuple[Array, Array]:
+def pack_boxes(rows: Array) -> tuple[Array, Indices]:
     """
     Return the groups of boxes that the kernels read, and where each box went.
 
@@ -64,7 +66,7 @@ def grown_groups(groups: Array, by: float) -> Array:
 
 
 def _fill(
-    groups: Array, lanes: Array, rows: Array, boxes: Array, g: int, depth: int, first: int
+    groups: Array, lanes: Indices, rows: Array, boxes: Indices, g: int, depth: int, first: int
 ) -> None:
     """Write the boxes of a group, or the bounds of the groups below it."""
     if depth == 1:
@@ -77,7 +79,7 @@ def _fill(
             _fill(groups, lanes, rows, part, LANES * g + lane + 1, depth - 1, first)
 
 
-def _parts(rows: Array, boxes: Array, n: int) -> list[Array]:
+def _parts(rows: Array, boxes: Indices, n: int) -> list[Indices]:
     """Return the boxes in n parts of nearly equal number, halved along the widest axis."""
     if n == 1:
         return [boxes]

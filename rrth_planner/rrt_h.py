@@ -96,7 +96,7 @@ def search(
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
     """Return the entries of `settings` of the kernel."""
-    is_printed = isinstance(options, PrintedRRTHOptions)
+    printed = options if isinstance(options, PrintedRRTHOptions) else None
     return np.array(
         [
             options.step_size,
@@ -112,8 +112,8 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
             0.0,
             deadline.start + options.improve_time if options.improve_time > 0.0 else -np.inf,
             options.corner_spacing,
-            options.target_spacing if is_printed else options.corner_moves,
-            options.check_spacing if is_printed else 0.0,
+            printed.target_spacing if printed else options.corner_moves,
+            printed.check_spacing if printed else 0.0,
         ]
     )
 
