@@ -96,12 +96,18 @@ def _draws(rng: np.random.Generator, world: World) -> Array:
 def _runs(body: int, n: int, n_long: int) -> list[Row]:
     arm, rows = table_1_arm(), []
     chosen = cases(body, n)
-    query(arm, chosen[0], np.random.default_rng(0))
-    for k, case in enumerate(chosen):
+    for case in chosen:
+        query(arm, case, np.random.default_rng(0))
+    # One after the other: what judges a path in between would leave no warm cache.
+    with uncollected():
+        timings = [
+            timed(lambda case=case, rng=rng: query(arm, case, rng))
+            for case, rng in [
+                (case, np.random.default_rng(body * n + k)) for k, case in enumerate(chosen)
+            ]
+        ]
+    for k, (case, (time_total, result)) in enumerate(zip(chosen, timings, strict=True)):
         seed = body * n + k
-        rng = np.random.default_rng(seed)
-        with uncollected():
-            time_total, result = timed(lambda case=case, rng=rng: query(arm, case, rng))
         path = None if result is None else result.path
         rows.append(
             path_row(

@@ -8,6 +8,7 @@ import json
 import numpy as np
 from rrth_planner.options import RRTOptions, TreeOptions
 from rrth_planner.planner import plan
+from rrth_planner.result import PlanResult
 
 from benchmarks.clock import timed, uncollected
 from benchmarks.extent import Extent
@@ -37,7 +38,13 @@ def _runs(name: str, planner: str, extent: Extent) -> list[Row]:
     options = _options(query, planner, extent.improve_time)
     for seed in range(N_WARM):
         plan(query.problem, options, np.random.default_rng(seed))
-    return [_run(query, planner, options, seed) for seed in range(extent.seeds)]
+    # One after the other: what judges a path in between would leave no warm cache.
+    with uncollected():
+        timings = [
+            timed(lambda rng=rng: plan(query.problem, options, rng))
+            for rng in [np.random.default_rng(seed) for seed in range(extent.seeds)]
+        ]
+    return [_row(query, planner, options, seed, *timing) for seed, timing in enumerate(timings)]
 
 
 def _options(query: Query, planner: str, improve_time: float) -> TreeOptions:
@@ -46,10 +53,14 @@ def _options(query: Query, planner: str, improve_time: float) -> TreeOptions:
     return RRTOptions(step_size=MAP_STEP, near_bias=0.0) if query.is_map else RRTOptions()
 
 
-def _run(query: Query, planner: str, options: TreeOptions, seed: int) -> Row:
-    rng = np.random.default_rng(seed)
-    with uncollected():
-        time_total, result = timed(lambda: plan(query.problem, options, rng))
+def _row(
+    query: Query,
+    planner: str,
+    options: TreeOptions,
+    seed: int,
+    time_total: float,
+    result: PlanResult,
+) -> Row:
     path, history = result.path, list(zip(result.time_history, result.cost_history, strict=True))
     return path_row(
         problem=query.name,
