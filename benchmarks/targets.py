@@ -20,7 +20,7 @@ WHY_NOT: Mapping[str, str] = {
         'the proof of a whole edge of 1 rad costs as much as six of them.'
     ),
     'full query: choose the posture, plan, shorten, p90': (
-        'With one further growth. With two the gap shrinks, and p95 grows beyond its target.'
+        'With one further growth. With three it is 0.1 % on a like set of queries, and p95 3 ms.'
     ),
     'full query: choose the posture, plan, shorten, p95': (
         'Queries that no straight way answers: growth takes 0.1 ms, leaning on the boxes 1 ms a '
