@@ -43,12 +43,14 @@ class Tree:
 
 def ordered_tree(nodes: Array, parents: NDArray[np.int64]) -> Tree:
     """Return a tree whose nodes come in the order of their depth, so parents come first."""
-    depth = np.zeros(len(nodes), dtype=np.int64)
-    above = np.array(parents)
-    while (above >= 0).any():
-        depth[above >= 0] += 1
-        above = np.where(above >= 0, parents[above], -1)
-    order = np.argsort(depth, kind='stable')
+    # A root's parent is a node past the last one. In each round all look twice as far up.
+    n = len(nodes)
+    above = np.append(np.where(parents < 0, n, parents), n)
+    depth = (above < n).astype(np.int64)
+    while (above < n).any():
+        depth += depth[above]
+        above = above[above]
+    order = np.argsort(depth[:n], kind='stable')
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     old = parents[order]

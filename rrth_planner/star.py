@@ -17,7 +17,7 @@ from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import MAX_NODES, MAX_WAYPOINTS
 
 # Draws between two looks at the clock.
-BATCH = 250
+BATCH = 500
 # Pairs of nodes at which the two trees meet, at most.
 MAX_MEETINGS = 65536
 

@@ -25,7 +25,14 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.sampling import draw_uniform
-from rrth_planner.kernels.tree import adapted_step, copy, distance, nearest, steer
+from rrth_planner.kernels.tree import (
+    adapted_step,
+    copy,
+    distance,
+    nearest,
+    squared_distances,
+    steer,
+)
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
 # resolution, chain, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius,
@@ -142,13 +149,14 @@ def add_node(
         return 0
     neighbours, lengths = np.empty(n, np.int64), np.empty(n)
     n_near = 0
+    squared_distances(nodes, 0, n, q, lengths)
     for i in range(n):
-        squared = 0.0
-        for k in range(q.shape[0]):
-            squared += (nodes[i, k] - q[k]) ** 2
-        if squared <= radius * radius:
-            neighbours[n_near], lengths[n_near] = i, math.sqrt(squared)
-            n_near += 1
+        # Written in any case, kept only if near: no branch for the processor to guess.
+        squared = lengths[i]
+        neighbours[n_near], lengths[n_near] = i, squared
+        n_near += 1 if squared <= radius * radius else 0
+    for row in range(n_near):
+        lengths[row] = math.sqrt(lengths[row])
     parent, cost = near, costs[near] + distance(nodes[near], q)
     for row in range(n_near):
         i, length = neighbours[row], lengths[row]

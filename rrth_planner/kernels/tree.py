@@ -21,6 +21,7 @@ from rrth_planner.kernels.jit import (
 
 # Nodes that the search for the nearest one looks at in one go.
 CHUNK = 256
+ROOM = CHUNK + 8
 
 
 @kernel(void(VEC, OUT_VEC))
@@ -48,32 +49,45 @@ def path_length(path, n):
     return total
 
 
+@kernel(void(MAT, int64, int64, VEC, OUT_VEC))
+def squared_distances(nodes, first, n, q, squares):
+    """Write the squared distances of n nodes, from that row on, from q."""
+    # Written out for the common sizes, and nothing else in the loop, it is done on vectors.
+    if q.shape[0] == 4:
+        for i in range(n):
+            a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
+            c, d = nodes[first + i, 2] - q[2], nodes[first + i, 3] - q[3]
+            squares[i] = a * a + b * b + c * c + d * d
+    elif q.shape[0] == 2:
+        for i in range(n):
+            a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
+            squares[i] = a * a + b * b
+    else:
+        for i in range(n):
+            total = 0.0
+            for k in range(q.shape[0]):
+                total += (nodes[first + i, k] - q[k]) ** 2
+            squares[i] = total
+
+
 @kernel(int64(MAT, int64, VEC))
 def nearest(nodes, size, q):
     """Return the index of the node nearest to q; brute force wins up to some 700 nodes."""
-    squares = scratch.floats(CHUNK)
+    squares = scratch.floats(ROOM)
     best, index = math.inf, 0
     for first in range(0, size, CHUNK):
         n = min(CHUNK, size - first)
-        # Written out for the common sizes, and apart from the search, it is done on vectors.
-        if q.shape[0] == 4:
-            for i in range(n):
-                a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
-                c, d = nodes[first + i, 2] - q[2], nodes[first + i, 3] - q[3]
-                squares[i] = a * a + b * b + c * c + d * d
-        elif q.shape[0] == 2:
-            for i in range(n):
-                a, b = nodes[first + i, 0] - q[0], nodes[first + i, 1] - q[1]
-                squares[i] = a * a + b * b
-        else:
-            for i in range(n):
-                total = 0.0
-                for k in range(q.shape[0]):
-                    total += (nodes[first + i, k] - q[k]) ** 2
-                squares[i] = total
-        for i in range(n):
-            if squares[i] < best:
-                best, index = squares[i], first + i
+        squared_distances(nodes, first, n, q, squares)
+        # Eight at once find out whether there is a nearer one; seldom is there one to look for.
+        for i in range(n, n + 7):
+            squares[i] = math.inf
+        for i in range(0, n, 8):
+            a, b = min(squares[i], squares[i + 1]), min(squares[i + 2], squares[i + 3])
+            c, d = min(squares[i + 4], squares[i + 5]), min(squares[i + 6], squares[i + 7])
+            if min(min(a, b), min(c, d)) < best:
+                for j in range(i, i + 8):
+                    if squares[j] < best:
+                        best, index = squares[j], first + j
     return index
 
 
