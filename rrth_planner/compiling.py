@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 # What either process compiles, about as much each, the one what the other does not ask for soon.
-SHARES = (('lean', 'rrt_h'), ('taut', 'rrt', 'goals', 'arm_clearance', 'chain'))
+SHARES = (('lean', 'arm_clearance', 'chain'), ('taut', 'rrt', 'rrt_h', 'goals'))
 
 
 def compile_kernels() -> bool:
