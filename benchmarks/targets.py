@@ -30,6 +30,10 @@ WHY_NOT: Mapping[str, str] = {
         (f'first path, {name}, p50' for name in QUERIES),
         'Some 20 us are the calls from Python and the result; the draws vary with the seed.',
     ),
+    'within 0.02 % of the exact shortest, c_shape, p50': (
+        'Some 20 us are the calls from Python and the result, as on a map where the straight line '
+        'is free; growth and pulling taut take the rest.'
+    ),
     'path, trajectory and both checks, over the service, p50': (
         'Planning, timing and both checks take the time named as planning in the node; the rest '
         'are the Python client, DDS, and two processes that wake up with cold caches.'
