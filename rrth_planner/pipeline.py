@@ -3,6 +3,7 @@
 """The straight line from a scene and a target to a certified trajectory."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 import functools
 import time
@@ -26,10 +27,17 @@ from rrth_planner.kernels import jit
 from rrth_planner.options import TreeOptions
 from rrth_planner.path import Path
 from rrth_planner.planner import plan, PlanResult
-from rrth_planner.refusal import goal_refusal, Refusal, start_refusal, target_refusal
+from rrth_planner.refusal import (
+    goal_refusal,
+    lead_refusal,
+    Refusal,
+    start_refusal,
+    target_refusal,
+)
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.timing import parameterize
+from rrth_planner.takeover import joined, lead_in, LeadIn, MotionState, reserved
+from rrth_planner.timing import parameterize, TooFastError
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World
 
@@ -39,6 +47,8 @@ SPARES = (5e-3, 1e-5)
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].
 HAIR = 2e-6
+# Sizes of the first blend of an arm that moves, as shares of what is free.
+FIRST_SHARES = (0.5, 0.2, 0.0)
 # A wearer who holds still makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)
 _grown = functools.lru_cache(maxsize=32)(grown)
@@ -91,6 +101,7 @@ def plan_motion(
     ray_guard_length: float,
     seed: int,
     should_stop: Callable[[], bool] = lambda: False,
+    moving: MotionState | None = None,
 ) -> MotionPlan:
     """
     Return a certified motion that ends with the tool pointing at the goal.
@@ -115,17 +126,24 @@ def plan_motion(
         >= 0.
     should_stop : callable
         Polled while planning; True cancels.
+    moving : MotionState, optional
+        How the arm moves at q_start; without, it is at rest. The motion then begins with this
+        state: the arm goes on straight ahead, no further than it needs to stop, and turns off.
 
     """
     begin = time.perf_counter()
     world = _world_of(arm, scene, margin, ray_guard_length)
-    refusal = start_refusal(
-        arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
-    ) or target_refusal(scene, goal, margin)
+    lead = None if moving is None else lead_in(moving, limits)
+    q_from = q_start if lead is None else lead.q_stop
+    refusal = (
+        start_refusal(arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1])
+        or target_refusal(scene, goal, margin)
+        or (None if lead is None else lead_refusal(arm, world, lead, limits))
+    )
     if refusal is None:
-        found = _find_path(arm, goal, world, q_start, options, seed, should_stop, begin)
+        found = _find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
         if isinstance(found, PlanResult) and found.path is not None:
-            timed = _time_path(arm, scene, goal, world, found.path, limits, margin)
+            timed = _time_path(arm, scene, goal, world, found.path, limits, margin, lead)
             if should_stop():
                 refusal = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
             elif isinstance(timed, Trajectory):
@@ -229,13 +247,22 @@ def _time_path(
     path: Path,
     limits: MotionLimits,
     margin: float,
+    lead: LeadIn | None,
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
+    if lead is not None:
+        path = _straight_on(lead, path)
     rounded = round_corners(path, _grown(world, HAIR), limits)
     choices = [rounded]
+    if lead is not None:
+        # The arm must be slow enough where the first blend begins: a smaller one begins later.
+        choices += [
+            (replace(rounded[0], half_length=share * rounded[0].half_length), *rounded[1:])
+            for share in FIRST_SHARES
+        ]
     if any(blend.half_length > 0.0 for blend in rounded):
         choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
-    trajectory = first_proven(path, choices, limits, world)
+    trajectory = first_proven(path, choices, limits, world, lead)
     if trajectory is None:
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
@@ -253,7 +280,11 @@ def _time_path(
 
 
 def first_proven(
-    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, world: World
+    path: Path,
+    choices: Sequence[tuple[Blend, ...]],
+    limits: MotionLimits,
+    world: World,
+    lead: LeadIn | None = None,
 ) -> Trajectory | None:
     """
     Return the fastest trajectory along a path that is proven free, or None.
@@ -265,14 +296,30 @@ def first_proven(
         Ways to take the corners.
     limits : MotionLimits
     world : World
+    lead : LeadIn, optional
+        What comes before the path, whose first edge is then followed from its speed on.
 
     """
     # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
-    timed = [parameterize(path, blends, limits) for blends in choices]
+    if lead is None:
+        timed = [parameterize(path, blends, limits) for blends in choices]
+    else:
+        timed = []
+        for blends in choices:
+            with suppress(TooFastError):
+                rest = parameterize(path, blends, reserved(limits), lead.speed)
+                timed.append(joined(lead.trajectory, rest))
     for trajectory in sorted(timed, key=lambda trajectory: trajectory.duration):
         if certify(trajectory, world).is_proven:
             return trajectory
     return None
+
+
+def _straight_on(lead: LeadIn, path: Path) -> Path:
+    """Return the path from the end of the lead-in over where the arm would stop."""
+    begin = lead.trajectory.positions[-1]
+    rest = path.waypoints if path.length > 0.0 else path.waypoints[:1]
+    return Path(np.concatenate([begin[None], rest]))
 
 
 def _solved(

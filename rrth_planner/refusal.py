@@ -8,11 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.aiming import GoalSet
 from rrth_planner.arm import ArmModel
+from rrth_planner.certificate import certify
 from rrth_planner.arrays import Array
 from rrth_planner.goal import PointingGoal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import LeadIn
+from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
+
+
+# A joint that moves faster than its limit by no more than this share is let pass.
+EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +57,41 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) ->
         PlanStatus.START_IN_COLLISION,
         f'{world.bar_names[bar]} is {_how_close(distances[bar, box], margin)} box '
         f'"{world.box_names[box]}"',
+    )
+
+
+def lead_refusal(
+    arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
+) -> Refusal | None:
+    """Return why an arm that moves cannot go straight on until it could rest, or None."""
+    fastest = np.abs(lead.trajectory.velocities) / limits.velocity
+    k = int(fastest.max(axis=0).argmax())
+    if fastest[:, k].max() > 1.0 + EXCESS:
+        speed = np.abs(lead.trajectory.velocities[:, k]).max()
+        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+        return Refusal(
+            PlanStatus.START_MOVES,
+            f'{arm.joint_names[k]} moves at up to {speed:.3f} {unit}, expected at most '
+            f'{limits.velocity[k]:g} {unit} or an arm at rest',
+        )
+    ways = np.concatenate([lead.trajectory.positions, lead.q_stop[None]])
+    low, high = arm.bounds
+    beyond = np.maximum(low - ways, ways - high).max(axis=0)
+    k = int(beyond.argmax())
+    if beyond[k] > 0.0:
+        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        return Refusal(
+            PlanStatus.START_MOVES,
+            f'{arm.joint_names[k]} moves too fast to stop straight ahead: it would pass its '
+            f'limit by {beyond[k]:.4f} {unit}, expected an arm at rest or further from it',
+        )
+    is_free = certify(lead.trajectory, world).is_proven
+    if is_free and world.is_edge_valid(lead.trajectory.positions[-1], lead.q_stop):
+        return None
+    return Refusal(
+        PlanStatus.START_MOVES,
+        'the arm moves, and straight ahead it would touch the wearer before it could stop; '
+        'expected an arm at rest or one with room ahead',
     )
 
 

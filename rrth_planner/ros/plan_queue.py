@@ -83,6 +83,8 @@ class PlanQueue:
         self._lock = Lock()
         self._open: set[_Ticket] = set()
         self._is_closed = False
+        # What the arm was last told to follow.
+        self._running: Trajectory | None = None
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
@@ -147,12 +149,17 @@ class PlanQueue:
         parameters = self._reporter.parameters
         try:
             outcome = self._plan_request(
-                self._heard, parameters, self._now, lambda: ticket.is_cancelled, goal
+                self._heard,
+                parameters,
+                self._now,
+                lambda: ticket.is_cancelled,
+                goal,
+                self._running,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if self._settle(ticket, outcome.trajectory, parameters):
+            if self._settle(ticket, outcome, parameters):
                 if code is not ErrorCode.PREEMPTED:
                     code, sentence = ErrorCode.PREEMPTED, 'the request was cancelled'
             elif outcome.trajectory is not None:
@@ -182,15 +189,15 @@ class PlanQueue:
         is_solved = code is ErrorCode.SUCCESS and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
-    def _settle(
-        self, ticket: _Ticket, trajectory: Trajectory | None, parameters: PlannerParameters
-    ) -> bool:
+    def _settle(self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters) -> bool:
         """Return whether a request was cancelled; publish its motion, if it has one, if not."""
         with self._lock:
             if ticket.is_cancelled or self._is_closed:
                 return True
-            if trajectory is not None:
-                self._publishers.publish_motion(trajectory, parameters)
+            if outcome.trajectory is not None:
+                begin = 0.0 if outcome.start is None else outcome.start.time
+                self._publishers.publish_motion(outcome.trajectory, parameters, begin)
+                self._running = outcome.trajectory
             self._open.discard(ticket)
             return False
 

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 import secrets
+import time
 
 import numpy as np
 from rrth_planner.arm import tool_pose
@@ -17,6 +18,7 @@ from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
+from rrth_planner.takeover import MotionState
 from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world
 
@@ -24,14 +26,41 @@ from rrth_planner.world import arm_world
 START_TOLERANCE = 1e-3
 
 
+# How far ahead a motion begins that takes over from one that runs: that long its plan may take,
+# and once more with more time [s].
+LEADS = (0.05, 0.25)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """
+    Where a motion of an arm that moves begins.
+
+    Parameters
+    ----------
+    time : float
+        [s].
+    state : MotionState
+        What the arm does then.
+    running : Trajectory or None
+        The motion that it was last told to follow.
+
+    """
+
+    time: float
+    state: MotionState
+    running: Trajectory | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanOutcome:
-    """How a request ended: code, sentence, and the plan and its inputs where there was one."""
+    """How a request ended: code, sentence, and plan, inputs and start where there were any."""
 
     code: ErrorCode
     sentence: str
     plan: MotionPlan | None = None
     inputs: PlanInputs | None = None
+    start: Start | None = None
 
     @property
     def trajectory(self) -> Trajectory | None:
@@ -47,9 +76,13 @@ def plan_request(
     clock: Callable[[], float],
     should_stop: Callable[[], bool],
     goal: PointingGoal | None = None,
+    running: Trajectory | None = None,
 ) -> PlanOutcome:
     """
     Return the outcome of a request that begins now.
+
+    A motion for an arm that moves begins with the state that the arm is going to be in shortly,
+    and this returns when that time has come.
 
     Parameters
     ----------
@@ -62,34 +95,73 @@ def plan_request(
         Polled while planning; True cancels.
     goal : PointingGoal, optional
         Of the request; without, the last target.
+    running : Trajectory, optional
+        The motion that the arm was last told to follow.
 
     """
     try:
-        now = clock()
-        inputs = heard.at(now, parameters, goal)
-        inputs.require_rest(now, parameters.arm)
-        if should_stop():
-            raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled before its turn')
-        plan = plan_motion(
-            parameters.arm,
-            inputs.scene,
-            inputs.q_start,
-            inputs.goal,
-            parameters.limits,
-            parameters.options,
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-            seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
-            should_stop=should_stop,
-        )
-        code = CODE_OF_STATUS[plan.status]
-        if plan.trajectory is not None and code is ErrorCode.SUCCESS:
+        for lead in LEADS:
+            now = clock()
+            inputs = heard.at(now, parameters, goal)
             if should_stop():
-                raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-            _check_present(heard, parameters, clock(), inputs, plan.trajectory)
-        return PlanOutcome(code, plan.sentence, plan, inputs)
+                raise RequestError(
+                    ErrorCode.PREEMPTED, 'the request was cancelled before its turn'
+                )
+            start = None
+            if inputs.is_moving(now):
+                start = Start(
+                    now + lead, inputs.ahead(running, now + lead, parameters.arm), running
+                )
+            plan = _plan(inputs, parameters, should_stop, start)
+            code = CODE_OF_STATUS[plan.status]
+            if plan.trajectory is None or code is not ErrorCode.SUCCESS:
+                return PlanOutcome(code, plan.sentence, plan, inputs)
+            if start is None or clock() <= start.time:
+                _wait_for(start, clock, should_stop)
+                if should_stop():
+                    raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
+                _check_present(heard, parameters, clock(), inputs, plan.trajectory, start)
+                return PlanOutcome(code, plan.sentence, plan, inputs, start)
+        raise RequestError(
+            ErrorCode.TIMED_OUT,
+            f'the arm moves, and no plan was ready within {LEADS[-1]:g} s to take over from its '
+            'motion',
+        )
     except RequestError as problem:
         return PlanOutcome(problem.code, str(problem))
+
+
+def _plan(
+    inputs: PlanInputs,
+    parameters: PlannerParameters,
+    should_stop: Callable[[], bool],
+    start: Start | None,
+) -> MotionPlan:
+    return plan_motion(
+        parameters.arm,
+        inputs.scene,
+        inputs.q_start if start is None else start.state.positions,
+        inputs.goal,
+        parameters.limits,
+        parameters.options,
+        margin=parameters.margin,
+        ray_guard_length=parameters.ray_guard_length,
+        seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
+        should_stop=should_stop,
+        moving=None if start is None else start.state,
+    )
+
+
+def _wait_for(
+    start: Start | None, clock: Callable[[], float], should_stop: Callable[[], bool]
+) -> None:
+    """Return when a motion is to begin; at once for an arm at rest."""
+    # A simulated clock may stand still.
+    end = time.monotonic() + 2 * LEADS[-1]
+    while start is not None and clock() < start.time and time.monotonic() < end:
+        if should_stop():
+            return
+        time.sleep(min(1e-3, max(1e-5, start.time - clock())))
 
 
 def _check_present(
@@ -98,17 +170,23 @@ def _check_present(
     now: float,
     inputs: PlanInputs,
     trajectory: Trajectory,
+    start: Start | None,
 ) -> None:
     """Raise RequestError where wearer or arm have moved so that the motion no longer fits."""
     present = heard.at(now, parameters, inputs.goal)
-    moved = float(np.abs(present.q_start - inputs.q_start).max())
+    expected = inputs.q_start
+    if start is None:
+        present.require_rest(now, parameters.arm)
+    else:
+        expected = inputs.ahead(start.running, present.joints.taken, parameters.arm).positions
+    moved = float(np.abs(present.q_start - expected).max())
     if not moved <= START_TOLERANCE:
+        what = 'moved by' if start is None else 'is off its course by'
         raise RequestError(
             ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-            f'the arm moved by {moved:.4f} rad while its motion was planned, expected at most '
+            f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
             f'{START_TOLERANCE:g} rad',
         )
-    present.require_rest(now, parameters.arm)
     if _is_same(present.scene, inputs.scene):
         return
     world = arm_world(

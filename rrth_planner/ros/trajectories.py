@@ -26,10 +26,10 @@ UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
 
 
 def joint_trajectory_to_msg(
-    trajectory: Trajectory, joint_names: Sequence[str], frame: str
+    trajectory: Trajectory, joint_names: Sequence[str], frame: str, begin: float = 0.0
 ) -> JointTrajectory:
     """
-    Return a trajectory as a message that starts on reception (stamp 0).
+    Return a trajectory as a message that starts at a time [s], or on reception (stamp 0).
 
     Times are rounded to whole nanoseconds; velocities and accelerations of both ends are exact
     zeros where they are zero but for rounding.
@@ -52,6 +52,8 @@ def joint_trajectory_to_msg(
     _check_times(times)
     msg = JointTrajectory(joint_names=list(joint_names))
     msg.header.frame_id = frame
+    stamp = msg.header.stamp
+    stamp.sec, stamp.nanosec = divmod(round(begin * NANOSECONDS), NANOSECONDS)
     rows = zip(times, trajectory.positions, velocities, accelerations, strict=True)
     for time, q, v, a in rows:
         # Arrays are taken as they are; lists would be checked number by number.

@@ -360,18 +360,36 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     assert not stranger.heard['joint_trajectory']
 
 
-@pytest.mark.parametrize(('speed', 'said'), [(1.5, '1.500'), (-0.02, '0.020'), (NAN, 'nan')])
-def test_nothing_is_planned_while_the_arm_moves(start, speed, said):
+def test_an_arm_that_moves_is_taken_over_from_its_present_velocity(start):
     planner, stranger = start()
-    moving = joints(velocity=[speed, 0.0, 0.0, 0.0])
-    say_all(planner, stranger, joint_states=moving)
+    say_all(planner, stranger, joint_states=joints(velocity=[0.3, 0.0, 0.0, -0.2]))
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    msg = stranger.heard['joint_trajectory'][-1]
+    assert list(msg.points[0].velocities) == [0.3, 0.0, 0.0, -0.2]
+    assert not any(msg.points[-1].velocities)
+    # It begins at a time that it names, so that what is late on its way does not jump.
+    assert msg.header.stamp.sec > 0
+
+
+def test_velocities_that_are_no_numbers_are_refused(start):
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[NAN, 0.0, 0.0, 0.0]))
     assert stranger.answer().message == (
-        f'START_STATE_INVALID (-26): joint_1 moves at {said} rad/s, expected an arm at rest '
-        '(at most 0.01 rad/s)'
+        'START_STATE_INVALID (-26): joint_1 moves at nan rad/s, expected a velocity for every '
+        'joint'
     )
     stranger.publishers['joint_states'].publish(joints(velocity=[0.009] * 4))
     stranger.wait_until(lambda: inputs_of(planner).joints.value.velocities[1] == 0.009)
     assert stranger.answer().success
+
+
+def test_an_arm_that_moves_faster_than_it_may_is_not_taken_over(start):
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 1.7, 0.0, 0.0]))
+    assert stranger.answer().message.startswith(
+        'START_STATE_INVALID (-26): joint_2 moves at up to 1.700 rad/s, expected at most 1.5 '
+    )
 
 
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
