@@ -24,7 +24,7 @@ setup(
     # Names only: the versions come from rosdep or from requirements/.
     install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
     extras_require={
-        'node': ['python-fcl', 'ruckig', 'matplotlib'],
+        'node': ['python-fcl', 'matplotlib'],
         'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.aiming import GoalSet
 from rrth_planner.arm import ArmModel
-from rrth_planner.certificate import certify
 from rrth_planner.arrays import Array
+from rrth_planner.certificate import certify
 from rrth_planner.goal import PointingGoal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import LeadIn
 from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
-
 
 # A joint that moves faster than its limit by no more than this share is let pass.
 EXCESS = 0.005

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a path to a trajectory: straight edges and rounded corners, within the joints' limits."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 import math
@@ -23,10 +22,13 @@ TICK, CLOSEST = 1e-9, 1e-5
 # a blend is one piece, or else it is passed slower in the middle where that is so much faster.
 SUBDIVISIONS = ((0.0, 1.0), (0.0, 0.05, 0.12, 0.22, 0.35, 0.65, 0.78, 0.88, 0.95, 1.0))
 WORTH = 1.01
+# Excess of a limit that is rounding, or the bound between two looks at a piece.
+ALLOWED = 2e-3
 
 # Where the limits are looked at within a piece: the powers of u in the first and the second
 # derivative there.
 _U = np.linspace(0.0, 1.0, 33)[:, None]
+_BETWEEN = (1.0 / 32) ** 2 / 8
 _FIRST = np.arange(1, 6) * _U ** np.arange(5)
 _SECOND = np.array([2.0, 6.0, 12.0, 20.0]) * _U ** np.arange(4)
 _THIRD = np.array([6.0, 24.0, 60.0]) * _U ** np.arange(3)
@@ -42,8 +44,8 @@ def parameterize(
     """
     Return the trajectory that follows a path with rounded corners to rest.
 
-    Stretches get the fastest profile of constant jerk phases (ruckig, Berscheid and Kroeger 2021)
-    between speeds that `kernels.speeds` finds. On straight ones, and on blends at constant speed,
+    Stretches get the fastest profile of constant jerk phases between speeds that
+    `kernels.speeds` finds. On straight ones, and on blends at constant speed,
     every piece between two points is a polynomial of at most fourth degree: the quintic that a
     controller interpolates is the curve itself.
 
@@ -134,7 +136,9 @@ def _segments(path: Path, blends: tuple[Blend, ...]) -> _Segments:
     )
 
 
-def _speeds(segments: _Segments, shares: tuple[float, ...], table: Array, v_start: float) -> _Speeds:
+def _speeds(
+    segments: _Segments, shares: tuple[float, ...], table: Array, v_start: float
+) -> _Speeds:
     """Return how fast a path may be followed where blends are cut into cells at some shares."""
     rows, places = [], []
     for row, width in enumerate(segments.widths.tolist()):
@@ -219,19 +223,25 @@ def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
     """
     Return by which factor a trajectory must be slowed to hold its limits; <= 1: it does.
 
-    Velocity, acceleration and jerk of each piece are looked at 33 times, where they are
-    polynomials of low degree.
+    Velocity, acceleration and jerk of each piece are looked at 33 times; between two of these
+    instants, h apart, a function f is no greater than there by more than h^2 / 8 max|f''|. What
+    is within a limit by this bound exceeds it nowhere by more than 0.2 %.
     """
     # Powers first: all pieces and joints in one product.
     c = piece_coefficients(trajectory).transpose(1, 0, 2)
     n, dof = c.shape[1:]
     T = np.diff(trajectory.times)[:, None]
-    v = np.abs(_FIRST @ c[1:].reshape(5, -1)).max(axis=0).reshape(n, dof) / T
-    a = np.abs(_SECOND @ c[2:].reshape(4, -1)).max(axis=0).reshape(n, dof) / T**2
-    j = np.abs(_THIRD @ c[3:].reshape(3, -1)).max(axis=0).reshape(n, dof) / T**3
-    # The last bits are rounding, no reason to slow down.
-    return max(
-        float((v / limits.velocity).max()) / (1 + 1e-6),
-        math.sqrt(float((a / limits.acceleration).max()) / (1 + 1e-4)),
-        (float((j / limits.jerk).max()) / (1 + 1e-3)) ** (1 / 3),
+    size = np.abs(c)
+    bends = (
+        6 * size[3] + 24 * size[4] + 60 * size[5],
+        24 * size[4] + 120 * size[5],
+        120 * size[5],
     )
+    ratios = []
+    for order, (powers, limit) in enumerate(
+        ((_FIRST, limits.velocity), (_SECOND, limits.acceleration), (_THIRD, limits.jerk)), start=1
+    ):
+        seen = np.abs(powers @ c[order:].reshape(6 - order, -1)).max(axis=0).reshape(n, dof)
+        excess = float(((seen + _BETWEEN * bends[order - 1]) / T**order / limit).max())
+        ratios.append((excess / (1 + ALLOWED)) ** (1 / order))
+    return max(ratios)

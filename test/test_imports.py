@@ -19,7 +19,6 @@ MODULES = {
 ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
 # What a module of the core may import beyond numpy and the standard library.
 OWN = {
-    'timing': {'ruckig'},
     'fcl_shapes': {'fcl'},
     'resources': {'yaml', 'ament_index_python'},
     'cluster': {'tqdm', 'distributed'},

@@ -57,9 +57,7 @@ def test_a_lead_in_begins_with_the_state_and_ends_straight_ahead(seed):
     assert np.array_equal(first.velocities[0], state.velocities)
     assert np.abs(first.accelerations[0] - state.accelerations).max() < 1e-12
     assert not first.accelerations[-1].any()
-    rest = parameterize(
-        Path([first.positions[-1], lead.q_stop]), (), reserved(bounds), lead.speed
-    )
+    rest = parameterize(Path([first.positions[-1], lead.q_stop]), (), reserved(bounds), lead.speed)
     whole = joined(first, rest)
     assert limit_ratio(whole, bounds) <= 1.002
     # The oracle's quintics through the points: velocity and acceleration have no jumps.

@@ -165,9 +165,7 @@ def grip_at(bends, limits, speed, cell):
     for k in range(bends.shape[1]):
         left = limits[JERK, k] - bends[2, k] * speed**3
         if bends[0, k] > 0.0:
-            grip = min(
-                grip, (limits[ACCELERATION, k] - bends[1, k] * speed * speed) / bends[0, k]
-            )
+            grip = min(grip, (limits[ACCELERATION, k] - bends[1, k] * speed * speed) / bends[0, k])
         if bends[1, k] * speed > 0.0:
             grip = min(grip, GRIP_SHARE * left / (3.0 * bends[1, k] * speed))
     straight_grip, straight_snap = math.inf, math.inf
@@ -249,9 +247,7 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
         squares[i] = slowed_square(bends, limits, cells[i, LENGTH], squares[i + 1], squares[i])
     for i in range(n):
         bound_bends(directions, turns, i, places[i], bends)
-        squares[i + 1] = slowed_square(
-            bends, limits, cells[i, LENGTH], squares[i], squares[i + 1]
-        )
+        squares[i + 1] = slowed_square(bends, limits, cells[i, LENGTH], squares[i], squares[i + 1])
         # Within a bend no faster than at its knots, where the acceleration was reckoned with.
         if bends[1].max() > 0.0:
             cells[i, TOP] = math.sqrt(max(squares[i], squares[i + 1]))
