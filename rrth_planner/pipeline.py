@@ -36,7 +36,7 @@ from rrth_planner.refusal import (
 )
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import joined, lead_in, LeadIn, MotionState, reserved
+from rrth_planner.takeover import joined, Lead, lead_in, MotionState, reserved
 from rrth_planner.timing import parameterize, TooFastError
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World
@@ -247,7 +247,7 @@ def _time_path(
     path: Path,
     limits: MotionLimits,
     margin: float,
-    lead: LeadIn | None,
+    lead: Lead | None,
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
     if lead is not None:
@@ -284,7 +284,7 @@ def first_proven(
     choices: Sequence[tuple[Blend, ...]],
     limits: MotionLimits,
     world: World,
-    lead: LeadIn | None = None,
+    lead: Lead | None = None,
 ) -> Trajectory | None:
     """
     Return the fastest trajectory along a path that is proven free, or None.
@@ -296,7 +296,7 @@ def first_proven(
         Ways to take the corners.
     limits : MotionLimits
     world : World
-    lead : LeadIn, optional
+    lead : Lead, optional
         What comes before the path, whose first edge is then followed from its speed on.
 
     """
@@ -315,7 +315,7 @@ def first_proven(
     return None
 
 
-def _straight_on(lead: LeadIn, path: Path) -> Path:
+def _straight_on(lead: Lead, path: Path) -> Path:
     """Return the path from the end of the lead-in over where the arm would stop."""
     begin = lead.trajectory.positions[-1]
     rest = path.waypoints if path.length > 0.0 else path.waypoints[:1]

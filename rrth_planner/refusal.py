@@ -13,7 +13,7 @@ from rrth_planner.certificate import certify
 from rrth_planner.goal import PointingGoal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import LeadIn
+from rrth_planner.takeover import Lead
 from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
 
@@ -59,9 +59,7 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) ->
     )
 
 
-def lead_refusal(
-    arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
-) -> Refusal | None:
+def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) -> Refusal | None:
     """Return why an arm that moves cannot go straight on until it could rest, or None."""
     fastest = np.abs(lead.trajectory.velocities) / limits.velocity
     k = int(fastest.max(axis=0).argmax())

@@ -38,7 +38,7 @@ class MotionState:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class LeadIn:
+class Lead:
     """
     From a moving state to constant velocity, and where straight on leads to rest.
 
@@ -58,7 +58,7 @@ class LeadIn:
     q_stop: Array
 
 
-def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
+def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
     """
     Return how an arm that moves gets onto a straight line.
 
@@ -89,7 +89,7 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     grip = RESERVE * float((limits.acceleration / share).min())
     snap = RESERVE * float((limits.jerk / share).min())
     length = 0.5 * speed * ramp_time(speed, grip, snap) * (1 + 1e-6)
-    return LeadIn(
+    return Lead(
         trajectory=Trajectory(
             times=times, positions=positions, velocities=velocities, accelerations=accelerations
         ),
