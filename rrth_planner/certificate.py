@@ -3,6 +3,7 @@
 """The proof that a timed curve, as a controller will run it, never touches the wearer."""
 
 from dataclasses import dataclass
+import functools
 from math import comb
 
 import numpy as np
@@ -74,19 +75,34 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
     return speed * (1 + 1e-12) + 1e-15, bend * (1 + 1e-12) + 1e-15
 
 
-def certify(trajectory: Trajectory, world: World) -> Certificate:
+def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certificate:
     """
     Return the proof that a quintic-interpolated trajectory is free of the world's boxes.
 
     Each piece is proven by the second-order certificate of `kernels.arm_validity.prove_curve`,
     from the very numbers that the trajectory holds.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    world : World
+    begin : float
+        What comes before this time is over [s].
+
     """
-    if len(trajectory.times) == 1:
-        is_free = world.is_valid(trajectory.positions[0])
+    if len(trajectory.times) == 1 or begin >= trajectory.duration:
+        is_free = world.is_valid(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
     coefficients = piece_coefficients(trajectory)
-    speed, bend = derivative_bounds(coefficients)
-    for i, curve in enumerate(coefficients):
+    speed, bend = _bounds_of(trajectory)
+    first = 0
+    if begin > 0.0:
+        first = int(np.searchsorted(trajectory.times, begin, side='right')) - 1
+    for i in range(first, len(coefficients)):
+        curve = coefficients[i]
+        if i == first and begin > 0.0:
+            width = float(trajectory.times[i + 1] - trajectory.times[i])
+            curve = shifted(curve, (begin - float(trajectory.times[i])) / width)
         proof = arm_validity.prove_curve(
             curve,
             speed[i],
@@ -99,6 +115,28 @@ def certify(trajectory: Trajectory, world: World) -> Certificate:
         if proof != 1:
             return Certificate(is_proven=False, piece=i, touches=proof == 0)
     return Certificate(is_proven=True)
+
+
+@functools.lru_cache(maxsize=8)
+def _bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return the derivative bounds of a trajectory's pieces; a running motion is asked often."""
+    return derivative_bounds(piece_coefficients(trajectory))
+
+
+def shifted(curve: Array, begin: float) -> Array:
+    """
+    Return the rest of a polynomial piece from a share of it on, over u from 0 to 1 again.
+
+    curve, (6, dof), lowest power first. The bounds of the derivatives of the whole piece hold for
+    its rest, which is shorter.
+    """
+    shift = np.array(
+        [
+            [comb(j, i) * begin ** (j - i) * (1.0 - begin) ** i if j >= i else 0.0 for j in range(6)]
+            for i in range(6)
+        ]
+    )
+    return np.ascontiguousarray(shift @ curve)
 
 
 def least_clearance(trajectory: Trajectory, world: World) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.kernels.speeds import ramp_time
-from rrth_planner.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.trajectory import MotionLimits, positions_at, sample, Trajectory
 
 # An arm that moves no faster is at rest [rad/s].
 REST_SPEED = 0.01
@@ -117,14 +117,20 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
     )
 
 
+def follows(trajectory: Trajectory, time: float, q: Array) -> bool:
+    """Return whether an arm at q is where a trajectory is at a time [s]."""
+    return bool(np.abs(positions_at(trajectory, [time])[0] - q).max() <= SAME_POSITION)
+
+
 def state_ahead(
     positions: Array, velocities: Array, running: Trajectory | None, lead: float
 ) -> MotionState:
     """
     Return the state that an arm will be in, from a reading of it.
 
-    An arm that is seen to follow a known motion, at whatever rate, goes on to follow it. Any other
-    goes on at the velocity it has: of its acceleration nothing is known.
+    An arm that is seen to follow a known motion, at whatever rate, goes on to follow it, and what
+    it is told next it follows at the same rate: the state is that of the motion. Any other goes on
+    at the velocity it has; of its acceleration nothing is known.
 
     Parameters
     ----------
@@ -136,7 +142,7 @@ def state_ahead(
         From the reading on, >= 0 [s].
 
     """
-    found = None if running is None else _phase_of(positions, velocities, running)
+    found = None if running is None else phase_of(positions, velocities, running)
     if running is None or found is None:
         return MotionState(
             positions=positions + lead * velocities,
@@ -145,10 +151,10 @@ def state_ahead(
         )
     phase, rate = found
     q, v, a = (values[0] for values in sample(running, [phase + rate * lead]))
-    return MotionState(positions=q, velocities=rate * v, accelerations=rate**2 * a)
+    return MotionState(positions=q, velocities=v, accelerations=a)
 
 
-def _phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
+def phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
     """Return the time within a motion at which the arm is, and at which rate it follows it."""
     n = max(2, int(running.duration / SEARCH_SPACING))
     times = np.linspace(0.0, running.duration, n)
