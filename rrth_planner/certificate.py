@@ -8,7 +8,7 @@ from math import comb
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.kernels import arm_validity
+from rrth_planner.kernels.pieces import prove_pieces
 from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
 from rrth_planner.world import World
 
@@ -95,48 +95,31 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
     coefficients = piece_coefficients(trajectory)
     speed, bend = _bounds_of(trajectory)
-    first = 0
+    first, share = 0, 0.0
     if begin > 0.0:
-        first = int(np.searchsorted(trajectory.times, begin, side='right')) - 1
-    for i in range(first, len(coefficients)):
-        curve = coefficients[i]
-        if i == first and begin > 0.0:
-            width = float(trajectory.times[i + 1] - trajectory.times[i])
-            curve = shifted(curve, (begin - float(trajectory.times[i])) / width)
-        proof = arm_validity.prove_curve(
-            curve,
-            speed[i],
-            bend[i],
-            0.2 * world.resolution,
-            world.chain,
-            world.robot,
-            world.obstacles,
-        )
-        if proof != 1:
-            return Certificate(is_proven=False, piece=i, touches=proof == 0)
-    return Certificate(is_proven=True)
+        times = trajectory.times
+        first = int(times.searchsorted(begin, side='right')) - 1
+        share = (begin - float(times[first])) / float(times[first + 1] - times[first])
+    found = prove_pieces(
+        coefficients,
+        speed,
+        bend,
+        first,
+        share,
+        0.2 * world.resolution,
+        world.chain,
+        world.robot,
+        world.obstacles,
+    )
+    if found < 0:
+        return Certificate(is_proven=True)
+    return Certificate(is_proven=False, piece=found // 2, touches=bool(found % 2))
 
 
 @functools.lru_cache(maxsize=8)
 def _bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
     """Return the derivative bounds of a trajectory's pieces; a running motion is asked often."""
     return derivative_bounds(piece_coefficients(trajectory))
-
-
-def shifted(curve: Array, begin: float) -> Array:
-    """
-    Return the rest of a polynomial piece from a share of it on, over u from 0 to 1 again.
-
-    curve, (6, dof), lowest power first. The bounds of the derivatives of the whole piece hold for
-    its rest, which is shorter.
-    """
-    shift = np.array(
-        [
-            [comb(j, i) * begin ** (j - i) * (1.0 - begin) ** i if j >= i else 0.0 for j in range(6)]
-            for i in range(6)
-        ]
-    )
-    return np.ascontiguousarray(shift @ curve)
 
 
 def least_clearance(trajectory: Trajectory, world: World) -> float:

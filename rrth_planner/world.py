@@ -189,13 +189,18 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
     return rows
 
 
+@functools.lru_cache(maxsize=16)
+def _mount_inverse(arm: ArmModel) -> Array:
+    return np.linalg.inv(arm.T_base_mount)
+
+
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
     """Return the numbers of each box, (15, m): rotation, the base's position, half extents."""
     m = len(scene.boxes)
     rows = np.empty((jit.BOX_ROWS, m))
     if m == 0:
         return rows
-    T_mount_base = np.linalg.inv(arm.T_base_mount)
+    T_mount_base = _mount_inverse(arm)
     rotations = np.array([box.rotation for box in scene.boxes])
     centers = np.array([box.center for box in scene.boxes])
     axes = (T_mount_base[:3, :3] @ rotations).transpose(0, 2, 1)
