@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that an arm was told to follow: how far it is, what is left, and what is proven of it."""
+"""A motion that an arm was told to follow: how far it is, and what is proven of the rest."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,0 +1,219 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""While the arm moves the wearer may move too: each new body is held against what is left."""
+
+from collections.abc import Callable
+from enum import Enum
+from threading import RLock
+import time
+import traceback
+
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rrth_planner.braking import brake
+from rrth_planner.certificate import least_clearance
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.inputs import Inputs, RequestError
+from rrth_planner.ros.messages import scene_of
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.publishers import PlanPublishers
+from rrth_planner.ros.reporter import Reporter
+from rrth_planner.running import box_speeds, is_still_free, RunningMotion
+from rrth_planner.scene import Scene
+from rrth_planner.world import arm_world
+
+# How often the age of the body is looked at [s].
+PERIOD = 0.02
+# An arm that is that long after the end of its motion is taken to have arrived [s].
+GRACE = 0.5
+
+
+class Watch(Enum):
+    """What the guard is doing."""
+
+    IDLE = 'no motion'
+    WATCHING = 'watches the motion'
+    BRAKING = 'brakes'
+    HOLDING = 'holds'
+
+
+class Guard:
+    """
+    Stops the arm when what is left of its motion is no longer proven free of the wearer.
+
+    Parameters
+    ----------
+    node : Node
+    heard : Inputs
+    reporter : Reporter
+    publishers : PlanPublishers
+    lock : RLock
+        Held while a motion is published.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        heard: Inputs,
+        reporter: Reporter,
+        publishers: PlanPublishers,
+        lock: RLock,
+    ) -> None:
+        """Begin with no motion."""
+        self._node, self._heard, self._reporter = node, heard, reporter
+        self._publishers, self._lock = publishers, lock
+        self.running: RunningMotion | None = None
+        self._goal: PointingGoal | None = None
+        self._state = Watch.IDLE
+        # Motions that were planned before a brake are of no use after it.
+        self.n_brakes = 0
+        self._before: tuple[Scene, float] | None = None
+        # Plans again for a goal, once the arm rests; set by the owner.
+        self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
+
+    def begin(self, running: RunningMotion, goal: PointingGoal) -> None:
+        """Watch a motion from now on; the lock is held."""
+        self.running, self._goal = running, goal
+        self._say(Watch.WATCHING, '')
+        # The body may have changed since the motion was last looked at.
+        self.on_body()
+
+    def on_body(self) -> None:
+        """Hold the body as it is now against what is left of the motion."""
+        begin = time.perf_counter()
+        with self._lock:
+            now, parameters = self._now(), self._reporter.parameters
+            scene = scene_of(self._heard.body.value.at(now))
+            speeds = None
+            if parameters.max_body_speed > 0.0 and self._before is not None:
+                before, then = self._before
+                speeds = box_speeds(before, scene, now - then, parameters.max_body_speed)
+            self._before = (scene, now)
+            phase = self._phase(now)
+            if phase is None or self._state is not Watch.WATCHING:
+                return
+            assert self.running is not None
+            if not scene.boxes:
+                self._stop(phase, now, scene, 'the body is empty', begin)
+            elif not is_still_free(
+                self.running,
+                phase,
+                parameters.arm,
+                scene,
+                margin=parameters.margin,
+                ray_guard_length=parameters.ray_guard_length,
+                speeds=speeds,
+            ):
+                self._stop(phase, now, scene, 'the wearer moved into the way', begin)
+            else:
+                self._reporter.recertified(time.perf_counter() - begin)
+
+    def _on_timer(self) -> None:
+        """Stop an arm whose wearer is not seen any more."""
+        timeout = self._reporter.parameters.body_timeout
+        if self._state is Watch.IDLE or (timeout == 0.0 and self._state is not Watch.BRAKING):
+            return
+        with self._lock:
+            now = self._now()
+            age, phase = self._heard.body.age(now), self._phase(now)
+            if phase is None or self._state is not Watch.WATCHING or not 0.0 < timeout < age:
+                return
+            scene = scene_of(self._heard.body.value.at(now))
+            why = f'the body is {age:.3f} s old, expected at most {timeout:g} s (body_timeout)'
+            self._stop(phase, now, scene, why, time.perf_counter())
+
+    def _phase(self, now: float) -> float | None:
+        """Return the time within the running motion; None where there is none any more."""
+        running, reading = self.running, self._heard.joints.value
+        if running is None or reading is None:
+            return None
+        late = now - running.start_time - running.trajectory.duration
+        if late > GRACE and not self._is_moving():
+            self.running = None
+            if self._state is not Watch.HOLDING:
+                self._say(Watch.IDLE, '')
+            return None
+        return running.phase(reading.positions, reading.velocities, reading.taken, now)
+
+    def _is_moving(self) -> bool:
+        reading = self._heard.joints.value
+        return bool(reading is not None and abs(reading.velocities).max() > 0.0)
+
+    def _stop(self, phase: float, now: float, scene: Scene, why: str, begin: float) -> None:
+        """Publish the braking trajectory from where the arm is; the lock is held."""
+        running, parameters, goal = self.running, self._reporter.parameters, self._goal
+        assert running is not None
+        if phase >= running.trajectory.duration:
+            return
+        stopped = RunningMotion(
+            trajectory=brake(running.trajectory, max(phase, 0.0), parameters.limits),
+            start_time=now,
+        )
+        warning = ''
+        if len(scene.boxes) and not self._is_free(stopped, parameters, scene):
+            # Whatever it does now may touch: what keeps further away is less bad.
+            world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
+            ahead = least_clearance(running.trajectory, world, phase)
+            braked = least_clearance(stopped.trajectory, world)
+            warning = f'; braking is not proven safe either, least clearance {braked:.4f} m'
+            if ahead > braked:
+                warning += f', going on keeps {ahead:.4f} m and is less bad: the arm goes on'
+                self._warn_once(f'{why}{warning}')
+                self._say(Watch.WATCHING, f'{why}{warning}')
+                return
+        self._publishers.publish_motion(stopped.trajectory, parameters, now)
+        took = time.perf_counter() - begin
+        self.running, self.n_brakes = stopped, self.n_brakes + 1
+        sentence = f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
+        self._say(Watch.BRAKING, sentence)
+        self._reporter.braked(took)
+        log = self._node.get_logger()
+        (log.error if warning else log.warning)(sentence)
+        if parameters.replan and goal is not None:
+            self.plan_again(goal, stopped.trajectory.duration)
+        else:
+            self._say(Watch.HOLDING, sentence)
+
+    def _is_free(self, motion: RunningMotion, parameters: PlannerParameters, scene: Scene) -> bool:
+        return is_still_free(
+            motion,
+            0.0,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        )
+
+    def hold(self, why: str) -> None:
+        """Stay where the arm came to rest, since it cannot go on."""
+        with self._lock:
+            sentence = f'the arm holds where it is: {why}'
+            self._say(Watch.HOLDING, sentence)
+            self._node.get_logger().warning(sentence)
+
+    def _warn_once(self, sentence: str) -> None:
+        if self._reporter.guard[1] != sentence:
+            self._node.get_logger().error(sentence)
+
+    def _say(self, state: Watch, sentence: str) -> None:
+        self._state = state
+        self._reporter.guard = (state.value, sentence)
+        self._reporter.publish_soon()
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9
+
+
+def require_same(n_brakes: int, guard: Guard) -> None:
+    """Raise RequestError where the arm was stopped since a plan began."""
+    if guard.n_brakes != n_brakes:
+        from rrth_planner.ros.error_codes import ErrorCode
+
+        raise RequestError(
+            ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+            'the arm was stopped for the wearer while its motion was planned',
+        )
