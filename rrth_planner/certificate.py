@@ -3,10 +3,10 @@
 """The proof that a timed curve, as a controller will run it, never touches the wearer."""
 
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 from rrth_planner.arrays import Array
+from rrth_planner.bernstein import to_bernstein
 from rrth_planner.kernels import arm_validity
 from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
 from rrth_planner.world import World
@@ -35,17 +35,7 @@ class Certificate:
     touches: bool = False
 
 
-def _to_bernstein(degree: int) -> Array:
-    """Return the matrix from powers to Bernstein coefficients, (degree + 1, degree + 1)."""
-    return np.array(
-        [
-            [comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in range(degree + 1)]
-            for j in range(degree + 1)
-        ]
-    )
-
-
-_BERNSTEIN_4, _BERNSTEIN_3 = _to_bernstein(4), _to_bernstein(3)
+_BERNSTEIN_4, _BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
 
 
 def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
