@@ -4,10 +4,10 @@
 
 from dataclasses import dataclass
 import functools
-from math import comb
 
 import numpy as np
 from rrth_planner.arrays import Array
+from rrth_planner.bernstein import to_bernstein
 from rrth_planner.kernels.pieces import prove_pieces
 from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
 from rrth_planner.world import World
@@ -36,17 +36,7 @@ class Certificate:
     touches: bool = False
 
 
-def _to_bernstein(degree: int) -> Array:
-    """Return the matrix from powers to Bernstein coefficients, (degree + 1, degree + 1)."""
-    return np.array(
-        [
-            [comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in range(degree + 1)]
-            for j in range(degree + 1)
-        ]
-    )
-
-
-_BERNSTEIN_4, _BERNSTEIN_3 = _to_bernstein(4), _to_bernstein(3)
+_BERNSTEIN_4, _BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
 
 
 def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
@@ -122,7 +112,8 @@ def _bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
     return derivative_bounds(piece_coefficients(trajectory))
 
 
-def least_clearance(trajectory: Trajectory, world: World) -> float:
-    """Return the least distance from the world's boxes, looked at every 10 ms [m]."""
-    times = np.append(np.arange(0.0, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
+def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) -> float:
+    """Return the least distance from the world's boxes from a time on, every 10 ms [m]."""
+    begin = min(begin, trajectory.duration)
+    times = np.append(np.arange(begin, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
     return float(world.clearances(positions_at(trajectory, times)).min(initial=np.inf))

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the planner is doing, as diagnostics."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -48,6 +50,22 @@ class PlanReport:
     clearance: float = float('nan')
 
 
+class Figures:
+    """How often something was done, and how long it took the last time and at most [s]."""
+
+    def __init__(self) -> None:
+        """Begin with nothing done."""
+        self.n, self.last, self.most = 0, 0.0, 0.0
+
+    def add(self, elapsed: float) -> None:
+        """Count once more."""
+        self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
+
+    def __str__(self) -> str:
+        """Return the figures in a line."""
+        return f'{self.n}, last {self.last * 1e3:.3f} ms, at most {self.most * 1e3:.3f} ms'
+
+
 def diagnostics_msg(
     node_name: str,
     stamp: Any,
@@ -55,6 +73,8 @@ def diagnostics_msg(
     heard: Inputs,
     parameters: PlannerParameters,
     report: PlanReport,
+    guard: tuple[str, str] = ('', ''),
+    figures: Mapping[str, Figures] = MappingProxyType({}),
 ) -> DiagnosticArray:
     """
     Return the diagnostics of the planner.
@@ -71,6 +91,10 @@ def diagnostics_msg(
     parameters : PlannerParameters
         For the timeouts.
     report : PlanReport
+    guard : tuple of str
+        What the guard of the running motion does, and why.
+    figures : mapping
+        Of what it did, by name.
 
     """
     body = heard.body.value.at(now)
@@ -89,6 +113,8 @@ def diagnostics_msg(
         'boxes': str(body.n_boxes),
         'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
     }
+    values['guard'], values['last stop'] = guard
+    values.update({name: str(figure) for name, figure in figures.items()})
     for name, topic in heard.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
         values[f'refused messages, {name}'] = str(topic.n_refused)

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from enum import Enum
 from threading import RLock
 import time
-import traceback
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.braking import brake
 from rrth_planner.certificate import least_clearance
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.inputs import Inputs, RequestError
+from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
@@ -168,7 +167,9 @@ class Guard:
         self._publishers.publish_motion(stopped.trajectory, parameters, now)
         took = time.perf_counter() - begin
         self.running, self.n_brakes = stopped, self.n_brakes + 1
-        sentence = f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
+        sentence = (
+            f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
+        )
         self._say(Watch.BRAKING, sentence)
         self._reporter.braked(took)
         log = self._node.get_logger()
@@ -206,14 +207,3 @@ class Guard:
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9
-
-
-def require_same(n_brakes: int, guard: Guard) -> None:
-    """Raise RequestError where the arm was stopped since a plan began."""
-    if guard.n_brakes != n_brakes:
-        from rrth_planner.ros.error_codes import ErrorCode
-
-        raise RequestError(
-            ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-            'the arm was stopped for the wearer while its motion was planned',
-        )

@@ -55,6 +55,8 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
+        # Called after each good body; set once there is somebody to tell.
+        self.on_body: Callable[[], None] = lambda: None
         self._history = BodyHistory()
         self._subscriptions = [
             OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body, self._on_body),
@@ -75,7 +77,8 @@ class Listener:
             edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
             return self._history.apply(body.value, edits, sent, now)
 
-        self._take(body, read, now)
+        if self._take(body, read, now):
+            self.on_body()
 
     def _on_target(self, msg: PointStamped, _: int) -> None:
         if not msg.header.frame_id:
@@ -91,13 +94,14 @@ class Listener:
         if set(self._joint_names) <= set(msg.name):
             self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
 
-    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> None:
+    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> bool:
         was_good = heard.received is not None and not heard.is_last_refused
         is_good = heard.accept(read, now)
         if not is_good:
             self._warn(heard)
         if is_good != was_good:
             self._on_change()
+        return is_good
 
     def _warn(self, heard: Input[Any]) -> None:
         present = time.monotonic()

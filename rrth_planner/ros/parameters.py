@@ -58,6 +58,15 @@ def settings(dof: int) -> tuple[Setting, ...]:
         ),
         Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
         Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting(
+            'max_body_speed',
+            0.0,
+            0.0,
+            10.0,
+            'm/s',
+            'up to which boxes seen to move are foreseen to go on, while the arm moves',
+        ),
+        Setting('replan', True, None, None, '-', 'plan again after a stop for the wearer'),
         Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
         *(
             Setting(
@@ -88,6 +97,9 @@ class PlannerParameters:
         [m].
     body_timeout, joint_timeout : float
         [s]; 0: never.
+    max_body_speed : float
+        [m/s].
+    replan : bool
     limits : MotionLimits
     options : TreeOptions
         Their class is the algorithm.
@@ -101,6 +113,8 @@ class PlannerParameters:
     ray_guard_length: float
     body_timeout: float
     joint_timeout: float
+    max_body_speed: float
+    replan: bool
     limits: MotionLimits
     options: TreeOptions
 
@@ -131,6 +145,8 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         ray_guard_length=values['ray_guard_length'],
         body_timeout=values['body_timeout'],
         joint_timeout=values['joint_timeout'],
+        max_body_speed=values['max_body_speed'],
+        replan=values['replan'],
         limits=MotionLimits(
             velocity=_of_each_joint('max_velocity', values, arm.dof),
             acceleration=_of_each_joint('max_acceleration', values, arm.dof),

@@ -5,22 +5,25 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from threading import Lock
+from threading import RLock
 import time
 import traceback
 from typing import Any
 
 from nav_msgs.msg import Path
+import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
+from rrth_planner.ros.guard import Guard
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.running import RunningMotion
+from rrth_planner.takeover import REST_SPEED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +47,10 @@ class Response:
     text: str
     tool_path: Callable[[], Path]
     conclude: Callable[[], None]
+
+
+# So much longer than its brake an arm may need to come to rest [s].
+LONGEST_SETTLING = 1.0
 
 
 class _Ticket:
@@ -80,11 +87,11 @@ class PlanQueue:
         self._publishers = PlanPublishers(node)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         # Held while a motion is published, so that what was cancelled before never is.
-        self._lock = Lock()
+        self._lock = RLock()
+        self.guard = Guard(node, heard, reporter, self._publishers, self._lock)
+        self.guard.plan_again = self._plan_again
         self._open: set[_Ticket] = set()
         self._is_closed = False
-        # What the arm was last told to follow.
-        self._running: Trajectory | None = None
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
@@ -147,6 +154,7 @@ class PlanQueue:
         """Plan and publish; called in the worker's thread."""
         figures, shown = PlanReport(), None
         parameters = self._reporter.parameters
+        n_brakes, running = self.guard.n_brakes, self.guard.running
         try:
             outcome = self._plan_request(
                 self._heard,
@@ -154,14 +162,15 @@ class PlanQueue:
                 self._now,
                 lambda: ticket.is_cancelled,
                 goal,
-                self._running,
+                None if running is None else running.trajectory,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if self._settle(ticket, outcome, parameters):
+            refusal = self._settle(ticket, outcome, parameters, n_brakes)
+            if refusal is not None:
                 if code is not ErrorCode.PREEMPTED:
-                    code, sentence = ErrorCode.PREEMPTED, 'the request was cancelled'
+                    code, sentence = refusal
             elif outcome.trajectory is not None:
                 shown = outcome
                 figures = replace(
@@ -189,17 +198,58 @@ class PlanQueue:
         is_solved = code is ErrorCode.SUCCESS and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
-    def _settle(self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters) -> bool:
-        """Return whether a request was cancelled; publish its motion, if it has one, if not."""
+    def _settle(
+        self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters, n_brakes: int
+    ) -> tuple[ErrorCode, str] | None:
+        """Publish a request's motion, if it has one, or return why not."""
         with self._lock:
             if ticket.is_cancelled or self._is_closed:
-                return True
-            if outcome.trajectory is not None:
-                begin = 0.0 if outcome.start is None else outcome.start.time
-                self._publishers.publish_motion(outcome.trajectory, parameters, begin)
-                self._running = outcome.trajectory
+                return ErrorCode.PREEMPTED, 'the request was cancelled'
             self._open.discard(ticket)
-            return False
+            if outcome.trajectory is None:
+                return None
+            if n_brakes != self.guard.n_brakes:
+                return (
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    'the arm was stopped for the wearer while its motion was planned',
+                )
+            begin = 0.0 if outcome.start is None else outcome.start.time
+            self._publishers.publish_motion(outcome.trajectory, parameters, begin)
+            self.guard.begin(
+                RunningMotion(
+                    trajectory=outcome.trajectory,
+                    start_time=begin or self._now(),
+                    reach=outcome.plan.reach,
+                ),
+                outcome.inputs.goal,
+            )
+            return None
+
+    def _plan_again(self, goal: PointingGoal, wait: float) -> None:
+        """Plan for a goal once more as soon as the arm, which brakes, rests."""
+        ticket = _Ticket()
+
+        def work() -> None:
+            self._wait_for_rest(ticket, wait)
+            response = self._work(goal, time.perf_counter(), ticket)
+            response.conclude()
+            if not response.is_solved and not ticket.is_cancelled:
+                self.guard.hold(response.text)
+
+        with self._lock:
+            self._open.add(ticket)
+        self.prepare(work)
+
+    def _wait_for_rest(self, ticket: _Ticket, wait: float) -> None:
+        """Return when the arm has come to rest, or the time for it is over [s]."""
+        end = time.monotonic() + wait + LONGEST_SETTLING
+        begin = self._now()
+        while time.monotonic() < end and not ticket.is_cancelled:
+            reading = self._heard.joints.value
+            is_new = reading is not None and reading.received >= begin + wait
+            if is_new and (np.abs(reading.velocities) <= REST_SPEED).all():
+                return
+            time.sleep(0.005)
 
     def _tool_path(self, outcome: Any, parameters: PlannerParameters) -> Path:
         """Return the tool's path; a failure of this does not unsay the motion."""

@@ -59,6 +59,7 @@ class PlannerNode(Node):
         self._reporter = Reporter(self, heard, parameters)
         self._listener = Listener(self, parameters, heard, self._reporter.publish)
         self._queue = PlanQueue(self, heard, self._reporter, self._load_planner())
+        self._listener.on_body = self._queue.guard.on_body
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node `arm_playback`: an arm that moves exactly as it is told, for trials without one."""
 
+from array import array
+import gc
 import sys
 from typing import Any
 
@@ -12,10 +14,11 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
 from rrth_planner.acceptance import accept
 from rrth_planner.arm import tool_pose
 from rrth_planner.errors import RrthError
-from rrth_planner.playback import standing, stop
+from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages import joint_trajectory_from_msg, pose_to_msg
 from rrth_planner.ros.playback_parameters import (
@@ -26,6 +29,9 @@ from rrth_planner.ros.playback_parameters import (
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
+
+# Two clocks are read as one when that takes no longer [ns]; else again, so many times.
+AT_ONCE, READINGS = 20_000, 5
 
 
 class PlaybackNode(Node):
@@ -41,7 +47,11 @@ class PlaybackNode(Node):
         is_simulated = self.get_parameter('use_sim_time').value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._motion_clock: Clock = self.get_clock() if is_simulated else steady
-        self._latest = self._now()
+        self._latest, _ = self._now()
+        self._state = JointState(name=list(self._arm.joint_names))
+        self._pose = PoseStamped()
+        # Since when the messages above say where the arm stands for good [s].
+        self._told_rest = float('inf')
         reliable = QoSProfile(
             depth=1,
             reliability=ReliabilityPolicy.RELIABLE,
@@ -58,43 +68,60 @@ class PlaybackNode(Node):
             1.0 / self.get_parameter('rate').value, self._publish, clock=self._motion_clock
         )
 
-    def _now(self) -> float:
-        """Return the time on the clock of the motion [s]."""
-        return float(self._motion_clock.now().nanoseconds / NANOSECONDS)
+    def _now(self) -> tuple[float, int]:
+        """Return the present on the clock of the motion [s], and on the node's clock [ns]."""
+        clock = self.get_clock()
+        if self._motion_clock is clock:
+            now = clock.now().nanoseconds
+            return now / NANOSECONDS, now
+        for _ in range(READINGS):
+            before = self._motion_clock.now().nanoseconds
+            now = clock.now().nanoseconds
+            after = self._motion_clock.now().nanoseconds
+            if after - before <= AT_ONCE:
+                break
+        return 0.5 * (before + after) / NANOSECONDS, now
 
-    def _advance(self) -> float:
-        """Return the time now [s]; a simulated clock that was set back leaves the arm in place."""
-        now = self._now()
+    def _advance(self) -> tuple[float, int]:
+        """Return `_now`; a simulated clock that was set back leaves the arm in place."""
+        now, stamp = self._now()
         if now < self._latest:
-            self._playback = standing(self._playback.state_at(self._latest)[0])
+            self._follow(standing(self._playback.state_at(self._latest)[0]))
         self._latest = now
-        return now
+        return now, stamp
+
+    def _follow(self, playback: Playback) -> None:
+        self._playback, self._told_rest = playback, float('inf')
 
     def _publish(self) -> None:
-        q, v, _ = self._playback.state_at(self._advance())
-        stamp = self.get_clock().now().to_msg()
-        state = JointState(
-            name=list(self._arm.joint_names), position=q.tolist(), velocity=v.tolist()
-        )
-        state.header.stamp = stamp
-        self._joint_states.publish(state)
-        pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
-        pose.header.stamp = stamp
-        self._tool_pose.publish(pose)
+        """Say where the arm is at the very time that the messages are stamped with."""
+        time, nanoseconds = self._advance()
+        # While it stands still only the stamps change.
+        if not time >= self._told_rest:
+            q, v, _ = self._playback.state_at(time)
+            self._state.position, self._state.velocity = array('d', q), array('d', v)
+            self._pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
+            self._told_rest = time if time >= self._playback.end_time else float('inf')
+        stamp = Time(nanoseconds=nanoseconds).to_msg()
+        self._state.header.stamp = self._pose.header.stamp = stamp
+        self._joint_states.publish(self._state)
+        self._tool_pose.publish(self._pose)
 
     def _on_trajectory(self, msg: JointTrajectory) -> None:
-        time = self._advance()
-        ros_time = self.get_clock().now().nanoseconds / NANOSECONDS
+        time, nanoseconds = self._advance()
+        ros_time = nanoseconds / NANOSECONDS
         stamp = seconds_of(msg.header.stamp)
         try:
             trajectory = joint_trajectory_from_msg(msg, self._arm.joint_names, ros_time)
-            self._playback = accept(
-                self._playback,
-                trajectory,
-                self._arm,
-                playback_rules(self, self._arm),
-                start_time=time if stamp == 0.0 else time + stamp - ros_time,
-                time=time,
+            self._follow(
+                accept(
+                    self._playback,
+                    trajectory,
+                    self._arm,
+                    playback_rules(self, self._arm),
+                    start_time=time if stamp == 0.0 else time + stamp - ros_time,
+                    time=time,
+                )
             )
         except RrthError as problem:
             stays = 'keeps to its motion' if time < self._playback.end_time else 'stays'
@@ -106,10 +133,8 @@ class PlaybackNode(Node):
         )
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        time = self._advance()
-        self._playback = stop(
-            self._playback, playback_rules(self, self._arm).max_acceleration, time
-        )
+        time, _ = self._advance()
+        self._follow(stop(self._playback, playback_rules(self, self._arm).limits, time))
         left = self._playback.end_time - time
         response.success = True
         response.message = (
@@ -127,6 +152,9 @@ def main(args: list[str] | None = None) -> int:
     try:
         rclpy.init(args=args)
         node = PlaybackNode()
+        # What lives as long as the node need not be looked at by the collector in mid-motion.
+        gc.collect()
+        gc.freeze()
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -9,7 +9,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport
+from rrth_planner.ros.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
@@ -38,6 +38,9 @@ class Reporter:
         self.report = PlanReport()
         self._node, self._heard = node, heard
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        # What the guard of the running motion does, and why.
+        self.guard = ('no motion', '')
+        self._recertified, self._braked = Figures(), Figures()
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -48,6 +51,18 @@ class Reporter:
             node.create_timer(PERIOD, self._publish, clock=steady),
             node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
         ]
+
+    def recertified(self, elapsed: float) -> None:
+        """Count that a running motion was held against a new body, and how long it took [s]."""
+        self._recertified.add(elapsed)
+
+    def braked(self, elapsed: float) -> None:
+        """Count a brake, and how long after the body's arrival it was published [s]."""
+        self._braked.add(elapsed)
+
+    def publish_soon(self) -> None:
+        """Publish the diagnostics within a tenth of a second."""
+        self._is_changed = True
 
     def publish(self) -> None:
         """Publish the diagnostics of now, or, when the last are too recent, soon."""
@@ -73,6 +88,8 @@ class Reporter:
                     self._heard,
                     self.parameters,
                     self.report,
+                    self.guard,
+                    {'motions held against a new body': self._recertified, 'brakes': self._braked},
                 )
             )
 
