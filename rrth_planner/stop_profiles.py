@@ -28,8 +28,8 @@ JERKS = np.array([0.97, 0.8, 0.6, 0.4, 0.2, 0.1])
 # Instants that the motion is looked at; steps of each phase of a profile, and of those stops that
 # are only compared.
 GRID, STEPS, FEW_STEPS = 512, 16, 8
-# How many stops become profiles.
-CHOSEN = 6
+# How many stops become profiles, and how many of one delay.
+CHOSEN, ALIKE = 10, 3
 # How often a profile is fitted to where it meets the points of the motion, at most, and how
 # closely [s].
 FITS, FIT = 6, 1e-10
@@ -116,16 +116,25 @@ def soonest_profiles(ahead: Outlook, limits: MotionLimits, latest: float) -> Ite
     stops = _candidates(ahead, limits)
     is_real = (stops.ends < latest) & np.isfinite(stops.ways).all(axis=1)
     # Those that do not reach their deceleration are the same for all of these.
-    kind = np.stack([stops.delays, stops.bends[:, 2], stops.durations[:, 2]], axis=1)
+    kind = np.stack([stops.delays, stops.ends, stops.durations[:, 2]], axis=1).round(9)
     unlike = np.unique(kind[is_real], axis=0, return_index=True)[1]
     stops = stops.chosen(np.flatnonzero(is_real)[unlike])
     stops = stops.chosen(np.flatnonzero(_seem_to_hold(stops, ahead)))
-    for i in np.argsort(stops.ends, kind='stable')[:CHOSEN]:
+    for i in _soonest(stops):
         # A number out of the range of all numbers is no profile either.
         with suppress(RrthError):
             profile = _profile(stops.chosen(np.array([i])), ahead)
             if profile.is_forward and profile.ways[-1] <= ahead.times[-1]:
                 yield profile
+
+
+def _soonest(stops: LineStops) -> list[int]:
+    """Return the soonest stops, a few of each delay: what fails one will fail the next."""
+    chosen: list[int] = []
+    for i in np.argsort(stops.ends, kind='stable').tolist():
+        if (stops.delays[chosen] == stops.delays[i]).sum() < ALIKE:
+            chosen.append(i)
+    return chosen[:CHOSEN]
 
 
 def _candidates(ahead: Outlook, limits: MotionLimits) -> LineStops:
@@ -178,17 +187,29 @@ def _profile(stop: LineStops, ahead: Outlook) -> RateProfile:
     # Just after the start a motion is so slow that bends are great, and fall fast.
     phases = stop.at(np.stack([shares**2, shares, shares]))[0].ravel()
     knots = ahead.running.knots
-    inner, profile = np.empty(0), None
+    used, profile = np.empty(0), None
     # Where pieces of the motion meet its jerk may jump, so the bend has to; but when the arm gets
     # there depends on the bends.
     for _ in range(FITS):
-        times = np.unique(np.concatenate([[0.0], phases, inner, stop.ends]))
+        times = np.unique(np.concatenate([[0.0], phases, used, stop.ends]))
         times = times[np.append(np.diff(times) > 0.1 * FIT, True)]
-        profile = RateProfile(times=times, bends=_bends(stop, times, ahead, profile))
-        before, inner = inner, profile.times_of(knots)
-        inner = inner[inner > stop.delays[0]]
-        if len(inner) == len(before) and np.abs(inner - before).max(initial=0.0) < FIT:
-            break
+        bends = _bends(stop, times, ahead, profile)
+        for _ in range(FITS):
+            profile = RateProfile(times=times, bends=_to_rest(times, bends, stop.delays[0]))
+            found = profile.times_of(knots)
+            found = found[found > stop.delays[0]]
+            if len(found) != len(used):
+                break
+            if np.abs(found - used).max(initial=0.0) < FIT:
+                return profile
+            # The same bends, their jumps where they belong.
+            moved = times.copy()
+            moved[np.searchsorted(times, used)] = found
+            used = found
+            if not (np.diff(moved) > 0.0).all():
+                break
+            times = moved
+        used = found
     assert profile is not None
     return profile
 
@@ -197,20 +218,23 @@ def _bends(stop: LineStops, times: Array, ahead: Outlook, guess: RateProfile | N
     """Return the bends at both ends of intervals that follow a stop on a line, (n, 2)."""
     middle = 0.5 * (times[1:] + times[:-1])
     instants = np.stack([times[:-1], middle, times[1:]])
-    way, *speeds = stop.during(instants, middle)
+    way, speed, slope, bend = stop.during(instants, middle)
     # Where the profile really gets, once there is one: its bends have to fit the motion there.
     reached = ahead.times_at(way) if guess is None else guess.at(instants)[0]
     states = derivatives_around(ahead.running, reached)
-    bends = _rate(states, *speeds, ahead.weights)[2][[0, 2]].T
-    begin = stop.delays[0]
-    is_before = middle < begin
-    bends[is_before] = 0.0
-    # What is missing to a rate and a slope of 0 at the end, as a line; twice, for rounding.
+    bends = _rate(states, speed, slope, bend, ahead.weights)[2][[0, 2]].T
+    return np.where(middle[:, None] < stop.delays[0], 0.0, bends)
+
+
+def _to_rest(times: Array, bends: Array, begin: float) -> Array:
+    """Return bends, (n, 2), and what they lack to a rate and a slope of 0 at the end, a line."""
     T = times[-1] - begin
     share = (np.stack([times[:-1], times[1:]], axis=1) - begin) / T
+    is_before = (times[1:] <= begin)[:, None]
+    # Twice, for rounding.
     for _ in range(2):
         slopes, rates, _ = integrated(times, bends)
         by_time = (12.0 * rates[-1] - 6.0 * slopes[-1] * T) / T**2
         line = -slopes[-1] / T + by_time * (share - 0.5)
-        bends += np.where(is_before[:, None], 0.0, line)
-    return np.asarray(bends)
+        bends = np.where(is_before, 0.0, bends + line)
+    return bends
