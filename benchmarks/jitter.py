@@ -170,7 +170,7 @@ def _steadiness(times: Array, rate: float) -> dict[str, float]:
 
 
 def _swings(q: Array, seconds: float) -> Trajectory:
-    """Return a motion of the first joint to and fro, for so long at least [s]."""
+    """Return a motion of the first joint back and forth, for so long at least [s]."""
     n = int(np.ceil(seconds / SWING)) + 2
     positions = np.tile(q, (n, 1))
     positions[1::2, 0] += REACH
