@@ -96,9 +96,11 @@ def measure(rate: float, seconds: float) -> dict[str, dict[str, dict[str, float]
         By `idle` and `moving`, then `published` (by the stamps) and `received` (by a subscriber in
         another process): `p50`, `p99` and `max` of |interval - period| [ms], `missed` periods and
         `intervals`; of `moving` also `positions`: how far the time that a position was taken at is
-        from its stamp, `p99` and `max` [ms].
+        from its stamp, `p99` and `max` [ms]. By `no arm`, `bare loop`: the same of a loop that
+        only waits, than which no program on this machine is steadier.
 
     """
+    bare = _steadiness(_bare_loop(rate, seconds), rate)
     arguments = ['--ros-args', '-p', f'rate:={float(rate)}']
     with _watcher() as watcher, ChildProcess(NODE, arguments, lambda _: None) as child:
         watcher.wait_for_states(child)
@@ -112,6 +114,7 @@ def measure(rate: float, seconds: float) -> dict[str, dict[str, dict[str, float]
     if not np.ptp(moving[:, 2]) > 0.5 * REACH:
         raise RrthError(f'playback node: moved {np.ptp(moving[:, 2]):.3g}, expected {REACH} [rad]')
     return {
+        'no arm': {'bare loop': bare},
         'idle': _figures(idle, rate),
         'moving': {**_figures(moving, rate), 'positions': _time_errors(moving, swings)},
     }
@@ -138,6 +141,16 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
+def _bare_loop(rate: float, seconds: float) -> Array:
+    """Return when a loop that does nothing woke up for each period [s]."""
+    begin = time.monotonic()
+    times = []
+    for k in range(1, int(seconds * rate) + 1):
+        time.sleep(max(0.0, begin + k / rate - time.monotonic()))
+        times.append(time.monotonic())
+    return np.array(times)
+
+
 def _figures(rows: Array, rate: float) -> dict[str, dict[str, float]]:
     return {by: _steadiness(rows[:, k], rate) for k, by in ((1, 'published'), (0, 'received'))}
 
@@ -157,7 +170,7 @@ def _steadiness(times: Array, rate: float) -> dict[str, float]:
 
 
 def _swings(q: Array, seconds: float) -> Trajectory:
-    """Return a motion of the first joint to and fro, for so long at least [s]."""
+    """Return a motion of the first joint back and forth, for so long at least [s]."""
     n = int(np.ceil(seconds / SWING)) + 2
     positions = np.tile(q, (n, 1))
     positions[1::2, 0] += REACH

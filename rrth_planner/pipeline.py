@@ -36,7 +36,7 @@ from rrth_planner.refusal import (
 )
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import joined, Lead, lead_in, MotionState, reserved
+from rrth_planner.takeover import joined, Lead, lead_in, reserved, stop_first, Takeover
 from rrth_planner.timing import parameterize, TooFastError
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World
@@ -101,7 +101,7 @@ def plan_motion(
     ray_guard_length: float,
     seed: int,
     should_stop: Callable[[], bool] = lambda: False,
-    moving: MotionState | None = None,
+    moving: Takeover | None = None,
 ) -> MotionPlan:
     """
     Return a certified motion that ends with the tool pointing at the goal.
@@ -126,20 +126,24 @@ def plan_motion(
         >= 0.
     should_stop : callable
         Polled while planning; True cancels.
-    moving : MotionState, optional
+    moving : Takeover, optional
         How the arm moves at q_start; without, it is at rest. The motion then begins with this
-        state: the arm goes on straight ahead, no further than it needs to stop, and turns off.
+        state: the arm goes on straight ahead, no further than it needs to stop, and turns off; or,
+        where there is no room for that, it stops along its present motion first.
 
     """
     begin = time.perf_counter()
     world = _world_of(arm, scene, margin, ray_guard_length)
-    lead = None if moving is None else lead_in(moving, limits)
-    q_from = q_start if lead is None else lead.q_stop
-    refusal = (
-        start_refusal(arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1])
-        or target_refusal(scene, goal, margin)
-        or (None if lead is None else lead_refusal(arm, world, lead, limits))
-    )
+    refusal = start_refusal(
+        arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
+    ) or target_refusal(scene, goal, margin)
+    lead, q_from = None, q_start
+    if refusal is None and moving is not None:
+        led = _lead(arm, world, moving, limits)
+        if isinstance(led, Refusal):
+            refusal = led
+        else:
+            lead, q_from = led, led.q_stop
     if refusal is None:
         found = _find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
         if isinstance(found, PlanResult) and found.path is not None:
@@ -189,6 +193,18 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
         seed=0,
     )
     jit.mark_compiled()
+
+
+def _lead(arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits) -> Lead | Refusal:
+    """Return what an arm in motion does first, straight on or along its present motion."""
+    straight = lead_in(moving.state, limits)
+    refusal = lead_refusal(arm, world, straight, limits)
+    if refusal is None:
+        return straight
+    stop = stop_first(moving, limits)
+    if stop is not None and certify(stop.trajectory, world).is_proven:
+        return stop
+    return refusal
 
 
 def _find_path(
@@ -250,11 +266,11 @@ def _time_path(
     lead: Lead | None,
 ) -> Trajectory | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
-    if lead is not None:
+    if lead is not None and lead.speed > 0.0:
         path = _straight_on(lead, path)
     rounded = round_corners(path, _grown(world, HAIR), limits)
     choices = [rounded]
-    if lead is not None:
+    if lead is not None and lead.speed > 0.0 and rounded:
         # The arm must be slow enough where the first blend begins: a smaller one begins later.
         choices += [
             (replace(rounded[0], half_length=share * rounded[0].half_length), *rounded[1:])
@@ -307,7 +323,8 @@ def first_proven(
         timed = []
         for blends in choices:
             with suppress(TooFastError):
-                rest = parameterize(path, blends, reserved(limits), lead.speed)
+                within = reserved(limits) if lead.speed > 0.0 else limits
+                rest = parameterize(path, blends, within, lead.speed)
                 timed.append(joined(lead.trajectory, rest))
     for trajectory in sorted(timed, key=lambda trajectory: trajectory.duration):
         if certify(trajectory, world).is_proven:

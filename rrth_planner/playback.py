@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rrth_planner.arrays import Array
 from rrth_planner.rate import RateProfile
-from rrth_planner.stopping import first_rest, soonest_stop
+from rrth_planner.running import first_rest, Running
+from rrth_planner.stopping import soonest_stop
 from rrth_planner.trajectory import MotionLimits, sample, Trajectory
 
 
@@ -109,7 +110,8 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     if time <= playback.start_time:
         return standing(playback.trajectory.positions[0])
     phase = playback.time_scale * (time - playback.start_time)
-    brake = soonest_stop(playback.trajectory, phase, playback.time_scale, limits)
+    running = Running(trajectory=playback.trajectory, phase=phase, scale=playback.time_scale)
+    brake = soonest_stop(running, limits)
     if brake is not None:
         return replace(playback, brake_time=time, brake=brake)
     return replace(playback, trajectory=_up_to_rest(playback.trajectory, phase))

@@ -12,6 +12,8 @@ from rrth_planner.errors import RrthError
 REST, ROUNDING = 1e-7, 1e-9
 # Steps to the time of a way: enough where the rate is 0 at the end.
 NEWTON = 25
+# How closely a way is met [s].
+ENOUGH = 1e-13
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -109,6 +111,8 @@ class RateProfile:
             low, high = np.where(way < ways, time, low), np.where(way < ways, high, time)
             time = time + (ways - way) / np.maximum(rate, ROUNDING)
             time = np.where((time >= low) & (time <= high), time, 0.5 * (low + high))
+            if np.abs(ways - way).max() < ENOUGH:
+                break
         return time
 
 

@@ -1,160 +1,100 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that an arm was told to follow: how far it is, and what is proven of the rest."""
+"""A motion from now on, by the clock, and what becomes of it at another rate."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.certificate import certify
-from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import follows, phase_of
-from rrth_planner.trajectory import sample, Trajectory
-from rrth_planner.world import arm_world
-
-# Two points of a part of a motion are at least so far apart [s].
-CLOSEST = 1e-4
-# Stretches of time in each of which boxes that move are as large as they get in it.
-STRETCHES = 6
+from rrth_planner.rate import RateProfile
+from rrth_planner.trajectory import jerks_at, piece_coefficients, sample, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RunningMotion:
+class Running:
     """
-    A motion and when it began.
+    A motion that is passed through now.
 
     Parameters
     ----------
     trajectory : Trajectory
-    start_time : float
-        [s].
-    reach : float
-        How much of the pointing ray must be clear at the end [m].
+    phase : float
+        Where in it the arm is [s].
+    scale : float
+        Seconds of the motion per second of the clock [-].
 
     """
 
     trajectory: Trajectory
-    start_time: float
-    reach: float = 0.0
+    phase: float
+    scale: float
 
-    def phase(self, q: Array, v: Array, taken: float, now: float) -> float | None:
-        """
-        Return the time within the motion that the arm is at now [s]; None where it is elsewhere.
-
-        Parameters
-        ----------
-        q, v : ndarray, shape (dof,)
-            A reading of the arm [rad, rad/s].
-        taken, now : float
-            When it was read, and now [s].
-
-        """
-        guess = taken - self.start_time
-        if follows(self.trajectory, guess, q):
-            return now - self.start_time
-        found = phase_of(q, v, self.trajectory)
-        return None if found is None else found[0] + found[1] * (now - taken)
+    @property
+    def knots(self) -> Array:
+        """When its points are passed, from now on, (n,) [s]."""
+        return np.asarray((self.trajectory.times - self.phase) / self.scale)
 
 
-def until(trajectory: Trajectory, time: float) -> Trajectory:
+def first_rest(trajectory: Trajectory, phase: float) -> int:
+    """Return the first point after some time [s] at which a motion stands still."""
+    is_rest = ~(trajectory.velocities.any(axis=1) | trajectory.accelerations.any(axis=1))
+    after = np.flatnonzero(is_rest & (trajectory.times > phase))
+    return int(after[0]) if len(after) else len(trajectory.times) - 1
+
+
+def derivatives_at(running: Running, times: Array) -> Array:
+    """Return velocities, accelerations and jerks by the clock, (m,) [s] -> (m, 3, dof)."""
+    phases, scale = running.phase + running.scale * times, running.scale
+    _, v, a = sample(running.trajectory, phases)
+    j = jerks_at(running.trajectory, phases)
+    return np.stack([v * scale, a * scale**2, j * scale**3], axis=1)
+
+
+def derivatives_around(running: Running, times: Array) -> Array:
     """
-    Return a trajectory up to a time within it [s].
+    Return what `derivatives_at` does at three instants each, from one piece, (3, m) [s].
 
-    A part of a quintic is the quintic through its ends: nothing changes but the points.
+    The piece that the middle one is on goes on to both sides.
     """
-    if time >= trajectory.duration:
-        return trajectory
-    q, v, a = sample(trajectory, [time])
-    is_before = trajectory.times < time - CLOSEST
-    if not is_before.any():
-        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
-    return Trajectory(
-        times=np.append(trajectory.times[is_before], time),
-        positions=np.concatenate([trajectory.positions[is_before], q]),
-        velocities=np.concatenate([trajectory.velocities[is_before], v]),
-        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
-    )
+    grid, phases = running.trajectory.times, running.phase + running.scale * times
+    i = np.searchsorted(grid[1:-1], phases[1], side='right')
+    width = (grid[i + 1] - grid[i])[:, None]
+    u = (phases - grid[i])[..., None] / width
+    c = piece_coefficients(running.trajectory)[i]
+    v = (((5 * c[:, 5] * u + 4 * c[:, 4]) * u + 3 * c[:, 3]) * u + 2 * c[:, 2]) * u + c[:, 1]
+    a = ((20 * c[:, 5] * u + 12 * c[:, 4]) * u + 6 * c[:, 3]) * u + 2 * c[:, 2]
+    j = (60 * c[:, 5] * u + 24 * c[:, 4]) * u + 6 * c[:, 3]
+    rate = running.scale / width
+    return np.stack([v * rate, a * rate**2, j * rate**3], axis=-2)
 
 
-def is_still_free(
-    running: RunningMotion,
-    phase: float,
-    arm: ArmModel,
-    scene: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
-    speeds: Array | None = None,
-) -> bool:
+def slowed(states: Array, rate: Array, slope: Array, bend: Array) -> Array:
     """
-    Return whether what is left of a motion is proven free of the wearer as seen now.
+    Return velocities, accelerations and jerks, (..., 3, dof), of a motion at another rate.
 
-    Parameters
-    ----------
-    running : RunningMotion
-    phase : float
-        Time within the motion that it has come to [s].
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    margin, ray_guard_length : float
-        [m].
-    speeds : ndarray, shape (m,), optional
-        How fast each box may go on moving, in any direction: until the arm has passed it counts
-        as that much larger [m/s].
-
+    With the time in the motion s(t) these are q' s', q'' s'^2 + q' s'' and
+    q''' s'^3 + 3 q'' s' s'' + q' s'''; the rate is s' [-, 1/s, 1/s^2].
     """
-    trajectory = running.trajectory
-    q_end = trajectory.positions[-1]
-    if speeds is None or not speeds.any():
-        world = arm_world(arm, scene, margin, ray_guard_length)
-        is_free = certify(trajectory, world, phase).is_proven
-        return is_free and world.is_valid(q_end, running.reach)
-    # Within a stretch of time the boxes are as large as they get at its end.
-    now = min(max(phase, 0.0), trajectory.duration)
-    for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
-        world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
-        if not certify(until(trajectory, end), world, begin).is_proven:
-            return False
-    return world.is_valid(q_end, running.reach)
+    r, w, u = rate[..., None], slope[..., None], bend[..., None]
+    v, a, j = (states[..., k, :] for k in range(3))
+    return np.stack([v * r, a * r**2 + v * w, j * r**3 + 3.0 * a * r * w + v * u], axis=-2)
 
 
-def _swollen(scene: Scene, by: Array) -> Scene:
-    """Return a scene whose boxes are larger by so much on every side, (m,) [m]."""
-    return Scene(
-        tuple(
-            Box(box.name, box.center, box.size + 2.0 * growth, box.rotation)
-            for box, growth in zip(scene.boxes, by.tolist(), strict=True)
-        )
-    )
+def derivatives_along(running: Running, profile: RateProfile, times: Array) -> Array:
+    """Return velocities, accelerations and jerks along a stop, (m,) [s] -> (m, 3, dof)."""
+    way, rate, slope, bend = profile.at(times)
+    return slowed(derivatives_at(running, way), rate, slope, bend)
 
 
-def box_speeds(before: Scene, after: Scene, elapsed: float, most: float) -> Array:
+def along_path(states: Array, weights: Array) -> tuple[Array, Array, Array]:
     """
-    Return how fast the boxes of a scene move, from where they were before, shape (m,) [m/s].
+    Return the speed along the path and its two derivatives, from (..., 3, dof).
 
-    The greatest speed of any of a box's corners, no more than `most`; a box that was not there
-    before may move as fast as any.
-
-    Parameters
-    ----------
-    before, after : Scene
-        Boxes are the same where their names are.
-    elapsed : float
-        Between the two [s].
-    most : float
-        [m/s].
-
+    Joints are weighed by their accelerations, so that radians and metres can be added.
     """
-    known = {box.name: box for box in before.boxes}
-    result = np.full(len(after.boxes), most)
-    for i, box in enumerate(after.boxes):
-        old = known.get(box.name)
-        if old is not None and elapsed > 0.0:
-            turned = np.linalg.norm(box.rotation - old.rotation, 2) * np.linalg.norm(box.size)
-            moved = np.linalg.norm(box.center - old.center) + 0.5 * turned
-            grown = 0.5 * np.linalg.norm(np.maximum(box.size - old.size, 0.0))
-            result[i] = min(most, (moved + grown) / elapsed)
-    return result
+    v, a, j = (states[..., k, :] / weights for k in range(3))
+    # At rest the derivatives come out as 0 or immense, never as no number.
+    speed = np.maximum(np.sqrt((v * v).sum(axis=-1)), 1e-150)
+    slope = (v * a).sum(axis=-1) / speed
+    bend = ((a * a).sum(axis=-1) + (v * j).sum(axis=-1) - slope**2) / speed
+    return speed, slope, bend

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.arrays import Array
+from rrth_planner.braking import brake
 from rrth_planner.kernels.speeds import ramp_time
 from rrth_planner.trajectory import MotionLimits, positions_at, sample, Trajectory
 
@@ -47,7 +48,7 @@ class Lead:
     trajectory : Trajectory
         From the state to constant velocity; its last point does not rest.
     speed : float
-        Of the last point, along the line through all joints [rad/s].
+        Of the last point, along the line through all joints; 0: it rests there [rad/s].
     q_stop : ndarray, shape (dof,)
         Where the arm comes to rest when it goes straight on and slows down [rad].
 
@@ -122,11 +123,43 @@ def follows(trajectory: Trajectory, time: float, q: Array) -> bool:
     return bool(np.abs(positions_at(trajectory, [time])[0] - q).max() <= SAME_POSITION)
 
 
-def state_ahead(
-    positions: Array, velocities: Array, running: Trajectory | None, lead: float
-) -> MotionState:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Takeover:
     """
-    Return the state that an arm will be in, from a reading of it.
+    What an arm that moves does when a motion takes over from its present one.
+
+    Parameters
+    ----------
+    state : MotionState
+        At that time.
+    running : Trajectory or None
+        The motion that it follows until then; None where that is not known.
+    time : float
+        Within that motion [s].
+
+    """
+
+    state: MotionState
+    running: Trajectory | None = None
+    time: float = 0.0
+
+
+def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
+    """Return the lead that is a stop along the present motion; None where that is not known."""
+    if moving.running is None:
+        return None
+    stop = brake(moving.running, moving.time, limits)
+    return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1])
+
+
+def takeover(
+    positions: Array,
+    velocities: Array,
+    running: Trajectory | None,
+    ahead: float,
+) -> Takeover:
+    """
+    Return what an arm will do, from a reading of it.
 
     An arm that is seen to follow a known motion, at whatever rate, goes on to follow it, and what
     it is told next it follows at the same rate: the state is that of the motion. Any other goes on
@@ -138,20 +171,25 @@ def state_ahead(
         Of the reading [rad, rad/s].
     running : Trajectory or None
         The motion that the arm was last told to follow.
-    lead : float
+    ahead : float
         From the reading on, >= 0 [s].
 
     """
     found = None if running is None else phase_of(positions, velocities, running)
     if running is None or found is None:
-        return MotionState(
-            positions=positions + lead * velocities,
-            velocities=velocities,
-            accelerations=np.zeros_like(velocities),
+        return Takeover(
+            state=MotionState(
+                positions=positions + ahead * velocities,
+                velocities=velocities,
+                accelerations=np.zeros_like(velocities),
+            )
         )
     phase, rate = found
-    q, v, a = (values[0] for values in sample(running, [phase + rate * lead]))
-    return MotionState(positions=q, velocities=v, accelerations=a)
+    time = min(phase + rate * ahead, running.duration)
+    q, v, a = (values[0] for values in sample(running, [time]))
+    return Takeover(
+        state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time
+    )
 
 
 def phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:

@@ -191,7 +191,8 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
 
 @functools.lru_cache(maxsize=16)
 def _mount_inverse(arm: ArmModel) -> Array:
-    return np.linalg.inv(arm.T_base_mount)
+    inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
+    return inverse
 
 
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Braking as a motion: from the very state, along the path, within limits, and proven or not."""
 
-from hypothesis import assume, given, strategies as st
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm import tool_pose
@@ -116,40 +116,57 @@ def test_braking_of_a_certified_motion_is_certified():
             assert certificate.is_proven, (n_motions, time, certificate)
 
 
+def random_brake(rng):
+    """Return a motion in an empty world, when it brakes, and how."""
+    empty = arm_world(ARM, Scene(()), 0.0, 0.0)
+    trajectory = first_proven(Path(rng.uniform(*ARM.bounds, (2, 4))), ((),), LIMITS, empty)
+    time = rng.uniform(0.05, 0.6) * trajectory.duration
+    return trajectory, time, brake(trajectory, time, LIMITS)
+
+
+def box_at_the_tool(q):
+    """Return a box round the tool of an arm, and the world with it."""
+    scene = Scene((Box('in the way', tool_pose(ARM, q)[:3, 3], np.full(3, 0.02), np.eye(3)),))
+    return scene, arm_world(ARM, scene, 0.0, 0.0)
+
+
 @examples(60)
 @given(seed=SEEDS)
-def test_a_box_on_the_path_is_safe_to_brake_before_only_beyond_the_braking_distance(seed):
-    rng = np.random.default_rng(seed)
-    empty = arm_world(ARM, Scene(()), 0.0, 0.0)
-    path = Path(rng.uniform(*ARM.bounds, (2, 4)))
-    trajectory = first_proven(path, ((),), LIMITS, empty)
-    time = rng.uniform(0.05, 0.6) * trajectory.duration
-    braked = brake(trajectory, time, LIMITS)
-
-    def world_with_box(q):
-        center = tool_pose(ARM, q)[:3, 3]
-        scene = Scene((Box('in the way', center, np.full(3, 0.02), np.eye(3)),))
-        return scene, arm_world(ARM, scene, 0.0, 0.0)
-
+def test_braking_before_a_box_within_the_braking_distance_is_not_certified(seed):
+    trajectory, time, braked = random_brake(np.random.default_rng(seed))
     # Before the arm stands still, and where it would.
     for share in (0.6, 1.0):
-        q = sample(braked, [share * braked.duration])[0][0]
-        _, world = world_with_box(q)
+        _, world = box_at_the_tool(sample(braked, [share * braked.duration])[0][0])
         certificate = certify_braking(trajectory, time, world, LIMITS)
         assert not certificate.is_proven
         assert certificate.touches
-    # Beyond: where the whole motion would still get, but the brake does not.
-    rest = braked.positions[-1]
+
+
+def check_box_beyond(rng):
+    """Check that braking before a box further on is certified; return whether there is room."""
+    trajectory, time, braked = random_brake(rng)
     later = sample(trajectory, np.linspace(time, trajectory.duration, 400))[0]
-    ahead = later[np.abs(later - rest).max(axis=1).argmin() :]
-    tools = tool_pose(ARM, ahead)[:, :3, 3]
-    # Only its tool is to be near the box, at no time of the brake.
-    for q in ahead[np.linalg.norm(tools - tools[0], axis=1) > 0.05][:1]:
-        scene, world = world_with_box(q)
+    ahead = later[np.abs(later - braked.positions[-1]).max(axis=1).argmin() :: 10]
+    for q in ahead:
+        scene, world = box_at_the_tool(q)
         pieces = piece_coefficients(braked)
-        assume(all(dense_touch(ARM, scene, 1e-3, 0.0, c, 200) < 0 for c in pieces))
-        assert certify_braking(trajectory, time, world, LIMITS).is_proven
-        assert not certify(trajectory, world).is_proven
+        # The first box that no part of the arm meets on its way to rest, as the oracle sees it.
+        if all(dense_touch(ARM, scene, 1e-3, 0.0, c, 200) < 0 for c in pieces):
+            assert certify_braking(trajectory, time, world, LIMITS).is_proven
+            assert not certify(trajectory, world).is_proven
+            return True
+    return False
+
+
+@examples(60)
+@given(seed=SEEDS)
+def test_braking_before_a_box_beyond_the_braking_distance_is_certified(seed):
+    check_box_beyond(np.random.default_rng(seed))
+
+
+def test_most_motions_have_room_for_a_box_beyond_the_braking_distance():
+    rng = np.random.default_rng(93)
+    assert sum(check_box_beyond(rng) for _ in range(20)) > 14
 
 
 def test_a_moved_wearer_is_seen():

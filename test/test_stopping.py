@@ -10,8 +10,10 @@ from rrth_planner.errors import RrthError
 from rrth_planner.path import Path
 from rrth_planner.playback import Playback, stop
 from rrth_planner.rate import RateProfile
+from rrth_planner.running import Running
+from rrth_planner.stopping import holds
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import jerks_at, sample, Trajectory
+from rrth_planner.trajectory import jerks_at, MotionLimits, sample, Trajectory
 from worlds import examples, limits
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -142,6 +144,34 @@ def test_a_stop_saves_time_in_most_motions():
         time = 0.3 * trajectory.duration
         kept.append((stop(playback, LIMITS, time).end_time - time) / (0.7 * trajectory.duration))
     assert np.median(kept) < 0.6
+
+
+@pytest.mark.parametrize(
+    ('stretch', 'is_held'),
+    # Within all limits; jerk alone is too great; acceleration too.
+    [(0.5, True), (0.14, False), (0.1, False)],
+)
+def test_what_breaks_a_limit_is_not_proven(stretch, is_held):
+    slow = MotionLimits(velocity=np.full(4, 0.4), acceleration=np.full(4, 4.0), jerk=LIMITS.jerk)
+    trajectory = parameterize(Path([[0.0] * 4, [2.0, 0.0, 0.0, 0.0]]), (), slow)
+    running = Running(trajectory=trajectory, phase=1.0, scale=1.0)
+    profile = RateProfile(
+        times=stretch * np.array([0.0, 0.5, 1.0, 2.0]),
+        bends=np.array([[-2.4, 0.0], [0.0, -2.4], [2.4, 0.0]]) / stretch**2,
+    )
+    assert holds(running, profile, LIMITS) is is_held
+
+
+def test_a_motion_of_dense_points_is_stopped_as_one_of_few():
+    few = parameterize(Path([[0.0] * 4, [2.0, -1.0, 0.5, 0.0]]), (), LIMITS)
+    times = np.append(np.arange(0.0, few.duration, 0.004), few.duration)
+    q, v, a = sample(few, times)
+    dense = Trajectory(times=times, positions=q, velocities=v, accelerations=a)
+    ends = [
+        stop(Playback(trajectory=t, start_time=0.0, time_scale=1.0), LIMITS, 0.7).end_time
+        for t in (few, dense)
+    ]
+    assert ends[1] == pytest.approx(ends[0], rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,8 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm import tool_pose
+from rrth_planner.braking import brake
+from rrth_planner.certificate import certify
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import quintic_states
@@ -18,7 +20,8 @@ from rrth_planner.takeover import (
     lead_in,
     MotionState,
     reserved,
-    state_ahead,
+    Takeover,
+    takeover,
 )
 from rrth_planner.timing import limit_ratio, parameterize
 from rrth_planner.trajectory import piece_coefficients, sample
@@ -97,7 +100,7 @@ def test_a_running_motion_is_taken_over_at_any_instant(seed):
     time = rng.uniform(0.0, before.trajectory.duration)
     q, v, a = (values[0] for values in sample(before.trajectory, [time]))
     state = MotionState(positions=q, velocities=v, accelerations=a)
-    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, state)
+    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, Takeover(state=state))
     if plan.trajectory is None:
         assert plan.status is not PlanStatus.NOT_CERTIFIED
         return
@@ -121,7 +124,7 @@ def test_an_arm_with_no_room_ahead_is_told_so():
     )
     ahead = tool_pose(arm, lead_in(state, limits()).q_stop)[:3, 3]
     box = Box('wall', ahead, np.full(3, 0.02), np.eye(3))
-    plan = motion(Scene((box,)), q, [0.0, 0.0, 2.0], 3, state)
+    plan = motion(Scene((box,)), q, [0.0, 0.0, 2.0], 3, Takeover(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert 'straight ahead' in plan.sentence
 
@@ -134,7 +137,7 @@ def test_an_arm_that_follows_a_motion_is_foreseen_to_go_on(rate, seed):
     running = parameterize(Path(rng.standard_normal((2, 4))), (), limits())
     time, lead = rng.uniform(0.1, 0.7) * running.duration, 0.05
     q, v, _ = (values[0] for values in sample(running, [time]))
-    found = state_ahead(q, rate * v, running, lead)
+    found = takeover(q, rate * v, running, lead).state
     q, v, a = (values[0] for values in sample(running, [time + rate * lead]))
     assert np.abs(found.positions - q).max() < 1e-6
     # In the time of the motion: what comes next is followed at the same rate.
@@ -142,10 +145,32 @@ def test_an_arm_that_follows_a_motion_is_foreseen_to_go_on(rate, seed):
     assert np.abs(found.accelerations - a).max() < 1e-3
 
 
+@examples(30)
+@given(seed=SEEDS)
+def test_an_arm_with_no_room_ahead_stops_along_its_motion_first(seed):
+    rng = np.random.default_rng(seed)
+    scene, world = wearer(), wearer_world()
+    before = motion(scene, free_configuration(rng, world), rng.uniform(-2.0, 2.0, 3), 1)
+    if before.trajectory is None:
+        return
+    time = rng.uniform(0.0, before.trajectory.duration)
+    q, v, a = (values[0] for values in sample(before.trajectory, [time]))
+    state = MotionState(positions=q, velocities=v, accelerations=a)
+    moving = Takeover(state=state, running=before.trajectory, time=time)
+    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving)
+    # Along a motion that is proven free it can stop; it may just fail to be proven, since the
+    # curve through the points of the stop is off the path by a little.
+    if plan.status is PlanStatus.START_MOVES:
+        assert not certify(brake(before.trajectory, time, limits()), world).is_proven
+    if plan.trajectory is not None:
+        assert np.array_equal(plan.trajectory.positions[0], q)
+        assert np.abs(plan.trajectory.velocities[0] - v).max() < 1e-12
+
+
 def test_an_arm_on_another_way_goes_on_at_its_velocity():
     running = parameterize(Path([np.zeros(4), np.ones(4)]), (), limits())
     q, v = np.full(4, 0.5) + [0.1, 0.0, 0.0, 0.0], np.array([0.3, 0.0, 0.0, 0.0])
-    found = state_ahead(q, v, running, 0.1)
+    found = takeover(q, v, running, 0.1).state
     assert np.allclose(found.positions, q + 0.1 * v)
     assert np.array_equal(found.velocities, v)
     assert not found.accelerations.any()

@@ -17,8 +17,8 @@ from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.running import box_speeds, is_still_free, RunningMotion
 from rrth_planner.scene import Scene
+from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].

@@ -15,7 +15,7 @@ from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.messages import FrameError, JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import MotionState, REST_SPEED, state_ahead
+from rrth_planner.takeover import REST_SPEED, Takeover, takeover
 from rrth_planner.trajectory import Trajectory
 
 T = TypeVar('T')
@@ -98,15 +98,15 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
 
-    def ahead(self, running: Trajectory | None, time: float, arm: ArmModel) -> MotionState:
-        """Return the state of an arm that moves at a time to come [s], or raise RequestError."""
+    def ahead(self, running: Trajectory | None, time: float, arm: ArmModel) -> Takeover:
+        """Return what an arm that moves will do at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
             raise RequestError(
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
-        return state_ahead(joints.positions, joints.velocities, running, time - joints.taken)
+        return takeover(joints.positions, joints.velocities, running, time - joints.taken)
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)

@@ -22,8 +22,8 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.running import RunningMotion
 from rrth_planner.takeover import REST_SPEED
+from rrth_planner.underway import RunningMotion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -246,8 +246,11 @@ class PlanQueue:
         begin = self._now()
         while time.monotonic() < end and not ticket.is_cancelled:
             reading = self._heard.joints.value
-            is_new = reading is not None and reading.received >= begin + wait
-            if is_new and (np.abs(reading.velocities) <= REST_SPEED).all():
+            if (
+                reading is not None
+                and reading.received >= begin + wait
+                and (np.abs(reading.velocities) <= REST_SPEED).all()
+            ):
                 return
             time.sleep(0.005)
 

@@ -18,7 +18,7 @@ from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import MotionState
+from rrth_planner.takeover import Takeover
 from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world
 
@@ -40,7 +40,7 @@ class Start:
     ----------
     time : float
         [s].
-    state : MotionState
+    takeover : Takeover
         What the arm does then.
     running : Trajectory or None
         The motion that it was last told to follow.
@@ -48,7 +48,7 @@ class Start:
     """
 
     time: float
-    state: MotionState
+    takeover: Takeover
     running: Trajectory | None
 
 
@@ -140,7 +140,7 @@ def _plan(
     return plan_motion(
         parameters.arm,
         inputs.scene,
-        inputs.q_start if start is None else start.state.positions,
+        inputs.q_start if start is None else start.takeover.state.positions,
         inputs.goal,
         parameters.limits,
         parameters.options,
@@ -148,7 +148,7 @@ def _plan(
         ray_guard_length=parameters.ray_guard_length,
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
         should_stop=should_stop,
-        moving=None if start is None else start.state,
+        moving=None if start is None else start.takeover,
     )
 
 
@@ -178,7 +178,8 @@ def _check_present(
     if start is None:
         present.require_rest(now, parameters.arm)
     else:
-        expected = inputs.ahead(start.running, present.joints.taken, parameters.arm).positions
+        ahead = inputs.ahead(start.running, present.joints.taken, parameters.arm)
+        expected = ahead.state.positions
     moved = float(np.abs(present.q_start - expected).max())
     if not moved <= START_TOLERANCE:
         what = 'moved by' if start is None else 'is off its course by'

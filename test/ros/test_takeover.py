@@ -80,9 +80,8 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, spi
         wait_until(lambda: client.speed() == 0.0)
     assert not [line for line in said if 'refused' in line]
     moving = [answer for was_moving, answer in answers if was_moving]
-    assert len(moving) >= len(TARGETS)
-    taken_over = [answer.success for answer in moving]
-    assert np.mean(taken_over) >= 0.8, [a.message for a in moving if not a.success]
+    assert len(moving) >= 3
+    assert all(answer.success for answer in moving), [a.message for a in moving]
     stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in client.states])
     q, v = (
         np.array([getattr(s, name) for s in client.states]) for name in ('position', 'velocity')
