@@ -221,9 +221,10 @@ def _find_path(
     goals: GoalSet | None = None
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
-    for spare in SPARES:
+    for spare in (*SPARES, 0.0):
         roomy = _grown(world, spare)
-        if not roomy.is_valid(q_start):
+        # Without any to spare only where the start has none: an arm that was in motion.
+        if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
             continue
         goals = goal_configurations(arm, goal, roomy, q_start, FEW)
         if len(goals.q_goals) == 0:
@@ -231,7 +232,7 @@ def _find_path(
         if len(goals.q_goals) == 0:
             continue
         # Half of the time for the roomy way, so that the tight one has its chance.
-        share = 1.0 if spare == SPARES[-1] else 0.5
+        share = 0.5 if spare == SPARES[0] else 1.0
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
         problem = pointing_problem(arm, goal, roomy, q_start, goals)
         rng = np.random.default_rng(seed)
