@@ -203,7 +203,8 @@ def _lead(arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits) -
         return straight
     stop = stop_first(moving, limits)
     if stop is not None and certify(stop.trajectory, world).is_proven:
-        return stop
+        # Rounding may have put a joint past its limit.
+        return replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
     return refusal
 
 
