@@ -194,3 +194,30 @@ def test_python_fcl_agrees_with_the_oracle_about_distances():
         elif exact > MARGIN:
             assert told > MARGIN - 1e-5
     assert n_near > 3
+
+
+def test_toppra_times_a_straight_line_as_the_textbook_does():
+    pytest.importorskip('toppra')
+    from benchmarks import toppra_peer as peer
+
+    path, bound = Path([[0.0] * 4, [2.0, 0.5, 0.5, 0.5]]), limits()
+    way, speed, acceleration = 2.0, 1.5, 4.0
+    expected = way / speed + speed / acceleration
+    assert peer.optimal_duration(path, (), bound) == pytest.approx(expected, rel=1e-6)
+
+
+def test_toppra_stops_where_a_corner_is_not_rounded():
+    pytest.importorskip('toppra')
+    from benchmarks import toppra_peer as peer
+
+    path, bound = Path(CORNERS), limits()
+    edges = [peer.optimal_duration(Path(CORNERS[i : i + 2]), (), bound) for i in range(3)]
+    stops = peer.optimal_duration(path, blends_of(CORNERS, 0.0, 0.0), bound)
+    assert stops == pytest.approx(sum(edges), rel=1e-9)
+    rounded = blends_of(CORNERS, 0.2, 0.15)
+    fastest = peer.optimal_duration(path, rounded, bound)
+    assert fastest < 0.95 * stops
+    # The grid is fine enough.
+    assert peer.optimal_duration(path, rounded, bound, 3) == pytest.approx(fastest, rel=1e-4)
+    free = replace(bound, jerk=np.full(4, 1e6))
+    assert parameterize(path, rounded, free).duration > (1 - 1e-4) * fastest
