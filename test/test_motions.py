@@ -221,3 +221,41 @@ def test_toppra_stops_where_a_corner_is_not_rounded():
     assert peer.optimal_duration(path, rounded, bound, 3) == pytest.approx(fastest, rel=1e-4)
     free = replace(bound, jerk=np.full(4, 1e6))
     assert parameterize(path, rounded, free).duration > (1 - 1e-4) * fastest
+
+
+def test_the_command_names_what_is_missing(capsys):
+    from benchmarks.motions import main
+
+    assert main([], lambda name: None if name == 'toppra' else name) == 2
+    assert capsys.readouterr().err.startswith('toppra: not installed')
+
+
+@pytest.mark.slow
+def test_a_short_run_writes_the_report_and_pictures(tmp_path, capsys):
+    for name in ('pyarrow', 'tqdm', 'matplotlib', 'toppra'):
+        pytest.importorskip(name)
+    from benchmarks.motion_rows import read_motions
+    from benchmarks.motion_table import FAULTS
+    from benchmarks.motions import main
+
+    data = tmp_path / 'rows.parquet'
+    where = ['--output', str(tmp_path), '--data', str(data)]
+    assert main(['--queries', '10', *where]) == 0
+    text = (tmp_path / 'motions.md').read_text(encoding='utf-8')
+    assert 'Written by `python -m benchmarks.motions --queries 10`; do not edit.' in text
+    assert (tmp_path / 'images' / 'motions' / 'toppra.png').stat().st_size > 10_000
+    rows = read_motions(data)
+    assert len(rows) == 10
+    assert not [row['contact'] for row in rows if row['contact']]
+    # A row that breaks everything is listed, and the report can be written again without planning.
+    from benchmarks.motion_rows import write_motions
+
+    broken = next(row for row in rows if row['is_solved'])
+    broken |= {'contact': 'bar 3', 'jerk_ratio': 1.02, 'is_at_rest': False, 'deviation': 2e-4}
+    broken |= {'fcl_distance': 0.01, 'is_at_ends': False, 'is_increasing': False}
+    write_motions(data, rows)
+    assert main(['--report-only', *where]) == 0
+    text = (tmp_path / 'motions.md').read_text(encoding='utf-8')
+    for name in set(FAULTS) - {'not certified'}:
+        assert name in text
+    assert '**no**' in capsys.readouterr().out
