@@ -62,7 +62,7 @@ def report(rows: Sequence[Row], command: str, pictures: Mapping[str, str]) -> st
     commit = f', commit {first["commit"]}' if first['commit'] else ''
     versions = (
         f'Python {first["python_version"]}, numpy {first["numpy_version"]}, numba '
-        f'{first["numba_version"]}, toppra {version("toppra")}, ruckig {version("ruckig")}, '
+        f'{first["numba_version"]}, toppra {version("toppra")}, '
         f'python-fcl {version("python-fcl")}{commit}'
     )
     gallery = '\n\n'.join(f'### {caption}\n\n![{caption}]({p})' for caption, p in pictures.items())

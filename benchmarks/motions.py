@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 import sys
+from typing import Any
 
-NEEDED = ('pyarrow', 'tqdm', 'matplotlib', 'fcl', 'ruckig', 'toppra')
+NEEDED = ('pyarrow', 'tqdm', 'matplotlib', 'fcl', 'toppra')
 MISSING = """{}: not installed, and motions cannot be judged without; install what it needs by
     ./run exec python -m pip install -r requirements/benchmark.txt"""
 RESULTS = Path(__file__).parent / 'results'
@@ -60,7 +61,7 @@ def _run(options: argparse.Namespace, command: str) -> None:
     print(f'{target}: {len(rows)} queries in {data}')
 
 
-def _measured(n_queries: int) -> list[dict]:
+def _measured(n_queries: int) -> list[dict[str, Any]]:
     """Return the rows of some queries, spread over as many wearers as it takes."""
     from tqdm import tqdm
 
@@ -70,7 +71,8 @@ def _measured(n_queries: int) -> list[dict]:
 
     # Its thread would wake up while plans are timed.
     tqdm.monitor_interval = 0
-    limits, rows = default_limits(), []
+    limits = default_limits()
+    rows: list[dict[str, Any]] = []
     with pinned(), tqdm(total=n_queries, unit='query', file=sys.stderr) as bar:
         for body in range(-(-n_queries // EACH)):
             motions = planned_motions(body, min(EACH, n_queries - len(rows)), limits)
