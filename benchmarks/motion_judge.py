@@ -109,16 +109,26 @@ def verdict(
         return Verdict(contact='no curve', **infinite, **common)
     curve = curve_of(trajectory)
     places = instants(curve)
+    velocity_ratio, acceleration_ratio = speed_ratios(curve, limits)
     q = derivative(curve, places, 0)
     outside = np.maximum(arm.bounds[0] - q, q - arm.bounds[1]).max()
     return Verdict(
         contact=_contact(arm, scene, places.times, q, margin, ray_length)
         or _contact(arm, scene, places.times[-1:], q[-1:], margin, max(reach, ray_length)),
-        velocity_ratio=_ratio(np.abs(derivative(curve, places, 1)), limits.velocity),
-        acceleration_ratio=_ratio(np.abs(derivative(curve, places, 2)), limits.acceleration),
+        velocity_ratio=velocity_ratio,
+        acceleration_ratio=acceleration_ratio,
         jerk_ratio=_ratio(greatest_jerk(curve), limits.jerk),
         beyond_range=max(0.0, float(outside)),
         **common,
+    )
+
+
+def speed_ratios(curve: Curve, limits: MotionLimits) -> tuple[float, float]:
+    """Return the greatest velocity and acceleration of any joint over their limits [-]."""
+    places = instants(curve)
+    return (
+        _ratio(np.abs(derivative(curve, places, 1)), limits.velocity),
+        _ratio(np.abs(derivative(curve, places, 2)), limits.acceleration),
     )
 
 

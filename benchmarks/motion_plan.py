@@ -18,7 +18,7 @@ from rrth_planner.path import Path
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.resources import load_yaml, resource_path
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import MotionLimits
+from rrth_planner.trajectory import MotionLimits, Trajectory
 
 from benchmarks.clock import uncollected
 from benchmarks.full_query import Case, cases, MARGIN, RAY
@@ -162,7 +162,7 @@ def duration_stopping(path: Path, blends: tuple[Blend, ...], limits: MotionLimit
     return parameterize(path, stops, limits).duration
 
 
-def duration_unlimited(path: Path, blends: tuple[Blend, ...], limits: MotionLimits) -> float:
-    """Return how long the motion takes where jerk hardly counts [s]."""
+def without_jerk(path: Path, blends: tuple[Blend, ...], limits: MotionLimits) -> Trajectory:
+    """Return the trajectory where jerk hardly counts."""
     free = replace(limits, jerk=np.full(len(limits.jerk), 1e6))
-    return parameterize(path, blends, free).duration
+    return parameterize(path, blends, free)

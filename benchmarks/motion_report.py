@@ -37,7 +37,8 @@ METHOD = """\
 - **Stopping** is the same path from rest to rest, edge by edge. A motion that stops although
   corners could be rounded does so because it is faster.
 - **toppra** gets the same rounded path with limits of velocity and acceleration on a fine grid
-  (constraints held at both ends of each interval); ours is timed on it with a jerk of 1e6 rad/s^3.
+  (constraints held at both ends of each interval); ours is timed on it with a jerk of 1e6 rad/s^3,
+  and whether it holds velocity and acceleration is looked at too.
   Where a corner cannot be rounded both stop.
 - **python-fcl** is asked in the pipeline, and again by code of its own every 1 ms: distance of
   each bar from each box that is not clearly further away than the margin.

@@ -16,9 +16,9 @@ from rrth_planner.trajectory import MotionLimits
 from benchmarks.full_query import MARGIN, RAY
 from benchmarks.motion_curve import Curve, derivative, instants
 from benchmarks.motion_fcl import least_distance, PERIOD
-from benchmarks.motion_judge import curve_of, verdict
+from benchmarks.motion_judge import curve_of, speed_ratios, verdict
 from benchmarks.motion_path import distances, planned_pieces
-from benchmarks.motion_plan import duration_stopping, duration_unlimited, Motion
+from benchmarks.motion_plan import duration_stopping, Motion, without_jerk
 from benchmarks.queries import table_1_arm
 from benchmarks.task import origin, Row
 from benchmarks.toppra_peer import optimal_duration
@@ -28,7 +28,7 @@ TOLERANCE = 3e-6
 _FLOATS = (
     *('duration', 'duration_stopping', 'duration_unlimited', 'duration_toppra', 'path_length'),
     *('velocity_ratio', 'acceleration_ratio', 'jerk_ratio', 'beyond_range', 'deviation'),
-    *('fcl_distance', 'time_round', 'time_prove', 'time_second', 'time_plan'),
+    *('unlimited_ratio', 'fcl_distance', 'time_round', 'time_prove', 'time_second', 'time_plan'),
 )
 _POINTS = ('positions', 'velocities', 'accelerations')
 SCHEMA = pa.schema(
@@ -87,12 +87,15 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     pieces = [piece for part in planned_pieces(path, motion.chosen) for piece in part]
     q = derivative(curve, instants(curve), 0)
     ends = np.array([case.q_start, path.waypoints[-1]])
+    unlimited = without_jerk(path, motion.rounded, limits)
     is_bent = any(blend.half_length > 0.0 for blend in motion.rounded)
     return {
         **told.columns(),
         'duration': trajectory.duration,
         'duration_stopping': duration_stopping(path, motion.rounded, limits),
-        'duration_unlimited': duration_unlimited(path, motion.rounded, limits),
+        'duration_unlimited': unlimited.duration,
+        # A motion that breaks its limits is no peer of one that holds them.
+        'unlimited_ratio': max(speed_ratios(curve_of(unlimited), limits)),
         'duration_toppra': optimal_duration(path, motion.rounded, limits),
         'path_length': path.length,
         'is_stopping': is_bent and not any(blend.half_length > 0.0 for blend in motion.chosen),

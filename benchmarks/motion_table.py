@@ -135,6 +135,7 @@ def figure_lines(rows: Sequence[Row]) -> list[list[str]]:
             1.0,
             '.4f',
         ),
+        ('over its limits, jerk free [%]', column(rows, 'unlimited_ratio') - 1, 100.0, '.4f'),
         ('curve off the planned path [rad]', column(rows, 'deviation'), 1.0, '.2g'),
         ('joint beyond its range [rad]', column(rows, 'beyond_range'), 1.0, '.2g'),
         ('velocity over its limit [%]', column(rows, 'velocity_ratio') - 1, 100.0, '.4f'),
