@@ -8,14 +8,17 @@ from itertools import pairwise
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
+from rrth_planner.braking import brake
 from rrth_planner.certificate import certify
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import follows, phase_of
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.takeover import follows, joined, phase_of
+from rrth_planner.trajectory import MotionLimits, sample, Trajectory
 from rrth_planner.world import arm_world
 
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
+# A stop is not expected to arrive before [s].
+ON_ITS_WAY = 0.01
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
 
@@ -58,24 +61,45 @@ class RunningMotion:
         return None if found is None else found[0] + found[1] * (now - taken)
 
 
-def until(trajectory: Trajectory, time: float) -> Trajectory:
+def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     """
-    Return a trajectory up to a time within it [s].
+    Return the part of a trajectory between two times within it [s], which begins at time 0.
 
     A part of a quintic is the quintic through its ends: nothing changes but the points.
     """
-    if time >= trajectory.duration:
-        return trajectory
-    q, v, a = sample(trajectory, [time])
-    is_before = trajectory.times < time - CLOSEST
-    if not is_before.any():
-        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
-    return Trajectory(
-        times=np.append(trajectory.times[is_before], time),
-        positions=np.concatenate([trajectory.positions[is_before], q]),
-        velocities=np.concatenate([trajectory.velocities[is_before], v]),
-        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
+    states = sample(trajectory, [begin, end])
+    times = trajectory.times
+    is_inside = (times > begin + CLOSEST) & (times < end - CLOSEST)
+    if end - begin < CLOSEST:
+        return Trajectory(
+            times=np.zeros(1),
+            positions=states[0][1:],
+            velocities=states[1][1:],
+            accelerations=states[2][1:],
+        )
+    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    q, v, a = (
+        np.concatenate([ends[:1], row[is_inside], ends[1:]])
+        for ends, row in zip(states, rows, strict=True)
     )
+    return Trajectory(
+        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
+        positions=q,
+        velocities=v,
+        accelerations=a,
+    )
+
+
+def stopping(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
+    """
+    Return how an arm that is at a time within a motion comes to rest along it [s].
+
+    For as long as a message may be on its way the motion goes on as it is: a controller that gets
+    the stop a little late finds itself on it.
+    """
+    time = min(max(time, 0.0), trajectory.duration)
+    later = min(time + ON_ITS_WAY, trajectory.duration)
+    return joined(between(trajectory, time, later), brake(trajectory, later, limits))
 
 
 def is_still_free(
@@ -116,7 +140,7 @@ def is_still_free(
     now = min(max(phase, 0.0), trajectory.duration)
     for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
         world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
-        if not certify(until(trajectory, end), world, begin).is_proven:
+        if not certify(between(trajectory, begin, end), world).is_proven:
             return False
     return world.is_valid(q_end, running.reach)
 
