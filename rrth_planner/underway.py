@@ -8,17 +8,14 @@ from itertools import pairwise
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.braking import brake
 from rrth_planner.certificate import certify
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import follows, joined, phase_of
-from rrth_planner.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.takeover import follows, phase_of
+from rrth_planner.trajectory import sample, Trajectory
 from rrth_planner.world import arm_world
 
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
-# A stop is not expected to arrive before [s].
-ON_ITS_WAY = 0.01
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
 
@@ -88,18 +85,6 @@ def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
         velocities=v,
         accelerations=a,
     )
-
-
-def stopping(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
-    """
-    Return how an arm that is at a time within a motion comes to rest along it [s].
-
-    For as long as a message may be on its way the motion goes on as it is: a controller that gets
-    the stop a little late finds itself on it.
-    """
-    time = min(max(time, 0.0), trajectory.duration)
-    later = min(time + ON_ITS_WAY, trajectory.duration)
-    return joined(between(trajectory, time, later), brake(trajectory, later, limits))
 
 
 def is_still_free(

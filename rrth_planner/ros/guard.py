@@ -10,6 +10,7 @@ import time
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.certificate import least_clearance
+from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
@@ -18,7 +19,7 @@ from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import follows
-from rrth_planner.underway import box_speeds, is_still_free, RunningMotion, stopping
+from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
@@ -143,7 +144,9 @@ class Guard:
         self._stopped_from, self.running = (
             before,
             RunningMotion(
-                trajectory=stopping(before.trajectory, phase, self._reporter.parameters.limits),
+                trajectory=emergency_stop(
+                    before.trajectory, phase, self._reporter.parameters.limits
+                ),
                 start_time=now,
             ),
         )
@@ -174,7 +177,7 @@ class Guard:
         if phase >= running.trajectory.duration:
             return
         stopped = RunningMotion(
-            trajectory=stopping(running.trajectory, phase, parameters.limits),
+            trajectory=emergency_stop(running.trajectory, phase, parameters.limits),
             start_time=now,
         )
         warning = ''
