@@ -4,7 +4,7 @@
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.kernels.stops import quick_stop, rate_at
+from rrth_planner.kernels.stops import quick_stop, rate_at, stop_duration
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
 
@@ -12,7 +12,7 @@ from rrth_planner.trajectory import MotionLimits, piece_coefficients, sample, Tr
 ON_ITS_WAY = 0.01
 # Points of the stop are no further apart, and no closer [s].
 SPACING, CLOSEST = 0.025, 1e-4
-TICK = 1e-9
+TICK, HALVINGS = 1e-9, 36
 
 
 def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
@@ -40,22 +40,24 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
     """
     time = min(max(time, 0.0), trajectory.duration)
     table = np.stack([limits.velocity, limits.acceleration, limits.jerk])
-    curves, found = piece_coefficients(trajectory), np.zeros(3)
+    curves, found = piece_coefficients(trajectory), np.zeros(4)
     later = time + ON_ITS_WAY
     knots = trajectory.times - time
     if len(curves) and quick_stop(curves, trajectory.times, later, table, found):
-        delay, slope, bend = found.tolist()
-        begin, duration = ON_ITS_WAY + delay, 1.0 / slope + slope / bend
-        ramp = slope / bend
+        delay, *shape = found.tolist()
+        begin, duration = ON_ITS_WAY + delay, stop_duration(*shape)
+        slope, down, up = shape
         grid = np.concatenate(
             [
                 knots[(knots > 0.0) & (knots < begin)],
-                begin + np.array([0.0, ramp, duration - ramp]),
+                begin + np.array([0.0, slope / down, duration - slope / up]),
                 begin + np.linspace(0.0, duration, 2 + int(duration / SPACING)),
+                # Where the motion passes from one piece to the next its jerk jumps.
+                begin + _times_of(knots[knots > begin] - begin, shape, duration),
             ]
         )
         times = _apart(grid, begin + duration)
-        ways, rates, slopes = _profile(times - begin, slope, bend)
+        ways, rates, slopes = _profile(times - begin, shape)
         q, v, a = sample(trajectory, time + np.where(times < begin, times, begin + ways))
         stop = Trajectory(
             times=times,
@@ -70,15 +72,25 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
     return Trajectory(times=times, positions=q, velocities=_at_rest(v), accelerations=_at_rest(a))
 
 
-def _profile(times: Array, slope: float, bend: float) -> tuple[Array, Array, Array]:
+def _profile(times: Array, shape: list[float]) -> tuple[Array, Array, Array]:
     """Return way, rate and slope of the rate at times since the stop began, each (n,)."""
     rows = np.empty((len(times), 4))
     for row, t in zip(rows, times.tolist(), strict=True):
         if t <= 0.0:
             row[:] = t, 1.0, 0.0, 0.0
         else:
-            rate_at(t, slope, bend, row)
+            rate_at(t, *shape, row)
     return rows[:, 0], rows[:, 1], rows[:, 2]
+
+
+def _times_of(ways: Array, shape: list[float], duration: float) -> Array:
+    """Return when a stop has passed so much of its motion, of those that it gets to [s]."""
+    low, high = np.zeros(len(ways)), np.full(len(ways), duration)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_past = _profile(middle, shape)[0] > ways
+        low, high = np.where(is_past, low, middle), np.where(is_past, middle, high)
+    return low[low < duration - CLOSEST]
 
 
 def _apart(grid: Array, end: float) -> Array:

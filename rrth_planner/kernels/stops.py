@@ -8,41 +8,47 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_MAT, OUT_VEC, VEC
 
-# A stop passes the motion at a rate that falls from 1 to 0: at constant jerk `bend` of the rate to
-# a constant slope, on at that, and at the opposite jerk to rest. What is tried, as shares of what
+# A stop passes the motion at a rate that falls from 1 to 0: it bends down to a constant slope,
+# goes on at that, and bends up to rest. What is tried, as shares of what
 # the limits leave at the speed of the motion when it begins, and how long it waits before [s].
-SLOPES, BENDS, DELAYS = 8, 6, 5
+SLOPES, BENDS, DELAYS = 14, 6, 9
 SHRINK_SLOPE, SHRINK_BEND, DELAY = 0.8, 0.6, 0.04
-# Instants of a stop at which limits are looked at, and the share of them that may be used: the
+# Instants of each of the three phases at which limits are looked at, and the share of them that may be used: the
 # motion itself may be at a limit when it begins to stop.
-INSTANTS, RESERVE = 40, 1.005
+INSTANTS, RESERVE = 14, 1.005
 SLOWEST = 1e-6
 
 
-@kernel(void(float64, float64, float64, OUT_VEC))
-def rate_at(time, slope, bend, rate):
+@kernel(float64(float64, float64, float64))
+def stop_duration(slope, down, up):
+    """Return how long a stop takes [s]; slope [1/s], bends of both ramps [1/s^2]."""
+    return 0.5 * slope / down + 1.0 / slope + 0.5 * slope / up
+
+
+@kernel(void(float64, float64, float64, float64, OUT_VEC))
+def rate_at(time, slope, down, up, rate):
     """
     Write way, rate, and its first two derivatives, (4,), at a time since the stop began.
 
-    slope [1/s] and bend [1/s^2] are those of the profile, slope^2 <= bend.
+    slope [1/s] is the greatest, down and up [1/s^2] are the bends of the two ramps;
+    slope^2 (1 / down + 1 / up) <= 2.
     """
-    ramp = slope / bend
-    hold = 1.0 / slope - ramp
-    if time < ramp:
-        rate[0], rate[1] = time - bend * time**3 / 6.0, 1.0 - 0.5 * bend * time * time
-        rate[2], rate[3] = -bend * time, -bend
+    first, last = slope / down, slope / up
+    hold = stop_duration(slope, down, up) - first - last
+    if time < first:
+        rate[0], rate[1] = time - down * time**3 / 6.0, 1.0 - 0.5 * down * time * time
+        rate[2], rate[3] = -down * time, -down
         return
-    way, level = ramp - bend * ramp**3 / 6.0, 1.0 - 0.5 * slope * ramp
-    if time < ramp + hold:
-        t = time - ramp
-        rate[0], rate[1] = way + level * t - 0.5 * slope * t * t, level - slope * t
-        rate[2], rate[3] = -slope, 0.0
+    way, level = first - down * first**3 / 6.0, 1.0 - 0.5 * slope * first
+    t = min(time - first, hold)
+    way += level * t - 0.5 * slope * t * t
+    if time < first + hold:
+        rate[0], rate[1], rate[2], rate[3] = way, level - slope * t, -slope, 0.0
         return
-    # From here on the mirror image of the first ramp, seen from its end.
-    left = max(0.0, 2.0 * ramp + hold - time)
-    whole = 0.5 * (2.0 * ramp + hold)
-    rate[0], rate[1] = whole - bend * left**3 / 6.0, 0.5 * bend * left * left
-    rate[2], rate[3] = -bend * left, bend
+    # As the way that is left: the mirror image of a ramp.
+    left = max(0.0, first + hold + last - time)
+    rate[0], rate[1] = way + up * (last**3 - left**3) / 6.0, 0.5 * up * left * left
+    rate[2], rate[3] = -up * left, up
 
 
 @kernel(void(CUBE, VEC, float64, OUT_MAT))
@@ -63,14 +69,22 @@ def derivatives_at(curves, times, time, states):
         states[3, k] = ((60 * c5 * u + 24 * c4) * u + 6 * c3) / width**3
 
 
-@kernel(boolean(CUBE, VEC, float64, float64, float64, MAT, OUT_MAT))
-def keeps_limits(curves, times, begin, slope, bend, limits, states):
+@kernel(boolean(CUBE, VEC, float64, float64, float64, float64, MAT, OUT_MAT))
+def keeps_limits(curves, times, begin, slope, down, up, limits, states):
     """Return whether a stop from a time on keeps velocity, acceleration and jerk, (3, dof)."""
     rate = np.empty(4)
-    duration = 1.0 / slope + slope / bend
-    for i in range(INSTANTS):
-        # The middles of the phases as well as their ends, where the jerk changes.
-        rate_at(duration * (i + 0.5) / INSTANTS, slope, bend, rate)
+    first, last = slope / down, slope / up
+    hold = stop_duration(slope, down, up) - first - last
+    for i in range(3 * INSTANTS):
+        # Each phase by itself: its ends, between which the jerk jumps, and between.
+        phase, share = i // INSTANTS, (0.001 + 0.998 * (i % INSTANTS) / (INSTANTS - 1))
+        if phase == 0:
+            time = share * first
+        elif phase == 1:
+            time = first + share * hold
+        else:
+            time = first + hold + share * last
+        rate_at(time, slope, down, up, rate)
         derivatives_at(curves, times, begin + rate[0], states)
         r, dr, ddr = rate[1], rate[2], rate[3]
         for k in range(limits.shape[1]):
@@ -85,7 +99,7 @@ def keeps_limits(curves, times, begin, slope, bend, limits, states):
 @kernel(int64(CUBE, VEC, float64, MAT, OUT_VEC))
 def quick_stop(curves, times, time, limits, found):
     """
-    Write delay, slope and bend of the soonest stop of those that are tried; return whether any.
+    Write delay, slope and bends of the soonest stop of those that are tried; return whether any.
 
     Parameters
     ----------
@@ -97,8 +111,8 @@ def quick_stop(curves, times, time, limits, found):
         Of the motion, when the stop is asked for [s].
     limits : array, shape (3, dof)
         Velocity, acceleration, jerk.
-    found : array, shape (3,)
-        Written [s, 1/s, 1/s^2].
+    found : array, shape (4,)
+        Written [s, 1/s, 1/s^2, 1/s^2].
 
     """
     dof = curves.shape[2]
@@ -121,16 +135,19 @@ def quick_stop(curves, times, time, limits, found):
                 grip, snap = min(grip, limits[1, k] / v), min(snap, limits[2, k] / v)
         if grip == math.inf:
             break
-        bend = snap
+        down = snap
         for _ in range(BENDS):
-            slope = min(grip, math.sqrt(bend))
-            for _ in range(SLOPES):
-                duration = d * DELAY + 1.0 / slope + slope / bend
-                if duration < best and keeps_limits(
-                    curves, times, begin, slope, bend, allowed, states
-                ):
-                    best, n_found = duration, n_found + 1
-                    found[0], found[1], found[2] = d * DELAY, slope, bend
-                slope *= SHRINK_SLOPE
-            bend *= SHRINK_BEND
+            up = snap
+            for _ in range(BENDS):
+                slope = min(grip, math.sqrt(2.0 / (1.0 / down + 1.0 / up)))
+                for _ in range(SLOPES):
+                    duration = d * DELAY + stop_duration(slope, down, up)
+                    if duration >= best:
+                        break
+                    if keeps_limits(curves, times, begin, slope, down, up, allowed, states):
+                        best, n_found = duration, n_found + 1
+                        found[0], found[1], found[2], found[3] = d * DELAY, slope, down, up
+                    slope *= SHRINK_SLOPE
+                up *= SHRINK_BEND
+            down *= SHRINK_BEND
     return n_found
