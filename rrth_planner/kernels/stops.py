@@ -9,12 +9,12 @@ import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_MAT, OUT_VEC, VEC
 
 # A stop passes the motion at a rate that falls from 1 to 0: it bends down to a constant slope,
-# goes on at that, and bends up to rest. What is tried, as shares of what
-# the limits leave at the speed of the motion when it begins, and how long it waits before [s].
-SLOPES, BENDS, DELAYS = 14, 6, 9
-SHRINK_SLOPE, SHRINK_BEND, DELAY = 0.8, 0.6, 0.04
-# Instants of each of the three phases at which limits are looked at, and the share of them that may be used: the
-# motion itself may be at a limit when it begins to stop.
+# goes on at that, and bends up to rest. What is tried, as shares of what the limits leave at the
+# speed of the motion when it begins, and how long it waits before [s].
+SLOPES, BENDS, DELAYS = 14, 6, 5
+SHRINK_SLOPE, SHRINK_BEND, DELAY = 0.8, 0.6, 0.05
+# Instants of each of the three phases at which limits are looked at, and the share of them that
+# may be used: the motion itself may be at a limit when it begins to stop.
 INSTANTS, RESERVE = 14, 1.005
 SLOWEST = 1e-6
 
