@@ -13,6 +13,8 @@ ON_ITS_WAY = 0.01
 # Points of the stop are no further apart, and no closer [s].
 SPACING, CLOSEST = 0.025, 1e-4
 TICK, HALVINGS = 1e-9, 36
+# By which factor a stop may be too fast: less than 1 % of its acceleration and jerk.
+WITHIN = 1.0025
 
 
 def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
@@ -65,7 +67,7 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
             velocities=_at_rest(v * rates[:, None]),
             accelerations=_at_rest(a * rates[:, None] ** 2 + v * slopes[:, None]),
         )
-        if limit_ratio(stop, limits) <= 1.008:
+        if limit_ratio(stop, limits) <= WITHIN:
             return stop
     times = _apart(knots[knots > 0.0], trajectory.duration - time)
     q, v, a = sample(trajectory, time + times)

@@ -15,7 +15,7 @@ SLOPES, BENDS, DELAYS = 14, 6, 5
 SHRINK_SLOPE, SHRINK_BEND, DELAY = 0.8, 0.6, 0.05
 # Instants of each of the three phases at which limits are looked at, and the share of them that
 # may be used: the motion itself may be at a limit when it begins to stop.
-INSTANTS, RESERVE = 14, 1.005
+INSTANTS, RESERVE = 14, 1.003
 SLOWEST = 1e-6
 
 

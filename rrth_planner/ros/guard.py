@@ -3,14 +3,17 @@
 """While the arm moves the wearer may move too: each new body is held against what is left."""
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
 from threading import RLock
 import time
 
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rrth_planner.braking import brake
 from rrth_planner.certificate import least_clearance
-from rrth_planner.emergency import emergency_stop
+from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
@@ -18,12 +21,15 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import follows
-from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
+from rrth_planner.takeover import follows, joined
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
+# Between two times of a running motion from which the soonest stop is found ahead [s].
+FORESEEN = 0.04
 # An arm that is not on its stop after this time is told again [s].
 PATIENCE = 0.05
 # An arm that is that long after the end of its motion is taken to have arrived [s].
@@ -71,6 +77,9 @@ class Guard:
         # Motions that were planned before a brake are of no use after it.
         self.n_brakes = 0
         self._stopped_from: RunningMotion | None = None
+        # Stops from some times of the running motion on, found while it runs.
+        self._stops: list[tuple[float, Trajectory]] = []
+        self._foreseer = ThreadPoolExecutor(max_workers=1, thread_name_prefix='stops')
         self._before: tuple[Scene, float] | None = None
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
@@ -81,9 +90,37 @@ class Guard:
     def begin(self, running: RunningMotion, goal: PointingGoal) -> None:
         """Watch a motion from now on; the lock is held."""
         self.running, self._goal, self._stopped_from = running, goal, None
+        self._stops = []
+        self._foreseer.submit(self._foresee, running, self._stops)
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body()
+
+    def close(self) -> None:
+        """Foresee nothing any more."""
+        self.running = None
+        self._foreseer.shutdown(wait=True, cancel_futures=True)
+
+    def _foresee(self, running: RunningMotion, stops: list[tuple[float, Trajectory]]) -> None:
+        """Find the soonest stop from every so many times on, which takes milliseconds each."""
+        limits = self._reporter.parameters.limits
+        for begin in np.arange(FORESEEN, running.trajectory.duration, FORESEEN).tolist():
+            if self.running is not running:
+                return
+            stops.append((begin, brake(running.trajectory, begin, limits)))
+
+    def _stop_of(self, running: RunningMotion, phase: float) -> Trajectory:
+        """Return the soonest stop that is known, from where the arm is."""
+        motion = running.trajectory
+        phase = min(max(phase, 0.0), motion.duration)
+        stop = emergency_stop(motion, phase, self._reporter.parameters.limits)
+        for begin, foreseen in self._stops:
+            # What has to reach the controller takes its time.
+            if begin >= phase + ON_ITS_WAY:
+                if begin - phase + foreseen.duration < stop.duration:
+                    stop = joined(between(motion, phase, begin), foreseen)
+                break
+        return stop
 
     def on_body(self) -> None:
         """Hold the body as it is now against what is left of the motion."""
@@ -177,7 +214,7 @@ class Guard:
         if phase >= running.trajectory.duration:
             return
         stopped = RunningMotion(
-            trajectory=emergency_stop(running.trajectory, phase, parameters.limits),
+            trajectory=self._stop_of(running, phase),
             start_time=now,
         )
         warning = ''

@@ -148,6 +148,7 @@ class PlanQueue:
         with self._lock:
             self._is_closed = True
         self.cancel()
+        self.guard.close()
         self._worker.shutdown(wait=True, cancel_futures=True)
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
@@ -231,9 +232,11 @@ class PlanQueue:
 
         def work() -> None:
             self._wait_for_rest(ticket, wait)
+            if ticket.is_cancelled:
+                return
             response = self._work(goal, time.perf_counter(), ticket)
             response.conclude()
-            if not response.is_solved and not ticket.is_cancelled:
+            if not response.is_solved:
                 self.guard.hold(response.text)
 
         with self._lock:
