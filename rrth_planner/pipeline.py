@@ -38,6 +38,7 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import joined, Lead, lead_in, reserved, stop_first, Takeover
 from rrth_planner.timing import parameterize, TooFastError
+from rrth_planner.touch import Disagreement
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World
 
@@ -76,6 +77,8 @@ class MotionPlan:
         Least distance of the arm and of the guarded ray from the wearer [m]; NaN unless solved.
     reach : float
         Distance from the tool to the target at the end [m]; NaN unless solved.
+    disagreement : Disagreement or None
+        The motion that the two judges disagree about, where that is why there is none.
 
     """
 
@@ -87,6 +90,7 @@ class MotionPlan:
     trajectory: Trajectory | None = None
     clearance: float = float('nan')
     reach: float = float('nan')
+    disagreement: Disagreement | None = None
 
 
 def plan_motion(
@@ -137,7 +141,7 @@ def plan_motion(
     refusal = start_refusal(
         arm, _grown(world, SPARES[-1]), q_start, margin + SPARES[-1]
     ) or target_refusal(scene, goal, margin)
-    lead, q_from = None, q_start
+    lead, q_from, disagreement = None, q_start, None
     if refusal is None and moving is not None:
         led = _lead(arm, world, moving, limits)
         if isinstance(led, Refusal):
@@ -152,6 +156,9 @@ def plan_motion(
                 refusal = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
             elif isinstance(timed, Trajectory):
                 return _solved(arm, goal, world, found, timed, margin, seed, begin)
+            elif isinstance(timed, Disagreement):
+                disagreement = timed
+                refusal = Refusal(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
             else:
                 refusal = timed
         else:
@@ -162,6 +169,7 @@ def plan_motion(
         sentence=f'{refusal.sentence}, seed {seed}',
         seed=seed,
         planning_time=time.perf_counter() - begin,
+        disagreement=disagreement,
     )
 
 
@@ -266,7 +274,7 @@ def _time_path(
     limits: MotionLimits,
     margin: float,
     lead: Lead | None,
-) -> Trajectory | Refusal:
+) -> Trajectory | Disagreement | Refusal:
     """Return the timed path once both judges agree that it is free, with stops if need be."""
     if lead is not None and lead.speed > 0.0:
         path = _straight_on(lead, path)
@@ -289,11 +297,7 @@ def _time_path(
         arm, scene, trajectory, margin, world.ray_length, _reach(arm, goal, path.waypoints[-1])
     )
     if touch is not None:
-        return Refusal(
-            PlanStatus.NOT_CERTIFIED,
-            f'the two collision checks disagree: {touch.bar} is {touch.distance:.4f} m from box '
-            f'"{touch.box}" at {touch.time:.3f} s, expected at least {margin:g} m',
-        )
+        return Disagreement(trajectory, touch)
     return trajectory
 
 

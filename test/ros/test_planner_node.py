@@ -27,12 +27,14 @@ from rclpy.qos import (  # noqa: E402
     ReliabilityPolicy,
 )
 from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import requests  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -310,8 +312,8 @@ def test_messages_are_heard_and_callers_wait_while_it_plans(start, wait_until):
     assert all(f.result().success for f in futures)
 
 
-def test_whatever_goes_wrong_is_answered(start, monkeypatch):
-    planner, stranger = start()
+def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
 
     def fail(*_, **__):
@@ -320,9 +322,9 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(requests, 'plan_motion', fail)
         message = stranger.answer().message
-    assert message == (
-        'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test'
-    )
+    sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
+    (file,) = tmp_path.iterdir()
+    assert message == f'{sentence}to replay it: ./run exec replay {file}'
     assert not stranger.heard['joint_trajectory']
     assert stranger.answer().success
 
@@ -427,8 +429,8 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
     assert stranger.answer().success
 
 
-def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until):
-    planner, stranger = start()
+def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
     inputs, plan_motion = inputs_of(planner), requests.plan_motion
     asked = []
@@ -443,13 +445,18 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
 
     def disagree(*args):
         asked.append(args)
-        return 'a touch' if len(asked) == 1 else None
+        return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
     monkeypatch.setattr(requests, 'first_touch', disagree)
     message = stranger.answer().message
-    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
+    (file,) = tmp_path.iterdir()
+    incident = read_incident(file)
+    # Planned for two boxes, judged for three.
+    assert len(incident.question.scene.boxes) == 2
+    assert [box.name for box in incident.present.boxes][-1] == 'far'
     assert stranger.answer().success
     assert len(asked) == 2
 
