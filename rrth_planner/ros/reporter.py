@@ -131,6 +131,8 @@ class Reporter:
         logger = self._node.get_logger()
         if is_solved:
             logger.info(text)
+        elif code is ErrorCode.FAILURE:
+            logger.error(text)
         else:
             logger.warning(text)
         self.publish()
