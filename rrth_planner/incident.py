@@ -144,6 +144,14 @@ def incident_from_mapping(data: Any) -> Incident:
         What is missing, unknown or out of its range.
 
     """
+    try:
+        return _incident(data)
+    except (ArithmeticError, AttributeError, TypeError, ValueError) as problem:
+        # A number that is too large, say.
+        raise RecordError(f'incident: {problem}, expected what was written') from problem
+
+
+def _incident(data: Any) -> Incident:
     if isinstance(data, Mapping) and data.get('format') != FORMAT:
         raise RecordError(f'format: {data.get("format")!r}, expected {FORMAT}')
     given = entries(data, Incident, 'incident', ('format',))

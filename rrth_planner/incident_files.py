@@ -57,8 +57,8 @@ def read_incident(path: Path) -> Incident:
     """Return the incident of a file, or raise RrthError with what is wrong with it."""
     try:
         return incident_from_mapping(load_yaml(path))
-    except RecordError as problem:
-        raise RecordError(f'file {path}: {problem}') from problem
+    except RecursionError as problem:
+        raise RecordError(f'file {path}: nested too deeply, expected an incident') from problem
     except RrthError as problem:
         if str(path) in str(problem):
             raise

@@ -249,6 +249,41 @@ def test_a_bad_record_is_refused_in_one_sentence(tmp_path, path, value, sentence
         read_incident(file)
 
 
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.just(10**400),
+    st.floats(),
+    st.text(max_size=5),
+    st.lists(st.integers() | st.text(max_size=2), max_size=4),
+    st.dictionaries(st.text(max_size=3) | st.integers(), st.none(), max_size=2),
+)
+
+
+def paths_in(data, path=()):
+    """Return the paths to everything in nested mappings and lists."""
+    items = data.items() if isinstance(data, dict) else enumerate(data)
+    for key, value in items:
+        yield (*path, key)
+        if isinstance(value, dict | list):
+            yield from paths_in(value, (*path, key))
+
+
+PATHS = list(paths_in(incident_to_mapping(disagreement())))
+
+
+@examples(400)
+@given(st.sampled_from(PATHS), JUNK)
+def test_whatever_a_record_holds_it_is_read_or_refused(path, junk):
+    try:
+        again = incident_from_mapping(changed(path, junk))
+    except RrthError as problem:
+        assert 'expected' in str(problem) or 'without' in str(problem)
+    else:
+        assert isinstance(again, Incident)
+
+
 @pytest.mark.parametrize('data', [None, 3, 'text', [], MappingProxyType({})])
 def test_what_is_no_mapping_is_refused(data):
     with pytest.raises(RecordError):

@@ -3,6 +3,7 @@
 """Where a node keeps its incidents, and what it says of them."""
 
 from pathlib import Path
+import shlex
 import traceback
 
 from rclpy.logging import get_logging_directory
@@ -40,7 +41,7 @@ def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
     except Exception as problem:
         reason = ' '.join(f'{type(problem).__name__}: {problem}'.split())
         return f'; no file was written to replay it: {reason}', None
-    return f'; to replay it: ./run exec replay {path}', path
+    return f'; to replay it: ./run exec replay {shlex.quote(str(path))}', path
 
 
 def incident_of(problem: BaseException) -> Incident | None:

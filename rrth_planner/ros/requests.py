@@ -154,8 +154,9 @@ def plan_request(
                 moved = _check_present(heard, parameters, clock(), inputs, plan.trajectory, start)
                 if moved is not None:
                     incident = disagreement_incident(question, *moved)
+                    sentence = f'{incident.sentence}, seed {plan.seed}'
                     return PlanOutcome(
-                        ErrorCode.FAILURE, incident.sentence, plan, inputs, incident=incident
+                        ErrorCode.FAILURE, sentence, plan, inputs, incident=incident
                     )
                 return PlanOutcome(code, plan.sentence, plan, inputs, start, question)
         raise RequestError(

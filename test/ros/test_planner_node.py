@@ -456,7 +456,7 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
     incident = read_incident(file)
     # Planned for two boxes, judged for three.
     assert len(incident.question.scene.boxes) == 2
-    assert [box.name for box in incident.present.boxes][-1] == 'far'
+    assert [box.name for box in incident.present.boxes][-1] == 'far/0'
     assert stranger.answer().success
     assert len(asked) == 2
 
