@@ -109,13 +109,13 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
         if excess <= 0.0:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is {-excess:.4f} m inside box "{box.name}"',
+                f'the target ({where}) m is inside box "{box.name}"',
             )
         if excess <= margin:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is about {excess:.4f} m, less than the margin of '
-                f'{margin:g} m, from box "{box.name}"',
+                f'the target ({where}) m is nearer to box "{box.name}" than the margin of '
+                f'{margin:g} m',
             )
     return None
 
@@ -128,21 +128,15 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
             'no posture within the joint limits aims at the target',
         )
     pairs: Counter[tuple[str, str]] = Counter()
-    least: dict[tuple[str, str], float] = {}
     for q, reach in zip(goals.q_blocked, goals.blocked_reaches, strict=True):
         distances = world.clearances(q, max(reach, world.ray_length))
         for bar, box in np.argwhere(distances < 0.0):
-            pair = (world.bar_names[bar], world.box_names[box])
-            pairs[pair] += 1
-            least[pair] = min(least.get(pair, np.inf), -float(distances[bar, box]))
+            pairs[world.bar_names[bar], world.box_names[box]] += 1
     blame = 'with next to no clearance'
     if pairs:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
-        blame = (
-            f'most often {bar} and box "{box}" ({share:.0f} %), at best {least[bar, box]:.4f} m '
-            'too deep'
-        )
+        blame = f'most often {bar} and box "{box}" ({share:.0f} %)'
     return Refusal(
         PlanStatus.GOAL_IN_COLLISION,
         f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',
