@@ -104,6 +104,8 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     assert out.splitlines()[-1] == (
         'not reproduced: the judges agree now that the recorded motion is free'
     )
+    stranger.publishers['joint_states'].publish(samples.joints())
+    stranger.wait_until(lambda: not inputs_of(planner).joints.value.velocities.any())
     assert stranger.answer().success
     assert len(list(tmp_path.iterdir())) == 1
 
