@@ -11,8 +11,10 @@ import numpy as np
 from rrth_planner.arm import tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.escape import beyond, touch_on_way_out
 from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
+from rrth_planner.leaving import leads_out
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
@@ -120,7 +122,7 @@ def plan_request(
                 _wait_for(start, clock, should_stop)
                 if should_stop():
                     raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-                _check_present(heard, parameters, clock(), inputs, plan.trajectory, start)
+                _check_present(heard, parameters, clock(), inputs, plan, start)
                 return PlanOutcome(code, plan.sentence, plan, inputs, start)
         raise RequestError(
             ErrorCode.TIMED_OUT,
@@ -149,6 +151,7 @@ def _plan(
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
         should_stop=should_stop,
         moving=None if start is None else start.takeover,
+        escape_depth=parameters.escape_depth,
     )
 
 
@@ -169,10 +172,12 @@ def _check_present(
     parameters: PlannerParameters,
     now: float,
     inputs: PlanInputs,
-    trajectory: Trajectory,
+    plan: MotionPlan,
     start: Start | None,
 ) -> None:
     """Raise RequestError where wearer or arm have moved so that the motion no longer fits."""
+    trajectory, escape_time = plan.trajectory, plan.escape_time
+    assert trajectory is not None
     present = heard.at(now, parameters, inputs.goal)
     expected = inputs.q_start
     if start is None:
@@ -198,9 +203,19 @@ def _check_present(
     # Both judges must agree, as they had to when it was planned.
     if not (
         world.is_valid(q_end, reach)
-        and certify(trajectory, world).is_proven
+        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
+        and certify(trajectory, world, escape_time).is_proven
+        and touch_on_way_out(
+            parameters.arm, present.scene, world, trajectory, escape_time, parameters.margin
+        )
+        is None
         and first_touch(
-            parameters.arm, present.scene, trajectory, parameters.margin, world.ray_length, reach
+            parameters.arm,
+            present.scene,
+            beyond(trajectory, escape_time),
+            parameters.margin,
+            world.ray_length,
+            reach,
         )
         is None
     ):
