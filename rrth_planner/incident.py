@@ -17,6 +17,7 @@ from rrth_planner.errors import RecordError
 from rrth_planner.question import PlanQuestion
 from rrth_planner.records import (
     entries,
+    number,
     plain,
     question_from_mapping,
     scene_from_mapping,
@@ -62,6 +63,8 @@ class Incident:
     present : Scene or None
         The wearer that the motion was judged for, where that is not the one it was planned for:
         he moved meanwhile.
+    escape_time : float
+        Until then the motion leads out of boxes that the arm was in [s].
     error, traceback : str
         The name of the error's type, and where it came from; empty for a disagreement.
     versions : mapping
@@ -81,6 +84,7 @@ class Incident:
     trajectory: Trajectory | None = None
     touch: Touch | None = None
     present: Scene | None = None
+    escape_time: float = 0.0
     error: str = ''
     traceback: str = ''
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -109,6 +113,7 @@ def disagreement_incident(
         trajectory=found.trajectory,
         touch=found.touch,
         present=present,
+        escape_time=found.escape_time,
         versions=versions(),
     )
 
@@ -171,6 +176,7 @@ def _incident(data: Any) -> Incident:
         ),
         touch=None if touch is None else touch_from_mapping(touch),
         present=None if present is None else scene_from_mapping(present, 'present'),
+        escape_time=number(given['escape_time'], 'escape_time', 's'),
         error=text(given['error'], 'error'),
         traceback=text(given['traceback'], 'traceback'),
         versions={

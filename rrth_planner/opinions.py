@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What each judge says of a motion, piece by piece: certificate, python-fcl, numpy oracle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 
 import numpy as np
@@ -10,8 +10,10 @@ from rrth_planner import oracle
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.escape import beyond, touch_on_way_out
 from rrth_planner.fcl_check import first_touch, nearest
 from rrth_planner.goal import PointingGoal
+from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Scene
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, Trajectory
@@ -82,6 +84,7 @@ def verdict_of(
     trajectory: Trajectory,
     margin: float,
     ray_guard_length: float,
+    escape_time: float = 0.0,
 ) -> Verdict:
     """
     Return what the judges say of a motion.
@@ -96,6 +99,8 @@ def verdict_of(
     trajectory : Trajectory
     margin, ray_guard_length : float
         [m].
+    escape_time : float
+        Until then the motion leads out of boxes that the arm was in: its pieces touch [s].
 
     """
     world = arm_world(arm, scene, margin, ray_guard_length)
@@ -112,9 +117,20 @@ def verdict_of(
         fcl=_closest(arm, scene, q_end[None], np.array([end]), reach),
         oracle=oracle.least_clearance(arm, scene, q_end[None], reach),
     )
+    is_out = escape_time == 0.0 or leads_out(trajectory, world, escape_time)
+    touch = touch_on_way_out(arm, scene, world, trajectory, escape_time, margin)
+    if touch is None:
+        rest = beyond(trajectory, escape_time)
+        touch = first_touch(arm, scene, rest, margin, ray_guard_length, reach)
+        if touch is not None:
+            touch = replace(touch, time=escape_time + touch.time)
     return Verdict(
-        is_proven=certify(trajectory, world).is_proven and world.is_valid(q_end, reach),
-        touch=first_touch(arm, scene, trajectory, margin, ray_guard_length, reach),
+        is_proven=(
+            is_out
+            and certify(trajectory, world, escape_time).is_proven
+            and world.is_valid(q_end, reach)
+        ),
+        touch=touch,
         clearance=min(opinion.oracle for opinion in (*opinions, last)),
         opinions=(*opinions, last),
     )

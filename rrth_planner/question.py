@@ -34,6 +34,8 @@ class PlanQuestion:
     seed : int
         >= 0.
     moving : Takeover or None
+    escape_depth : float
+        >= 0 [m].
 
     Raises
     ------
@@ -52,6 +54,7 @@ class PlanQuestion:
     ray_guard_length: float
     seed: int
     moving: Takeover | None = None
+    escape_depth: float = 0.05
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -66,7 +69,8 @@ class PlanQuestion:
         for name, width in widths.items():
             if width != dof:
                 raise OptionsError(f'{name}: of {width} joints, expected those of the arm, {dof}')
-        for name, value in (('margin', self.margin), ('ray_guard_length', self.ray_guard_length)):
+        for name in ('margin', 'ray_guard_length', 'escape_depth'):
+            value = getattr(self, name)
             if not 0.0 <= value < float('inf'):
                 raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
         if self.seed < 0:

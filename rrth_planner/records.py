@@ -64,6 +64,7 @@ def question_from_mapping(data: Any) -> PlanQuestion:
         ray_guard_length=number(given['ray_guard_length'], 'ray_guard_length', 'm'),
         seed=_whole(given['seed'], 'seed'),
         moving=None if given['moving'] is None else _takeover(given['moving'], arm.dof),
+        escape_depth=number(given['escape_depth'], 'escape_depth', 'm'),
     )
 
 

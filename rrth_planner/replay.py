@@ -122,6 +122,7 @@ def verdict_of_recorded(incident: Incident, trajectory: Trajectory) -> Verdict:
         trajectory,
         question.margin,
         question.ray_guard_length,
+        incident.escape_time,
     )
 
 

@@ -40,16 +40,22 @@ class Disagreement:
         Never published.
     touch : Touch
         What python-fcl saw first.
+    escape_time : float
+        Until then the motion leads out of boxes that the arm was in [s].
 
     """
 
     trajectory: Trajectory
     touch: Touch
+    escape_time: float = 0.0
 
     def sentence(self, margin: float) -> str:
         """Return what to say of it, for the margin that was to be kept [m]."""
         touch = self.touch
+        expected = f'expected at least {margin:g} m'
+        if touch.time < self.escape_time:
+            expected = 'on the way out of the wearer; expected no part deeper than at the start'
         return (
             f'the two collision checks disagree: {touch.bar} is {touch.distance:.4f} m from box '
-            f'"{touch.box}" at {touch.time:.3f} s, expected at least {margin:g} m'
+            f'"{touch.box}" at {touch.time:.3f} s, {expected}'
         )

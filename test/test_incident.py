@@ -93,6 +93,7 @@ def incidents(draw):
         ray_guard_length=draw(st.floats(0.0, 1e300)),
         seed=draw(st.integers(0, 2**63)),
         moving=draw(st.sampled_from([None, moving])),
+        escape_depth=draw(st.floats(0.0, 1.0)),
     )
     is_disagreement = draw(st.booleans())
     touch = Touch(draw(ANY), draw(ANY), draw(st.text()), draw(st.text()))
@@ -104,6 +105,7 @@ def incidents(draw):
         trajectory=draw(trajectories()) if is_disagreement else None,
         touch=touch if is_disagreement else None,
         present=draw(st.none() | scenes),
+        escape_time=draw(st.floats(0.0, 9.0)),
         error=draw(st.text()),
         traceback=draw(st.text()),
         versions=draw(st.dictionaries(st.text(), st.text(), max_size=3)),

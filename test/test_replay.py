@@ -20,6 +20,7 @@ from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import takeover
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import Trajectory
+from rrth_planner.world import arm_world
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 
 pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
@@ -53,9 +54,10 @@ def disagreement(monkeypatch, question=QUESTION):
         plan = pipeline.plan_motion(**question.arguments)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None
+    when = plan.disagreement.escape_time + TOUCH.time
     assert plan.sentence.startswith(
-        'the two collision checks disagree: ray is 0.0123 m from box "head" at 0.250 s, expected '
-        'at least 0.02 m, seed '
+        f'the two collision checks disagree: ray is 0.0123 m from box "head" at {when:.3f} s, '
+        'expected at least 0.02 m, seed '
     )
     return disagreement_incident(question, plan.disagreement)
 
@@ -132,6 +134,26 @@ def test_the_wearer_that_a_motion_was_judged_for_is_the_one_asked_about(monkeypa
     assert '8 boxes, 1 when judged' in out
     assert 'certificate: not proven' in out
     assert out.splitlines()[-1].endswith('the recorded motion is not proven free')
+
+
+def test_a_motion_that_first_leaves_a_box_is_judged_as_one(monkeypatch, capsys):
+    rng, world = np.random.default_rng(4), arm_world(table_1_arm(), wearer(), MARGIN, RAY)
+    for _ in range(100):
+        question = replace(QUESTION, q_start=rng.uniform(*world.bounds))
+        if world.is_valid(question.q_start):
+            continue
+        plan = pipeline.plan_motion(**question.arguments)
+        if plan.escape_time > 0.0:
+            break
+    incident = disagreement(monkeypatch, question)
+    assert incident.escape_time == plan.escape_time
+    assert incident.touch.time == plan.escape_time + TOUCH.time
+    assert replay.replay(incident) == 1
+    out = capsys.readouterr().out
+    assert 'certificate: proven free' in out
+    assert out.splitlines()[-1].endswith('the recorded motion is free')
+    disagree(monkeypatch)
+    assert replay.replay(incident) == 0
 
 
 def test_every_judge_has_an_opinion_on_every_piece(monkeypatch):

@@ -38,6 +38,14 @@ def settings(dof: int) -> tuple[Setting, ...]:
         Setting(
             'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
         ),
+        Setting(
+            'escape_depth',
+            0.05,
+            0.0,
+            1.0,
+            'm',
+            'an arm at rest less deep in the boxes with their margin first leaves them; 0: never',
+        ),
         Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
         Setting(
             'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
@@ -87,7 +95,7 @@ class PlannerParameters:
     base_frame : str
     seed : int
         -1: fresh each time.
-    margin, ray_guard_length : float
+    margin, ray_guard_length, escape_depth : float
         [m].
     body_timeout, joint_timeout : float
         [s]; 0: never.
@@ -107,6 +115,7 @@ class PlannerParameters:
     seed: int
     margin: float
     ray_guard_length: float
+    escape_depth: float
     body_timeout: float
     joint_timeout: float
     max_body_speed: float
@@ -140,6 +149,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         seed=values['seed'],
         margin=values['margin'],
         ray_guard_length=values['ray_guard_length'],
+        escape_depth=values['escape_depth'],
         body_timeout=values['body_timeout'],
         joint_timeout=values['joint_timeout'],
         max_body_speed=values['max_body_speed'],

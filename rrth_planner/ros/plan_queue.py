@@ -227,6 +227,7 @@ class PlanQueue:
                     trajectory=outcome.trajectory,
                     start_time=begin or self._now(),
                     reach=outcome.plan.reach,
+                    escape_time=outcome.plan.escape_time,
                 ),
                 outcome.inputs.goal,
             )

@@ -3,7 +3,7 @@
 """One request: from what was heard to an outcome with a code, whatever happens."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import secrets
 import time
 
@@ -11,9 +11,11 @@ import numpy as np
 from rrth_planner.arm import tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.escape import beyond, touch_on_way_out
 from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
+from rrth_planner.leaving import leads_out
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.question import PlanQuestion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
@@ -151,7 +153,7 @@ def plan_request(
                 _wait_for(start, clock, should_stop)
                 if should_stop():
                     raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-                moved = _check_present(heard, parameters, clock(), inputs, plan.trajectory, start)
+                moved = _check_present(heard, parameters, clock(), inputs, plan, start)
                 if moved is not None:
                     incident = disagreement_incident(question, *moved)
                     sentence = f'{incident.sentence}, seed {plan.seed}'
@@ -186,6 +188,7 @@ def _question(
         ray_guard_length=parameters.ray_guard_length,
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
         moving=None if start is None else start.takeover,
+        escape_depth=parameters.escape_depth,
     )
 
 
@@ -206,7 +209,7 @@ def _check_present(
     parameters: PlannerParameters,
     now: float,
     inputs: PlanInputs,
-    trajectory: Trajectory,
+    plan: MotionPlan,
     start: Start | None,
 ) -> tuple[Disagreement, Scene] | None:
     """
@@ -215,6 +218,8 @@ def _check_present(
     Return what the two judges disagree about in the present world, and its wearer; None where they
     agree.
     """
+    trajectory, escape_time = plan.trajectory, plan.escape_time
+    assert trajectory is not None
     present = heard.at(now, parameters, inputs.goal)
     expected = inputs.q_start
     if start is None:
@@ -237,17 +242,27 @@ def _check_present(
     )
     q_end: Array = trajectory.positions[-1]
     reach = float(np.linalg.norm(inputs.goal.target - tool_pose(parameters.arm, q_end)[:3, 3]))
-    if not (world.is_valid(q_end, reach) and certify(trajectory, world).is_proven):
+    if not (
+        world.is_valid(q_end, reach)
+        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
+        and certify(trajectory, world, escape_time).is_proven
+    ):
         raise RequestError(
             ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
             'the wearer moved while the motion was planned, and it is no longer proven free of '
             'the present body',
         )
     # Both judges must agree, as they had to when it was planned.
-    touch = first_touch(
-        parameters.arm, present.scene, trajectory, parameters.margin, world.ray_length, reach
-    )
-    return None if touch is None else (Disagreement(trajectory, touch), present.scene)
+    arm, margin = parameters.arm, parameters.margin
+    touch = touch_on_way_out(arm, present.scene, world, trajectory, escape_time, margin)
+    if touch is None:
+        rest = beyond(trajectory, escape_time)
+        touch = first_touch(arm, present.scene, rest, margin, world.ray_length, reach)
+        if touch is not None:
+            touch = replace(touch, time=escape_time + touch.time)
+    if touch is None:
+        return None
+    return Disagreement(trajectory, touch, escape_time), present.scene
 
 
 def _is_same(one: Scene, other: Scene) -> bool:
