@@ -26,7 +26,7 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
-from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import requests  # noqa: E402
@@ -255,6 +255,66 @@ def test_each_obstacle_to_planning_has_its_code(start, messages, answer):
     assert response.message.startswith(answer)
     stranger.wait_until(lambda: stranger.value('last code') == answer.split(':')[0])
     assert not stranger.heard['joint_trajectory']
+
+
+def leaned():
+    """Return a wearer whose hand the tool of the folded arm is in."""
+    arm, body = load_arm(), wearer()
+    T = tool_pose(arm, np.array(FOLDED))
+    # Behind the ray, 0.5 m down, which runs 0.0075 m inside its edge.
+    center = T[:3, 3] + 0.5 * T[:3, 2] - np.array([0.05 + 0.02 - 0.012, 0.0, 0.0])
+    body.markers.append(box('hand', center=tuple(center), size=(0.1, 0.1, 0.1)))
+    return body
+
+
+def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(start):
+    planner, stranger = start(seed=3)
+    say_all(planner, stranger, body_boxes=leaned())
+    response = stranger.answer()
+    assert response.success, response.message
+    assert ', first leaves box "hand/0", 0.0275 m deep at pointing ray' in response.message
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    # The present body, said again, does not stop it.
+    stranger.publishers['body_boxes'].publish(leaned())
+    stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
+    (msg,) = stranger.heard['joint_trajectory']
+    trajectory = joint_trajectory_from_msg(msg, JOINTS)
+    np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
+    for values in (trajectory.velocities, trajectory.accelerations):
+        assert not values[[0, -1]].any()
+
+
+def test_deeper_than_escape_depth_is_refused(start):
+    planner, stranger = start(escape_depth=0.01)
+    say_all(planner, stranger, body_boxes=leaned())
+    response = stranger.answer()
+    assert not response.success
+    assert response.message.startswith(
+        'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": 0.0275 m '
+        'deep in it with its margin, expected less than 0.01 m (escape_depth)'
+    )
+    planner.set_parameters([Parameter(name='escape_depth', value=0.03)])
+    assert stranger.answer().success
+
+
+def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger, body_boxes=leaned())
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    moves = iter((leaned(), fenced()))
+
+    def plan_while_the_body_changes(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        body, changed = inputs.body.value, next(moves)
+        changed.markers.append(box('far', center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1)))
+        stranger.publishers['body_boxes'].publish(changed)
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_body_changes)
+    assert stranger.answer().success
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
 
 
 @pytest.mark.parametrize(
