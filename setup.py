@@ -39,6 +39,7 @@ setup(
             'planner_node = rrth_planner.ros.planner_node:main',
             'playback_node = rrth_planner.ros.playback_node:main',
             'demo = rrth_planner.ros.demo:main',
+            'replay = rrth_planner.replay:main',
             'reproduce = rrth_planner.reproduce:main',
         ],
     },

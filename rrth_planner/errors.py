@@ -21,3 +21,7 @@ class OptionsError(RrthError):
 
 class MessageError(RrthError):
     """Input from the wire that is refused."""
+
+
+class RecordError(RrthError):
+    """A record of an incident that says too little, too much or nothing."""

@@ -14,6 +14,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.fcl_shapes import Bar, boxes_of, DOUBT
 from rrth_planner.reach import bar_ends
 from rrth_planner.scene import Scene
+from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, Trajectory
 from rrth_planner.travel import travelled
 
@@ -23,28 +24,6 @@ PERIOD = 0.001
 TOLERANCE = 3e-6
 # Looks into a gap at once: where they are many, some may turn out to be needless.
 MOST_LOOKS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """
-    Where a trajectory comes nearer to the wearer than the margin.
-
-    Parameters
-    ----------
-    time : float
-        [s].
-    distance : float
-        From the body itself [m].
-    bar, box : str
-        Which part of the arm, which box.
-
-    """
-
-    time: float
-    distance: float
-    bar: str
-    box: str
 
 
 def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Touch:

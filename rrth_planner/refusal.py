@@ -38,8 +38,19 @@ class Refusal:
     sentence: str
 
 
-def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) -> Refusal | None:
-    """Return why no motion can start at q_start, shape (dof,), or None."""
+def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None:
+    """
+    Return why no motion can start at q_start, or None.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    world : World
+        Its boxes grown by the margin and what must be left beyond it.
+    q_start : ndarray, shape (dof,)
+        [rad].
+
+    """
     for k, name in enumerate(arm.joint_names):
         low, high = arm.bounds[:, k]
         if not low <= q_start[k] <= high:
@@ -50,13 +61,32 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) ->
             )
     if world.is_valid(q_start):
         return None
-    distances = world.clearances(q_start)
-    bar, box = np.unravel_index(int(np.argmin(distances)), distances.shape)
-    return Refusal(
-        PlanStatus.START_IN_COLLISION,
-        f'{world.bar_names[bar]} is {_how_close(distances[bar, box], margin)} box '
-        f'"{world.box_names[box]}"',
-    )
+    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm touches the wearer')
+
+
+def depth_sentence(world: World, depths: Array, margin: float) -> str:
+    """
+    Say which part of the arm is deepest in which box, and how deep.
+
+    Parameters
+    ----------
+    world : World
+        Its boxes grown by the margin.
+    depths : ndarray, shape (n_bars, m)
+        As `leaving.box_depths` [m].
+    margin : float
+        [m].
+
+    """
+    bar, box = np.unravel_index(int(np.argmax(depths)), depths.shape)
+    depth = max(0.0, float(depths[bar, box]))
+    distance = margin - depth
+    part, name = world.bar_names[bar], world.box_names[box]
+    if distance <= 0.0:
+        where = f'{-distance:.4f} m inside box "{name}"'
+    else:
+        where = f'about {distance:.4f} m, less than the margin of {margin:g} m, from box "{name}"'
+    return f'{part} is {where}: {depth:.4f} m deep in it with its margin'
 
 
 def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) -> Refusal | None:
@@ -92,14 +122,6 @@ def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) 
     )
 
 
-def _how_close(clearance: float, margin: float) -> str:
-    """Say a clearance from the grown box as a distance from the body itself."""
-    distance = clearance + margin
-    if distance <= 0.0:
-        return f'{-distance:.4f} m inside'
-    return f'about {distance:.4f} m, less than the margin of {margin:g} m, from'
-
-
 def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal | None:
     """Return why a target cannot be pointed at from anywhere, or None."""
     where = ', '.join(f'{value:.3f}' for value in goal.target)
@@ -109,13 +131,13 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
         if excess <= 0.0:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is inside box "{box.name}"',
+                f'the target ({where}) m is inside box "{box.name}", {-excess:.4f} m deep',
             )
         if excess <= margin:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is nearer to box "{box.name}" than the margin of '
-                f'{margin:g} m',
+                f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
+                f'margin of {margin:g} m: {margin - excess:.4f} m deep in it with its margin',
             )
     return None
 
@@ -128,15 +150,21 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
             'no posture within the joint limits aims at the target',
         )
     pairs: Counter[tuple[str, str]] = Counter()
+    least: dict[tuple[str, str], float] = {}
     for q, reach in zip(goals.q_blocked, goals.blocked_reaches, strict=True):
         distances = world.clearances(q, max(reach, world.ray_length))
         for bar, box in np.argwhere(distances < 0.0):
-            pairs[world.bar_names[bar], world.box_names[box]] += 1
+            pair = (world.bar_names[bar], world.box_names[box])
+            pairs[pair] += 1
+            least[pair] = min(least.get(pair, np.inf), float(-distances[bar, box]))
     blame = 'with next to no clearance'
     if pairs:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
-        blame = f'most often {bar} and box "{box}" ({share:.0f} %)'
+        blame = (
+            f'most often {bar} and box "{box}" ({share:.0f} %), at least {least[bar, box]:.4f} m '
+            'deep in it with its margin'
+        )
     return Refusal(
         PlanStatus.GOAL_IN_COLLISION,
         f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',

@@ -19,6 +19,8 @@ RESERVE = 0.99
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
 SEARCH_SPACING = 1e-3
+# Two points of a part of a motion are at least so far apart [s].
+CLOSEST = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -115,6 +117,36 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
         positions=np.concatenate([before.positions, after.positions[1:]]),
         velocities=np.concatenate([before.velocities, after.velocities[1:]]),
         accelerations=np.concatenate([before.accelerations, after.accelerations[1:]]),
+    )
+
+
+def until(trajectory: Trajectory, time: float) -> Trajectory:
+    """
+    Return a trajectory up to a time within it [s].
+
+    A part of a quintic is the quintic through its ends: nothing changes but the points.
+    """
+    if time >= trajectory.duration:
+        return trajectory
+    q, v, a = sample(trajectory, [time])
+    is_before = trajectory.times < time - CLOSEST
+    if not is_before.any():
+        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
+    return Trajectory(
+        times=np.append(trajectory.times[is_before], time),
+        positions=np.concatenate([trajectory.positions[is_before], q]),
+        velocities=np.concatenate([trajectory.velocities[is_before], v]),
+        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
+    )
+
+
+def after(trajectory: Trajectory, index: int) -> Trajectory:
+    """Return a trajectory from one of its points on."""
+    return Trajectory(
+        times=trajectory.times[index:] - trajectory.times[index],
+        positions=trajectory.positions[index:],
+        velocities=trajectory.velocities[index:],
+        accelerations=trajectory.accelerations[index:],
     )
 
 

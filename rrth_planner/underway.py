@@ -9,13 +9,12 @@ import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import follows, phase_of
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world
 
-# Two points of a part of a motion are at least so far apart [s].
-CLOSEST = 1e-4
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
 
@@ -32,12 +31,15 @@ class RunningMotion:
         [s].
     reach : float
         How much of the pointing ray must be clear at the end [m].
+    escape_time : float
+        Until then the motion may lead out of the wearer [s].
 
     """
 
     trajectory: Trajectory
     start_time: float
     reach: float = 0.0
+    escape_time: float = 0.0
 
     def phase(self, q: Array, v: Array, taken: float, now: float) -> float | None:
         """
@@ -117,12 +119,18 @@ def is_still_free(
     """
     trajectory = running.trajectory
     q_end = trajectory.positions[-1]
+    checked = phase
+    if phase < running.escape_time:
+        world = arm_world(arm, scene, margin, ray_guard_length)
+        if not leads_out(trajectory, world, running.escape_time, phase):
+            return False
+        checked = running.escape_time
     if speeds is None or not speeds.any():
         world = arm_world(arm, scene, margin, ray_guard_length)
-        is_free = certify(trajectory, world, phase).is_proven
+        is_free = certify(trajectory, world, checked).is_proven
         return is_free and world.is_valid(q_end, running.reach)
     # Within a stretch of time the boxes are as large as they get at its end.
-    now = min(max(phase, 0.0), trajectory.duration)
+    now = min(max(checked, 0.0), trajectory.duration)
     for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
         world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
         if not certify(between(trajectory, begin, end), world).is_proven:

@@ -74,7 +74,7 @@ def diagnostics_msg(
     parameters: PlannerParameters,
     report: PlanReport,
     guard: tuple[str, str] = ('', ''),
-    figures: Mapping[str, Figures] = MappingProxyType({}),
+    figures: Mapping[str, Figures | int | str] = MappingProxyType({}),
 ) -> DiagnosticArray:
     """
     Return the diagnostics of the planner.
@@ -94,7 +94,7 @@ def diagnostics_msg(
     guard : tuple of str
         What the guard of the running motion does, and why.
     figures : mapping
-        Of what it did, by name.
+        Of what it did, and of incidents, by name.
 
     """
     body = heard.body.value.at(now)

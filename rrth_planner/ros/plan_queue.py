@@ -18,6 +18,7 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
+from rrth_planner.ros.incidents import cause_of, incident_of, keep, PlanError
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
@@ -153,7 +154,7 @@ class PlanQueue:
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
         """Plan and publish; called in the worker's thread."""
-        figures, shown = PlanReport(), None
+        figures, shown, incident, outcome = PlanReport(), None, None, None
         parameters = self._reporter.parameters
         n_brakes, running = self.guard.n_brakes, self.guard.running
         try:
@@ -166,6 +167,7 @@ class PlanQueue:
                 None if running is None else running.trajectory,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
+            incident = outcome.incident
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
             refusal = self._settle(ticket, outcome, parameters, n_brakes)
@@ -187,6 +189,11 @@ class PlanQueue:
             with self._lock:
                 self._open.discard(ticket)
             code, sentence, shown = ErrorCode.FAILURE, _in_a_sentence(problem), None
+            incident = incident_of(_with_question(problem, outcome))
+        if incident is not None:
+            noted, file = keep(incident, parameters.incident_folder)
+            sentence += noted
+            self._reporter.incident(file)
 
         def tool_path() -> Path:
             return Path() if shown is None else self._tool_path(shown, parameters)
@@ -221,6 +228,7 @@ class PlanQueue:
                     trajectory=outcome.trajectory,
                     start_time=begin or self._now(),
                     reach=outcome.plan.reach,
+                    escape_time=outcome.plan.escape_time,
                 ),
                 outcome.inputs.goal,
             )
@@ -276,4 +284,14 @@ class PlanQueue:
 
 
 def _in_a_sentence(problem: Exception) -> str:
-    return f'planning failed unexpectedly: {type(problem).__name__}: {problem}'
+    cause = cause_of(problem)
+    return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'
+
+
+def _with_question(problem: Exception, outcome: Any) -> Exception:
+    """Return an error with what was asked, where that is known."""
+    if outcome is None or outcome.question is None:
+        return problem
+    known = PlanError(outcome.question, outcome.trajectory)
+    known.__cause__ = problem
+    return known

@@ -3,6 +3,7 @@
 """Tell how requests ended: to the log, and to diagnostics."""
 
 from dataclasses import replace
+from pathlib import Path
 from threading import Lock
 import time
 
@@ -41,6 +42,7 @@ class Reporter:
         # What the guard of the running motion does, and why.
         self.guard = ('no motion', '')
         self._recertified, self._braked = Figures(), Figures()
+        self._n_incidents, self._last_incident = 0, ''
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -59,6 +61,11 @@ class Reporter:
     def braked(self, elapsed: float) -> None:
         """Count a brake, and how long after the body's arrival it was published [s]."""
         self._braked.add(elapsed)
+
+    def incident(self, file: Path | None) -> None:
+        """Count an incident, and keep the name of its file if there is one."""
+        self._n_incidents += 1
+        self._last_incident = '' if file is None else str(file)
 
     def publish_soon(self) -> None:
         """Publish the diagnostics within a tenth of a second."""
@@ -89,7 +96,12 @@ class Reporter:
                     self.parameters,
                     self.report,
                     self.guard,
-                    {'motions held against a new body': self._recertified, 'brakes': self._braked},
+                    {
+                        'motions held against a new body': self._recertified,
+                        'brakes': self._braked,
+                        'incidents': self._n_incidents,
+                        'last incident': self._last_incident,
+                    },
                 )
             )
 
@@ -119,6 +131,8 @@ class Reporter:
         logger = self._node.get_logger()
         if is_solved:
             logger.info(text)
+        elif code is ErrorCode.FAILURE:
+            logger.error(text)
         else:
             logger.warning(text)
         self.publish()
