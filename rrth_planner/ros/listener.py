@@ -60,13 +60,20 @@ class Listener:
         self.on_body: Callable[[], None] = lambda: None
         self._history = BodyHistory()
         self._subscriptions = [
-            self._subscribe(MarkerArray, 'body_boxes', inputs.body, self._on_body, self._on_body),
+            self._subscribe(
+                MarkerArray, 'body_boxes', inputs.body, self._on_body, on_late=self._on_body
+            ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
             self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
         ]
 
     def _subscribe(
-        self, kind: type, topic: str, heard: Input[Any], *hearers: Any
+        self,
+        kind: type,
+        topic: str,
+        heard: Input[Any],
+        on_message: Callable[[Any, int], None],
+        on_late: Callable[[Any, int], None] | None = None,
     ) -> OpenSubscription:
         def refuse(problem: MessageError) -> None:
             def read() -> Any:
@@ -74,7 +81,7 @@ class Listener:
 
             self._take(heard, read, self._now())
 
-        return OpenSubscription(self._node, kind, topic, *hearers, on_refusal=refuse)
+        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse)
 
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
