@@ -110,7 +110,9 @@ class PlanInputs:
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
-        return takeover(joints.positions, joints.velocities, running, time - joints.taken)
+        # Speeds that overflow belong to no motion, and are refused as too fast.
+        with np.errstate(all='ignore'):
+            return takeover(joints.positions, joints.velocities, running, time - joints.taken)
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)
