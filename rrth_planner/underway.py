@@ -12,9 +12,11 @@ from rrth_planner.certificate import certify
 from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import follows, phase_of
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.trajectory import sample, Trajectory
 from rrth_planner.world import arm_world
 
+# Two points of a part of a motion are at least so far apart [s].
+CLOSEST = 1e-4
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rrth_planner.errors import one_line
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
@@ -125,7 +126,7 @@ def diagnostics_msg(
         hardware_id='rrth_planner',
         message=message,
     )
-    status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+    status.values = [KeyValue(key=key, value=one_line(value)) for key, value in values.items()]
     msg = DiagnosticArray(status=[status])
     msg.header.stamp = stamp
     return msg

@@ -4,6 +4,7 @@
 
 from enum import IntEnum
 
+from rrth_planner.errors import one_line
 from rrth_planner.status import PlanStatus
 
 
@@ -42,5 +43,5 @@ CODE_OF_STATUS = {
 
 
 def answer(code: ErrorCode, sentence: str) -> str:
-    """Return what a service answers: `NAME (number): sentence`."""
-    return f'{code.name} ({code.value}): {sentence}'
+    """Return what a service answers, in one line: `NAME (number): sentence`."""
+    return one_line(f'{code.name} ({code.value}): {sentence}')

@@ -19,6 +19,8 @@ from rrth_planner.takeover import REST_SPEED, Takeover, takeover
 from rrth_planner.trajectory import Trajectory
 
 T = TypeVar('T')
+# A message from further ahead was heard before the clock was set back: nobody knows when [s].
+CLOCK_STEP = 0.1
 
 
 class RequestError(RrthError):
@@ -66,8 +68,10 @@ class Input(Generic[T]):
         return True
 
     def age(self, now: float) -> float:
-        """Return the time since the last good message; inf before it [s]."""
-        return float('inf') if self.received is None else max(0.0, now - self.received)
+        """Return the time since the last good message; inf before it, or where unknown [s]."""
+        if self.received is None or now < self.received - CLOCK_STEP:
+            return float('inf')
+        return max(0.0, now - self.received)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +110,9 @@ class PlanInputs:
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
-        return takeover(joints.positions, joints.velocities, running, time - joints.taken)
+        # Speeds that overflow belong to no motion, and are refused as too fast.
+        with np.errstate(all='ignore'):
+            return takeover(joints.positions, joints.velocities, running, time - joints.taken)
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)

@@ -8,6 +8,7 @@ from typing import Any
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
+from rrth_planner.errors import MessageError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.bodies import read_edits
 from rrth_planner.ros.body_history import BodyHistory
@@ -59,10 +60,28 @@ class Listener:
         self.on_body: Callable[[], None] = lambda: None
         self._history = BodyHistory()
         self._subscriptions = [
-            OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body, self._on_body),
-            OpenSubscription(node, PointStamped, 'target', self._on_target),
-            OpenSubscription(node, JointState, 'joint_states', self._on_joints),
+            self._subscribe(
+                MarkerArray, 'body_boxes', inputs.body, self._on_body, on_late=self._on_body
+            ),
+            self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
+            self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
         ]
+
+    def _subscribe(
+        self,
+        kind: type,
+        topic: str,
+        heard: Input[Any],
+        on_message: Callable[[Any, int], None],
+        on_late: Callable[[Any, int], None] | None = None,
+    ) -> OpenSubscription:
+        def refuse(problem: MessageError) -> None:
+            def read() -> Any:
+                raise problem
+
+            self._take(heard, read, self._now())
+
+        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse)
 
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""

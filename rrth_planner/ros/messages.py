@@ -69,7 +69,9 @@ def goal_from_msg(
     point = position_of(msg.point, 'point')
     T = pose_in_base(msg.header.frame_id, base_frame, lookup)
     try:
-        return PointingGoal(T[:3, :3] @ point + T[:3, 3])
+        # What overflows is infinite, which a goal refuses.
+        with np.errstate(over='ignore', invalid='ignore'):
+            return PointingGoal(T[:3, :3] @ point + T[:3, 3])
     except SceneError as problem:
         raise MessageError(str(problem)) from problem
 
@@ -165,9 +167,11 @@ def joint_reading(
             )
         v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
         return JointReading(q, v, taken, received, float('inf'))
-    if before is None:
+    if before is None or received < before.received:
+        # A clock that was set back tells no time that passed.
         return JointReading(q, np.zeros_like(q), taken, received, received)
     step = max(received - before.received, 1e-9)
-    return JointReading(
-        q, (q - before.positions) / step, taken, received, before.received + DIFFERENCE_AGE
-    )
+    # What overflows is infinite, and never at rest.
+    with np.errstate(over='ignore'):
+        v = (q - before.positions) / step
+    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE)

@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
-from rrth_planner.kernels.jit import is_compiled
+from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.frames import FrameError
@@ -79,10 +79,10 @@ class PlannerNode(Node):
                 '(pip install python-fcl)'
             )
         if not is_compiled():
-            self.get_logger().info(
-                'compiling kernels, once for this machine: takes up to a minute'
-            )
-            compile_kernels()
+            how_often = 'at every start' if cache_folder() is None else 'once for this machine'
+            self.get_logger().info(f'compiling kernels, {how_often}: takes up to a minute')
+            if cache_folder() is not None:
+                compile_kernels()
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 

@@ -5,6 +5,7 @@
 from array import array
 import gc
 import sys
+import traceback
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -17,7 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rrth_planner.acceptance import accept
 from rrth_planner.arm import tool_pose
-from rrth_planner.errors import RrthError
+from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages import joint_trajectory_from_msg, pose_to_msg
@@ -26,10 +27,13 @@ from rrth_planner.ros.playback_parameters import (
     initial_positions,
     playback_rules,
 )
+from rrth_planner.ros.subscriptions import decoded
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
+# Of a trajectory; what is longer is not decoded, which would hold up the joint states.
+MOST_BYTES = 2 * 1024 * 1024
 # Two clocks are read as one when that takes no longer [ns]; else again, so many times.
 AT_ONCE, READINGS = 20_000, 5
 
@@ -61,7 +65,7 @@ class PlaybackNode(Node):
         self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
         self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
         self.create_subscription(
-            JointTrajectory, 'joint_trajectory', self._on_trajectory, reliable
+            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
         )
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_timer(
@@ -106,6 +110,15 @@ class PlaybackNode(Node):
         self._state.header.stamp = self._pose.header.stamp = stamp
         self._joint_states.publish(self._state)
         self._tool_pose.publish(self._pose)
+
+    def _on_raw_trajectory(self, data: bytes) -> None:
+        try:
+            self._on_trajectory(decoded(data, JointTrajectory, MOST_BYTES))
+        except MessageError as problem:
+            self.get_logger().warning(f'joint_trajectory refused: {problem}')
+        except Exception:
+            # Whatever it is, the arm keeps to what it does.
+            self.get_logger().error(traceback.format_exc())
 
     def _on_trajectory(self, msg: JointTrajectory) -> None:
         time, nanoseconds = self._advance()

@@ -10,12 +10,15 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rrth_planner.errors import one_line
 from rrth_planner.ros.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 
 PERIOD = 1.0
+# So many boxes are remembered as named.
+MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
 
@@ -110,8 +113,10 @@ class Reporter:
         expired = self._heard.body.value.at(now).expired
         new = [(key, part) for key, part in expired if key not in self._named]
         if new:
+            if len(self._named) > MOST_NAMED:
+                self._named = {key for key, _ in expired}
             self._named.update(key for key, _ in new)
-            names = ', '.join(f'"{box.name}"' for _, part in new for box in part.boxes)
+            names = one_line(', '.join(f'"{box.name}"' for _, p in new for box in p.boxes))
             self._node.get_logger().warning(
                 f'{self._heard.body.topic}: the lifetime of {names} has passed, plans no longer '
                 'regard them'
@@ -119,7 +124,7 @@ class Reporter:
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
         """Log and publish how a request ended, and return the answer to it."""
-        text = answer(code, sentence)
+        text, sentence = answer(code, sentence), one_line(sentence)
         is_solved = code is ErrorCode.SUCCESS
         self.report = replace(
             figures,

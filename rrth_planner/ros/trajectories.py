@@ -22,6 +22,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 REST_VELOCITY = float(np.finfo(np.float32).eps)
 # Residues of rounding at the ends, which are written as exact zeros.
 RESIDUE = 1e-6
+# More is refused: looking through them holds up the node.
+MOST_POINTS = 10_000
 UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
 
 
@@ -94,6 +96,8 @@ def joint_trajectory_from_msg(
         raise MessageError(f'joint_names: {names}, expected each of {list(joint_names)} once')
     if not msg.points:
         raise MessageError('points: none, expected at least one')
+    if len(msg.points) > MOST_POINTS:
+        raise MessageError(f'points: {len(msg.points)}, expected at most {MOST_POINTS}')
     times = [nanoseconds_of(point.time_from_start) for point in msg.points]
     if times[0] != 0:
         raise MessageError(
