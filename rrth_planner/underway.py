@@ -58,23 +58,32 @@ class RunningMotion:
         return None if found is None else found[0] + found[1] * (now - taken)
 
 
-def until(trajectory: Trajectory, time: float) -> Trajectory:
+def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     """
-    Return a trajectory up to a time within it [s].
+    Return the part of a trajectory between two times within it [s], which begins at time 0.
 
     A part of a quintic is the quintic through its ends: nothing changes but the points.
     """
-    if time >= trajectory.duration:
-        return trajectory
-    q, v, a = sample(trajectory, [time])
-    is_before = trajectory.times < time - CLOSEST
-    if not is_before.any():
-        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
+    states = sample(trajectory, [begin, end])
+    times = trajectory.times
+    is_inside = (times > begin + CLOSEST) & (times < end - CLOSEST)
+    if end - begin < CLOSEST:
+        return Trajectory(
+            times=np.zeros(1),
+            positions=states[0][1:],
+            velocities=states[1][1:],
+            accelerations=states[2][1:],
+        )
+    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    q, v, a = (
+        np.concatenate([ends[:1], row[is_inside], ends[1:]])
+        for ends, row in zip(states, rows, strict=True)
+    )
     return Trajectory(
-        times=np.append(trajectory.times[is_before], time),
-        positions=np.concatenate([trajectory.positions[is_before], q]),
-        velocities=np.concatenate([trajectory.velocities[is_before], v]),
-        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
+        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
+        positions=q,
+        velocities=v,
+        accelerations=a,
     )
 
 
@@ -116,7 +125,7 @@ def is_still_free(
     now = min(max(phase, 0.0), trajectory.duration)
     for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
         world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
-        if not certify(until(trajectory, end), world, begin).is_proven:
+        if not certify(between(trajectory, begin, end), world).is_proven:
             return False
     return world.is_valid(q_end, running.reach)
 

@@ -9,8 +9,8 @@ import time
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.braking import brake
 from rrth_planner.certificate import least_clearance
+from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
@@ -18,11 +18,14 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.scene import Scene
+from rrth_planner.takeover import follows
 from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
+# An arm that is not on its stop after this time is told again [s].
+PATIENCE = 0.05
 # An arm that is that long after the end of its motion is taken to have arrived [s].
 GRACE = 0.5
 
@@ -67,6 +70,7 @@ class Guard:
         self._state = Watch.IDLE
         # Motions that were planned before a brake are of no use after it.
         self.n_brakes = 0
+        self._stopped_from: RunningMotion | None = None
         self._before: tuple[Scene, float] | None = None
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
@@ -76,7 +80,7 @@ class Guard:
 
     def begin(self, running: RunningMotion, goal: PointingGoal) -> None:
         """Watch a motion from now on; the lock is held."""
-        self.running, self._goal = running, goal
+        self.running, self._goal, self._stopped_from = running, goal, None
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body()
@@ -112,18 +116,42 @@ class Guard:
                 self._reporter.recertified(time.perf_counter() - begin)
 
     def _on_timer(self) -> None:
-        """Stop an arm whose wearer is not seen any more."""
-        timeout = self._reporter.parameters.body_timeout
-        if self._state is Watch.IDLE or (timeout == 0.0 and self._state is not Watch.BRAKING):
+        """Stop an arm whose wearer is not seen any more, or that goes on for all that."""
+        if self._state is Watch.IDLE:
             return
         with self._lock:
-            now = self._now()
+            now, timeout = self._now(), self._reporter.parameters.body_timeout
+            self._insist(now)
             age, phase = self._heard.body.age(now), self._phase(now)
             if phase is None or self._state is not Watch.WATCHING or not 0.0 < timeout < age:
                 return
             scene = scene_of(self._heard.body.value.at(now))
             why = f'the body is {age:.3f} s old, expected at most {timeout:g} s (body_timeout)'
             self._stop(phase, now, scene, why, time.perf_counter())
+
+    def _insist(self, now: float) -> None:
+        """Stop the arm again where it is seen to go on with the motion it was to stop."""
+        stop, before, reading = self.running, self._stopped_from, self._heard.joints.value
+        if stop is None or before is None or reading is None:
+            return
+        elapsed = reading.taken - stop.start_time
+        if elapsed < PATIENCE or follows(stop.trajectory, elapsed, reading.positions):
+            return
+        self._stopped_from = None
+        phase = before.phase(reading.positions, reading.velocities, reading.taken, now)
+        if phase is None or phase >= before.trajectory.duration:
+            return
+        self._stopped_from, self.running = (
+            before,
+            RunningMotion(
+                trajectory=emergency_stop(
+                    before.trajectory, phase, self._reporter.parameters.limits
+                ),
+                start_time=now,
+            ),
+        )
+        self._publishers.publish_motion(self.running.trajectory, self._reporter.parameters, now)
+        self._node.get_logger().error('the arm did not stop as it was told: it is told again')
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where there is none any more."""
@@ -149,7 +177,7 @@ class Guard:
         if phase >= running.trajectory.duration:
             return
         stopped = RunningMotion(
-            trajectory=brake(running.trajectory, max(phase, 0.0), parameters.limits),
+            trajectory=emergency_stop(running.trajectory, phase, parameters.limits),
             start_time=now,
         )
         warning = ''
@@ -166,6 +194,7 @@ class Guard:
                 return
         self._publishers.publish_motion(stopped.trajectory, parameters, now)
         took = time.perf_counter() - begin
+        self._stopped_from = running
         self.running, self.n_brakes = stopped, self.n_brakes + 1
         sentence = (
             f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
