@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a soak is judged by: motions by the oracle, memory, answers; nothing of ROS but bytes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -55,7 +55,7 @@ def growth_of(memory: Sequence[float]) -> Growth:
 
 def verdict_on(
     arm: ArmModel,
-    scenes: Sequence[Scene],
+    scenes: Iterable[Scene],
     trajectory: Trajectory,
     period: float = COARSE,
     margin: float = MARGIN,
@@ -66,8 +66,8 @@ def verdict_on(
     Parameters
     ----------
     arm : ArmModel
-    scenes : sequence of Scene
-        The bodies before it was published, the newest first.
+    scenes : iterable of Scene
+        The bodies before it was published, the newest first; taken as far as needed.
     trajectory : Trajectory
     period : float
         Between two instants that are looked at [s].
@@ -76,11 +76,13 @@ def verdict_on(
 
     """
     q = states_of(trajectory, period)
+    looked_at: list[Scene] = []
     for k, scene in enumerate(scenes):
+        looked_at.append(scene)
         if first_contact(arm, scene, q, RAY, margin - SLACK) is None:
             return FREE if k < IN_FLIGHT else OLDER
     is_touching = all(
-        first_contact(arm, scene, q, RAY, 0.0) is not None for scene in scenes[:IN_FLIGHT]
+        first_contact(arm, scene, q, RAY, 0.0) is not None for scene in looked_at[:IN_FLIGHT]
     )
     return TOUCHES if is_touching else NEAR
 
@@ -119,7 +121,7 @@ def judge_bytes(task: tuple[bytes, tuple, bool]) -> tuple[str, bool]:
     arm = _arm()
     msg = deserialize_message(data, JointTrajectory)
     trajectory = joint_trajectory_from_msg(msg, arm.joint_names)
-    scenes = [scene_of_body(body) for body in bodies]
+    scenes = map(scene_of_body, bodies)
     word = verdict_on(arm, scenes, trajectory, FINE if is_fine else COARSE)
     return word, bool(msg.header.stamp.sec or msg.header.stamp.nanosec)
 
