@@ -16,7 +16,7 @@ from rrth_planner.world import arm_world
 from tqdm import tqdm
 
 from benchmarks.client import ros_client
-from benchmarks.draws import free_configurations, random_target
+from benchmarks.draws import random_target
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import process_of, SoakClient
 from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, RAY
@@ -24,8 +24,8 @@ from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, RAY
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
 ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'replan:=false', '--log-level', 'error']
-# Plans round one wearer, starts drawn for him, and plans between two looks at the memory.
-PER_WEARER, STARTS, SAMPLE = 1000, 100, 20
+# Plans round one wearer, fewest starts of so many drawn, plans between looks at the memory.
+PER_WEARER, STARTS, DRAWS, SAMPLE = 1000, 30, 2000, 20
 # Bodies before a motion that it may have been planned round.
 LOOKED_AT = 6
 # A new wearer has been heard, and the last messages have come [s].
@@ -46,6 +46,8 @@ class PlansRecord:
     n_asked, n_unanswered : int
     codes : Counter
         How often each code was answered.
+    examples : dict
+        The last answer of each code.
     calls : list of float
         How long the answers took [s].
     memory : list of (float, float)
@@ -71,6 +73,7 @@ class PlansRecord:
     n_asked: int = 0
     n_unanswered: int = 0
     codes: Counter = field(default_factory=Counter)
+    examples: dict[str, str] = field(default_factory=dict)
     calls: list[float] = field(default_factory=list)
     memory: list[tuple[float, float]] = field(default_factory=list)
     ages: list[float] = field(default_factory=list)
@@ -135,12 +138,11 @@ def _ask(
 ) -> None:
     rng, arm, process = np.random.default_rng(seed), load_arm(), process_of(NODE)
     begin = time.perf_counter()
-    starts = np.empty((0, arm.dof))
+    wearer, starts = 0, np.empty((0, arm.dof))
     with tqdm(total=n, unit='plan', file=sys.stderr, mininterval=PROGRESS) as bar:
         while record.n_asked < n and record.elapsed < longest:
             if record.n_asked % PER_WEARER == 0:
-                wearer = 1 + record.n_asked // PER_WEARER
-                starts = free_starts(rng, wearer)
+                wearer, starts = free_starts(rng, wearer + 1)
                 bodies.change(wearer)
                 client.hear(SETTLE)
             q = starts[rng.integers(len(starts))]
@@ -151,7 +153,9 @@ def _ask(
             if answer is None:
                 record.n_unanswered += 1
             else:
-                record.codes[answer.message.split(' ')[0]] += 1
+                code = answer.message.split(' ')[0]
+                record.codes[code] += 1
+                record.examples[code] = answer.message
                 record.calls.append(elapsed)
             record.elapsed = time.perf_counter() - begin
             if record.n_asked % SAMPLE == 0:
@@ -166,11 +170,20 @@ def _target(rng: np.random.Generator, k: int) -> Array:
     return target
 
 
-def free_starts(rng: np.random.Generator, wearer: int) -> Array:
-    """Return configurations that are free wherever a wearer sways, (n, dof) [rad]."""
-    scene = scene_of_body(BodyAt(0, -wearer, 0.0))
-    world = arm_world(load_arm(), scene, MARGIN + 2.0 * SWAY, RAY)
-    return free_configurations(rng, world, STARTS)
+def free_starts(rng: np.random.Generator, wearer: int) -> tuple[int, Array]:
+    """
+    Return the next wearer who leaves the arm some room, and configurations that are free of him.
+
+    They are free wherever he sways, shape (n, dof) [rad].
+    """
+    while True:
+        scene = scene_of_body(BodyAt(0, -wearer, 0.0))
+        world = arm_world(load_arm(), scene, MARGIN + 2.0 * SWAY, RAY)
+        drawn = rng.uniform(*world.bounds, (DRAWS, len(world.bounds[0])))
+        found = [q for q in drawn if world.is_valid(q)]
+        if len(found) >= STARTS:
+            return wearer, np.array(found)
+        wearer += 1
 
 
 def judge_all(client: SoakClient, log: list[BodyAt], verdicts: Counter) -> None:

@@ -117,7 +117,7 @@ def guard_targets(guard: GuardRecord) -> list[list[str]]:
 
 
 def _plans_text(plans: PlansRecord) -> str:
-    codes = [[code, str(n)] for code, n in plans.codes.most_common()]
+    codes = [[code, str(n), plans.examples.get(code, '')] for code, n in plans.codes.most_common()]
     verdicts = [
         [('braking: ' if is_brake else '') + word, str(n)]
         for (word, is_brake), n in sorted(plans.verdicts.items())
@@ -128,7 +128,7 @@ def _plans_text(plans: PlansRecord) -> str:
             f'{plans.n_asked} requests in {plans.elapsed / 60:.1f} min, while {plans.n_sent} '
             f'bodies were sent, median {np.median(gaps):.2f} ms and at most {gaps.max():.1f} ms '
             f'apart; {plans.n_motions} trajectories were published.',
-            markdown_table(('answer', 'requests'), codes),
+            markdown_table(('answer', 'requests', 'the last one'), codes),
             markdown_table(('verdict', 'trajectories'), verdicts),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),

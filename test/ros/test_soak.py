@@ -46,7 +46,7 @@ def swing(q_from, q_to):
 @pytest.fixture(scope='module')
 def motion():
     """Return a short motion that is free of the body."""
-    q = free_starts(np.random.default_rng(0), 1)[0]
+    q = free_starts(np.random.default_rng(0), 1)[1][0]
     return swing(q, q + 0.01)
 
 
@@ -178,7 +178,7 @@ def episode(motion, body, **changes):
 
 
 def test_contacts_are_told_apart():
-    q = free_starts(np.random.default_rng(0), 1)[0]
+    q = free_starts(np.random.default_rng(0), 1)[1][0]
     long = swing(q, q + [0.0, 0.0, 0.0, 1.0])
     there, here = hand_at(long, 1.0), hand_at(long, 0.0)
     # The tool is turned on the spot: a hand there is put right onto it.
