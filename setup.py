@@ -16,7 +16,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
         (f'{share}/launch', sorted(glob('launch/*.py'))),
-        (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/config', sorted(glob('config/*.yaml') + glob('config/*.xml'))),
         (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
         (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
     ],

@@ -36,6 +36,7 @@ from rrth_planner.refusal import (
     Refusal,
     start_refusal,
     target_refusal,
+    within_limits,
 )
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
@@ -149,6 +150,7 @@ def plan_motion(
 
     """
     begin = time.perf_counter()
+    q_start = within_limits(arm, q_start)
     world = _world_of(arm, scene, margin, ray_guard_length)
     lead, escape, q_from, disagreement = None, None, q_start, None
     refusal = start_refusal(arm, _grown(world, SPARES[-1]), q_start)

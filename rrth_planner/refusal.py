@@ -17,6 +17,8 @@ from rrth_planner.takeover import Lead
 from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
 
+# A joint this far beyond its limit is at it [rad, m].
+ROUNDING = 1e-6
 # A joint that moves faster than its limit by no more than this share is let pass.
 EXCESS = 0.005
 
@@ -38,6 +40,12 @@ class Refusal:
     sentence: str
 
 
+def within_limits(arm: ArmModel, q: Array) -> Array:
+    """Return a configuration, (dof,), with joints that are past a limit by rounding at it."""
+    near: Array = np.clip(q, *arm.bounds)
+    return near if float(np.abs(near - q).max()) <= ROUNDING else q
+
+
 def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None:
     """
     Return why no motion can start at q_start, or None.
@@ -53,7 +61,7 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None
     """
     for k, name in enumerate(arm.joint_names):
         low, high = arm.bounds[:, k]
-        if not low <= q_start[k] <= high:
+        if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
             unit = 'm' if arm.is_prismatic[k] else 'rad'
             return Refusal(
                 PlanStatus.START_OUT_OF_BOUNDS,
@@ -105,7 +113,7 @@ def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) 
     low, high = arm.bounds
     beyond = np.maximum(low - ways, ways - high).max(axis=0)
     k = int(beyond.argmax())
-    if beyond[k] > 0.0:
+    if beyond[k] > ROUNDING:
         unit = 'm' if arm.is_prismatic[k] else 'rad'
         return Refusal(
             PlanStatus.START_MOVES,
@@ -113,7 +121,9 @@ def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) 
             f'limit by {beyond[k]:.4f} {unit}, expected an arm at rest or further from it',
         )
     is_free = certify(lead.trajectory, world).is_proven
-    if is_free and world.is_edge_valid(lead.trajectory.positions[-1], lead.q_stop):
+    if is_free and world.is_edge_valid(
+        np.clip(lead.trajectory.positions[-1], low, high), np.clip(lead.q_stop, low, high)
+    ):
         return None
     return Refusal(
         PlanStatus.START_MOVES,

@@ -15,6 +15,8 @@ from rrth_planner.takeover import follows, phase_of
 from rrth_planner.trajectory import sample, Trajectory
 from rrth_planner.world import arm_world
 
+# How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
+SLOW, LATEST = 0.05, 0.05
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
 # Stretches of time in each of which boxes that move are as large as they get in it.
@@ -57,7 +59,15 @@ class RunningMotion:
         """
         guess = taken - self.start_time
         if follows(self.trajectory, guess, q):
-            return now - self.start_time
+            # The arm began when it heard of the motion: a little late, which at 4 rad/s^2 is more
+            # than a controller lets a motion that takes over be off in velocity.
+            at = guess
+            for _ in range(2):
+                p, w, _ = (values[0] for values in sample(self.trajectory, [at]))
+                if np.abs(w).max() > SLOW:
+                    at += float((q - p) @ w / (w @ w))
+                at = min(max(at, guess - LATEST), guess + LATEST)
+            return at + now - taken
         found = phase_of(q, v, self.trajectory)
         return None if found is None else found[0] + found[1] * (now - taken)
 

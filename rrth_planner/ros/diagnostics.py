@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import math
 from types import MappingProxyType
 from typing import Any
 
@@ -12,6 +13,9 @@ from rrth_planner.errors import one_line
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
+
+# Durations are counted in bins, so many a decade from the shortest on [s].
+BINS, DECADES, SHORTEST = 48, 8, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +56,38 @@ class PlanReport:
 
 
 class Figures:
-    """How often something was done, and how long it took the last time and at most [s]."""
+    """How often something was done, and how long it took the last time, mostly and at most [s]."""
 
     def __init__(self) -> None:
         """Begin with nothing done."""
         self.n, self.last, self.most = 0, 0.0, 0.0
+        # As many numbers after a year as after a minute.
+        self._counts = [0] * (BINS * DECADES)
 
     def add(self, elapsed: float) -> None:
         """Count once more."""
         self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
+        at = math.ceil(BINS * math.log10(max(elapsed, SHORTEST) / SHORTEST))
+        self._counts[min(at, len(self._counts) - 1)] += 1
+
+    def quantile(self, share: float) -> float:
+        """Return what a share of all took at most, rounded up by no more than 5 % [s]."""
+        wanted, seen = share * self.n, 0
+        for k, count in enumerate(self._counts):
+            seen += count
+            if count and seen >= wanted:
+                return min(self.most, SHORTEST * 10.0 ** (k / BINS))
+        return self.most
 
     def __str__(self) -> str:
         """Return the figures in a line."""
-        return f'{self.n}, last {self.last * 1e3:.3f} ms, at most {self.most * 1e3:.3f} ms'
+        shown = {
+            'last': self.last,
+            'p50': self.quantile(0.5),
+            'p99': self.quantile(0.99),
+            'at most': self.most,
+        }
+        return ', '.join([str(self.n), *(f'{k} {1e3 * v:.3f} ms' for k, v in shown.items())])
 
 
 def diagnostics_msg(
@@ -118,6 +141,7 @@ def diagnostics_msg(
     values.update({name: str(figure) for name, figure in figures.items()})
     for name, topic in heard.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
+        values[f'good messages, {name}'] = str(topic.n_good)
         values[f'refused messages, {name}'] = str(topic.n_refused)
         values[f'last refusal, {name}'] = str(topic.refusal or '')
     status = DiagnosticStatus(

@@ -238,8 +238,11 @@ class Guard:
         )
         self._say(Watch.BRAKING, sentence)
         self._reporter.braked(took)
-        log = self._node.get_logger()
-        (log.error if warning else log.warning)(sentence)
+        # A line each: rclpy raises where one and the same line logs at another severity.
+        if warning:
+            self._node.get_logger().error(sentence)
+        else:
+            self._node.get_logger().warning(sentence)
         if parameters.replan and goal is not None:
             self.plan_again(goal, stopped.trajectory.duration)
         else:

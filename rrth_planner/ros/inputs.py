@@ -50,7 +50,7 @@ class Input(Generic[T]):
         self.topic = topic
         self.value = empty
         self.received: float | None = None
-        self.n_refused = 0
+        self.n_good, self.n_refused = 0, 0
         self.refusal: MessageError | None = None
         self.is_last_refused = False
 
@@ -64,6 +64,7 @@ class Input(Generic[T]):
             self.is_last_refused = True
             return False
         self.received = now
+        self.n_good += 1
         self.is_last_refused = False
         return True
 

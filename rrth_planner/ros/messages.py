@@ -26,7 +26,7 @@ from rrth_planner.ros.trajectories import (
 from sensor_msgs.msg import JointState
 
 # A message may be so long on its way; its stamp is of another clock if it seems longer [s].
-LONGEST_WAY = 0.1
+LONGEST_WAY = 1.0
 # Positions that are older than this say nothing about the present velocity [s].
 DIFFERENCE_AGE = 0.5
 
