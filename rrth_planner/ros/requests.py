@@ -11,10 +11,10 @@ import numpy as np
 from rrth_planner.arm import tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond, touch_on_way_out
-from rrth_planner.fcl_check import first_touch
+from rrth_planner.escape import beyond
+from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.goal import PointingGoal
-from rrth_planner.leaving import leads_out
+from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
@@ -22,7 +22,7 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import Takeover
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.world import arm_world
+from rrth_planner.world import arm_world, World
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3
@@ -205,10 +205,7 @@ def _check_present(
         world.is_valid(q_end, reach)
         and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
         and certify(trajectory, world, escape_time).is_proven
-        and touch_on_way_out(
-            parameters.arm, present.scene, world, trajectory, escape_time, parameters.margin
-        )
-        is None
+        and _is_way_out_confirmed(parameters, present.scene, world, plan)
         and first_touch(
             parameters.arm,
             present.scene,
@@ -224,6 +221,25 @@ def _check_present(
             'the wearer moved while the motion was planned, and it is no longer proven free of '
             'the present body',
         )
+
+
+def _is_way_out_confirmed(
+    parameters: PlannerParameters, scene: Scene, world: World, plan: MotionPlan
+) -> bool:
+    """Return whether the second opinion too lets the arm out of what it is in, if anything."""
+    if plan.escape_time == 0.0:
+        return True
+    assert plan.trajectory is not None
+    touch = touch_on_way_out(
+        parameters.arm,
+        scene,
+        box_depths(world, plan.trajectory.positions[0]).max(axis=0),
+        plan.trajectory,
+        plan.escape_time,
+        parameters.margin,
+        world.ray_length,
+    )
+    return touch is None
 
 
 def _is_same(one: Scene, other: Scene) -> bool:
