@@ -3,20 +3,16 @@
 """The shortest way out for an arm that the wearer leaned into."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.fcl_check import first_touch
-from rrth_planner.leaving import box_depths, GAP, leads_out
+from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.path import Path
 from rrth_planner.refusal import depth_sentence, Refusal
-from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import after, until
+from rrth_planner.takeover import after
 from rrth_planner.timing import parameterize
-from rrth_planner.touch import Touch
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import grown, World
 
@@ -29,9 +25,6 @@ N_ROUNDS, N_SWEEPS = 12, 200
 # Pairs of a bar and a box that are further apart do not push [m].
 NEAR = 0.05
 STEP = 1e-6
-# The second opinion is asked for this distance of boxes so much smaller: of what touches, or is
-# in a box, the library does not say how deep [m].
-APART = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -100,19 +93,16 @@ def way_out(
         )
     for spare in spares:
         roomy, rng = grown(world, spare), np.random.default_rng(seed)
-        best: Trajectory | None = None
-        # What pushes the arm out directly is mostly the shortest; others are asked in its stead.
-        for tries in (_pushed(roomy, q_start, spare), _scattered(roomy, q_start, rng)):
+        best, longest = None, LONGEST
+        # What pushes the arm out directly is mostly the shortest way.
+        for look in (_pushed, _scattered):
+            tries = list(look(roomy, q_start, spare, longest, rng))
             for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
                 if should_stop():
                     return Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
-                if best is not None and _length(q_end, q_start) >= _length(
-                    best.positions[-1], q_start
-                ):
-                    break
                 trajectory = parameterize(Path(np.stack([q_start, q_end])), (), limits)
                 if leads_out(trajectory, world, trajectory.duration):
-                    best = trajectory
+                    best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
                     break
         if best is not None:
             return Escape(trajectory=best, sentence=_said(world, depths, spares[-1]))
@@ -123,60 +113,11 @@ def way_out(
     )
 
 
-def touch_on_way_out(
-    arm: ArmModel,
-    scene: Scene,
-    world: World,
-    trajectory: Trajectory,
-    escape_time: float,
-    margin: float,
-) -> Touch | None:
-    """
-    Return where a motion that leads out of boxes first comes nearer than it must, or None.
-
-    The second opinion on the way out: no part may come deeper into a box than the arm is in it at
-    the start, nor into any other.
-
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    world : World
-        The scene's, its boxes grown by the margin.
-    trajectory : Trajectory
-    escape_time : float
-        When the arm is out; 0: it was not in [s].
-    margin : float
-        [m].
-
-    """
-    if escape_time == 0.0:
-        return None
-    depths = box_depths(world, trajectory.positions[0])
-    boxes, kept = [], margin - GAP - np.maximum(depths.max(axis=0), 0.0)
-    for box, by in zip(scene.boxes, kept.tolist(), strict=True):
-        size = box.size + 2.0 * (by - APART)
-        if not (size > 0.0).all():
-            return Touch(0.0, by, 'the arm', box.name)
-        boxes.append(Box(box.name, box.center, size, box.rotation))
-    way = until(trajectory, escape_time)
-    touch = first_touch(arm, Scene(tuple(boxes)), way, APART, world.ray_length, 0.0)
-    if touch is None:
-        return None
-    by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == touch.box)
-    return replace(touch, distance=touch.distance - APART + by)
-
-
 def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
     """Return what is left of a motion when the arm is out, at one of its points [s]."""
     if escape_time == 0.0:
         return trajectory
     return after(trajectory, int(np.abs(trajectory.times - escape_time).argmin()))
-
-
-def _length(q_end: Array, q_start: Array) -> float:
-    return float(np.linalg.norm(q_end - q_start))
 
 
 def _said(world: World, depths: Array, hair: float) -> str:
@@ -192,14 +133,16 @@ def _said(world: World, depths: Array, hair: float) -> str:
     return f'first leaves {" and ".join(parts)}'
 
 
-def _pushed(roomy: World, q_start: Array, spare: float) -> list[Array]:
+def _pushed(
+    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+) -> Iterator[Array]:
     """
-    Return where the boxes push the arm: the nearest configuration that is free of all of them.
+    Yield where the boxes push the arm: to the nearest configuration that is free of all of them.
 
     Sequential quadratic programming: the depths are taken as linear where the arm has come to, and
     of the configurations that are then free the one nearest to the start is next.
     """
-    q, found = q_start.copy(), []
+    q = q_start.copy()
     for _ in range(N_ROUNDS):
         depths, slopes = _slopes(roomy, q)
         is_near = depths > -NEAR
@@ -210,12 +153,11 @@ def _pushed(roomy: World, q_start: Array, spare: float) -> list[Array]:
             [G @ (q - q_start) - s, roomy.bounds[1] - q_start, q_start - roomy.bounds[0]]
         )
         x = _least(rows, bounds)
-        if not np.isfinite(x).all() or np.linalg.norm(x) > LONGEST:
+        if not np.isfinite(x).all() or np.linalg.norm(x) > longest:
             break
         q = np.clip(q_start + x, *roomy.bounds)
         if roomy.is_valid(q):
-            found.append(q)
-    return found
+            yield q
 
 
 def _slopes(world: World, q: Array) -> tuple[Array, Array]:
@@ -243,13 +185,15 @@ def _least(rows: Array, bounds: Array) -> Array:
     return x
 
 
-def _scattered(roomy: World, q_start: Array, rng: np.random.Generator) -> Iterator[Array]:
+def _scattered(
+    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+) -> Iterator[Array]:
     """Yield where the arm is first free along each joint and in random directions."""
     dof = len(q_start)
     random = rng.standard_normal((N_DIRECTIONS, dof))
     for direction in np.concatenate([np.eye(dof), -np.eye(dof), random]):
         u = direction / np.linalg.norm(direction)
-        for far in np.arange(LOOK, LONGEST, LOOK).tolist():
+        for far in np.arange(LOOK, longest, LOOK).tolist():
             if not roomy.is_in_bounds(q_start + far * u):
                 break
             if roomy.is_valid(q_start + far * u):

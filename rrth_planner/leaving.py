@@ -77,8 +77,8 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
     The time is cut into stretches, and from one to the next the arm may get no deeper in any box.
     Within a stretch it is proven free of the boxes as much smaller as the arm was deep in them at
     its beginning; of a box that it is not in, or not any more, of all of it. At the end the arm
-    is out. So no box is entered, none is left for good and entered again, and in none the arm is
-    deeper at any time than it was before, by more than `GAP` and the way of one stretch.
+    is out. So the arm enters no box that it is not in, and is in none deeper, by more than `GAP`,
+    than it was at the beginning of the stretch.
 
     Parameters
     ----------

@@ -10,10 +10,10 @@ from rrth_planner import oracle
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond, touch_on_way_out
-from rrth_planner.fcl_check import first_touch, nearest
+from rrth_planner.escape import beyond
+from rrth_planner.fcl_check import first_touch, nearest, touch_on_way_out
 from rrth_planner.goal import PointingGoal
-from rrth_planner.leaving import leads_out
+from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.scene import Scene
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, Trajectory
@@ -118,7 +118,8 @@ def verdict_of(
         oracle=oracle.least_clearance(arm, scene, q_end[None], reach),
     )
     is_out = escape_time == 0.0 or leads_out(trajectory, world, escape_time)
-    touch = touch_on_way_out(arm, scene, world, trajectory, escape_time, margin)
+    depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+    touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray_guard_length)
     if touch is None:
         rest = beyond(trajectory, escape_time)
         touch = first_touch(arm, scene, rest, margin, ray_guard_length, reach)

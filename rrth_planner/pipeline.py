@@ -21,8 +21,8 @@ from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.certificate import certify, least_clearance
-from rrth_planner.escape import beyond, Escape, touch_on_way_out, way_out
-from rrth_planner.fcl_check import first_touch
+from rrth_planner.escape import beyond, Escape, way_out
+from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
 from rrth_planner.leaving import box_depths
@@ -332,7 +332,12 @@ def _time_path(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
         )
     reach = _reach(arm, goal, path.waypoints[-1])
-    touch = touch_on_way_out(arm, scene, world, trajectory, escape_time, margin)
+    touch = None
+    if escape is not None:
+        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        touch = touch_on_way_out(
+            arm, scene, depths, trajectory, escape_time, margin, world.ray_length
+        )
     if touch is not None:
         return Disagreement(trajectory, touch, escape_time)
     touch = first_touch(

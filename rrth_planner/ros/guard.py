@@ -77,6 +77,8 @@ class Guard:
         # Motions that were planned before a brake are of no use after it.
         self.n_brakes = 0
         self._stopped_from: RunningMotion | None = None
+        # Those of the plan: another margin since then says nothing against its motion.
+        self._parameters = reporter.parameters
         # Stops from some times of the running motion on, found while it runs.
         self._stops: list[tuple[float, Trajectory]] = []
         self._foreseer = ThreadPoolExecutor(max_workers=1, thread_name_prefix='stops')
@@ -87,8 +89,11 @@ class Guard:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
 
-    def begin(self, running: RunningMotion, goal: PointingGoal) -> None:
-        """Watch a motion from now on; the lock is held."""
+    def begin(
+        self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
+    ) -> None:
+        """Watch a motion from now on by the parameters of its plan; the lock is held."""
+        self._parameters = parameters
         self.running, self._goal, self._stopped_from = running, goal, None
         self._stops = []
         self._foreseer.submit(self._foresee, running, self._stops)
@@ -103,7 +108,7 @@ class Guard:
 
     def _foresee(self, running: RunningMotion, stops: list[tuple[float, Trajectory]]) -> None:
         """Find the soonest stop from every so many times on, which takes milliseconds each."""
-        limits = self._reporter.parameters.limits
+        limits = self._parameters.limits
         for begin in np.arange(FORESEEN, running.trajectory.duration, FORESEEN).tolist():
             if self.running is not running:
                 return
@@ -113,7 +118,7 @@ class Guard:
         """Return the soonest stop that is known, from where the arm is."""
         motion = running.trajectory
         phase = min(max(phase, 0.0), motion.duration)
-        stop = emergency_stop(motion, phase, self._reporter.parameters.limits)
+        stop = emergency_stop(motion, phase, self._parameters.limits)
         for begin, foreseen in self._stops:
             # What has to reach the controller takes its time.
             if begin >= phase + ON_ITS_WAY:
@@ -126,12 +131,14 @@ class Guard:
         """Hold the body as it is now against what is left of the motion."""
         begin = time.perf_counter()
         with self._lock:
-            now, parameters = self._now(), self._reporter.parameters
+            now, parameters = self._now(), self._parameters
             scene = scene_of(self._heard.body.value.at(now))
             speeds = None
-            if parameters.max_body_speed > 0.0 and self._before is not None:
+            if self._reporter.parameters.max_body_speed > 0.0 and self._before is not None:
                 before, then = self._before
-                speeds = box_speeds(before, scene, now - then, parameters.max_body_speed)
+                speeds = box_speeds(
+                    before, scene, now - then, self._reporter.parameters.max_body_speed
+                )
             self._before = (scene, now)
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
@@ -209,7 +216,7 @@ class Guard:
 
     def _stop(self, phase: float, now: float, scene: Scene, why: str, begin: float) -> None:
         """Publish the braking trajectory from where the arm is; the lock is held."""
-        running, parameters, goal = self.running, self._reporter.parameters, self._goal
+        running, parameters, goal = self.running, self._parameters, self._goal
         assert running is not None
         if phase >= running.trajectory.duration:
             return
@@ -243,7 +250,7 @@ class Guard:
             self._node.get_logger().error(sentence)
         else:
             self._node.get_logger().warning(sentence)
-        if parameters.replan and goal is not None:
+        if self._reporter.parameters.replan and goal is not None:
             self.plan_again(goal, stopped.trajectory.duration)
         else:
             self._say(Watch.HOLDING, sentence)

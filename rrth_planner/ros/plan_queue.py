@@ -231,6 +231,7 @@ class PlanQueue:
                     escape_time=outcome.plan.escape_time,
                 ),
                 outcome.inputs.goal,
+                parameters,
             )
             return None
 

@@ -11,11 +11,11 @@ import numpy as np
 from rrth_planner.arm import tool_pose
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond, touch_on_way_out
-from rrth_planner.fcl_check import first_touch
+from rrth_planner.escape import beyond
+from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
-from rrth_planner.leaving import leads_out
+from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.pipeline import MotionPlan, plan_motion
 from rrth_planner.question import PlanQuestion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
@@ -254,7 +254,12 @@ def _check_present(
         )
     # Both judges must agree, as they had to when it was planned.
     arm, margin = parameters.arm, parameters.margin
-    touch = touch_on_way_out(arm, present.scene, world, trajectory, escape_time, margin)
+    touch = None
+    if escape_time > 0.0:
+        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        touch = touch_on_way_out(
+            arm, present.scene, depths, trajectory, escape_time, margin, world.ray_length
+        )
     if touch is None:
         rest = beyond(trajectory, escape_time)
         touch = first_touch(arm, present.scene, rest, margin, world.ray_length, reach)
