@@ -134,11 +134,10 @@ class Guard:
             now, parameters = self._now(), self._parameters
             scene = scene_of(self._heard.body.value.at(now))
             speeds = None
-            if self._reporter.parameters.max_body_speed > 0.0 and self._before is not None:
+            most = most
+            if most > 0.0 and self._before is not None:
                 before, then = self._before
-                speeds = box_speeds(
-                    before, scene, now - then, self._reporter.parameters.max_body_speed
-                )
+                speeds = box_speeds(before, scene, now - then, most)
             self._before = (scene, now)
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
