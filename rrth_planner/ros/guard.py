@@ -134,7 +134,7 @@ class Guard:
             now, parameters = self._now(), self._parameters
             scene = scene_of(self._heard.body.value.at(now))
             speeds = None
-            most = most
+            most = self._reporter.parameters.max_body_speed
             if most > 0.0 and self._before is not None:
                 before, then = self._before
                 speeds = box_speeds(before, scene, now - then, most)
