@@ -132,9 +132,10 @@ class Guard:
         begin = time.perf_counter()
         with self._lock:
             now, parameters = self._now(), self._parameters
+            speeds, most = None, self._reporter.parameters.max_body_speed
+            if self.running is None and most == 0.0:
+                return
             scene = scene_of(self._heard.body.value.at(now))
-            speeds = None
-            most = self._reporter.parameters.max_body_speed
             if most > 0.0 and self._before is not None:
                 before, then = self._before
                 speeds = box_speeds(before, scene, now - then, most)
@@ -184,16 +185,9 @@ class Guard:
         phase = before.phase(reading.positions, reading.velocities, reading.taken, now)
         if phase is None or phase >= before.trajectory.duration:
             return
-        self._stopped_from, self.running = (
-            before,
-            RunningMotion(
-                trajectory=emergency_stop(
-                    before.trajectory, phase, self._reporter.parameters.limits
-                ),
-                start_time=now,
-            ),
-        )
-        self._publishers.publish_motion(self.running.trajectory, self._reporter.parameters, now)
+        stop = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
+        self._stopped_from, self.running = before, stop
+        self._publishers.publish_motion(stop.trajectory, self._parameters, now)
         self._node.get_logger().error('the arm did not stop as it was told: it is told again')
 
     def _phase(self, now: float) -> float | None:
