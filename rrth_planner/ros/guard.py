@@ -32,6 +32,8 @@ PERIOD = 0.02
 FORESEEN = 0.04
 # An arm that is not on its stop after this time is told again [s].
 PATIENCE = 0.05
+# An arm that stands still so long after the begin of a motion does not follow it [s].
+LATE = 0.25
 # An arm that is that long after the end of its motion is taken to have arrived [s].
 GRACE = 0.5
 
@@ -200,6 +202,9 @@ class Guard:
             self.running = None
             if self._state is not Watch.HOLDING:
                 self._say(Watch.IDLE, '')
+            return None
+        if reading.taken - running.start_time > LATE and not self._is_moving():
+            # Nobody follows the motion, or it is over.
             return None
         return running.phase(reading.positions, reading.velocities, reading.taken, now)
 

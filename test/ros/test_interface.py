@@ -300,7 +300,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
             planner.set_parameters(
                 [Parameter('seed', value=6), Parameter('max_jerk', value=[30.0])]
             )
-        jerks.append(args[4].jerk[0])
+        jerks.append(kwargs['limits'].jerk[0])
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_it_is_set)
