@@ -16,7 +16,7 @@ setup(
         ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
         (share, ['package.xml']),
         (f'{share}/launch', sorted(glob('launch/*.py'))),
-        (f'{share}/config', sorted(glob('config/*.yaml'))),
+        (f'{share}/config', sorted(glob('config/*.yaml') + glob('config/*.xml'))),
         (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
         (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
     ],
@@ -24,7 +24,7 @@ setup(
     # Names only: the versions come from rosdep or from requirements/.
     install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
     extras_require={
-        'node': ['python-fcl', 'ruckig', 'matplotlib'],
+        'node': ['python-fcl', 'matplotlib'],
         'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },
@@ -39,6 +39,7 @@ setup(
             'planner_node = rrth_planner.ros.planner_node:main',
             'playback_node = rrth_planner.ros.playback_node:main',
             'demo = rrth_planner.ros.demo:main',
+            'replay = rrth_planner.replay:main',
             'reproduce = rrth_planner.reproduce:main',
         ],
     },

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 import sys
 
-NEEDED = ('pyarrow', 'tqdm', 'psutil', 'matplotlib', 'fcl', 'ruckig')
+NEEDED = ('pyarrow', 'tqdm', 'psutil', 'matplotlib', 'fcl')
 MISSING = """{}: not installed, and the benchmarks cannot run without; install what they need by
     ./run exec python -m pip install -r requirements/benchmark.txt"""
 

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client of a planner node that runs as a process of its own."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os
 import time
-from typing import Any
+from typing import Any, TypeVar
 
 from geometry_msgs.msg import PointStamped
 import rclpy
@@ -102,14 +102,17 @@ class Client(Node):
         publisher.wait_for_all_acked()
 
 
+T = TypeVar('T', bound=Client)
+
+
 @contextmanager
-def ros_client() -> Iterator[Client]:
+def ros_client(make: Callable[[], T] = Client) -> Iterator[T]:
     """Give a client in a ROS domain of its own."""
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     try:
-        client = Client()
+        client = make()
         yield client
         client.destroy_node()
     finally:

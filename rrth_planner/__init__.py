@@ -31,6 +31,8 @@ _HOME = {
     'sample': 'trajectory',
     'parameterize': 'timing',
     'certify': 'certificate',
+    'brake': 'braking',
+    'certify_braking': 'braking',
     'load_arm': 'resources',
 }
 

@@ -6,18 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array
+from rrth_planner.bernstein import first_outside, to_bernstein
 from rrth_planner.errors import MessageError, OptionsError
 from rrth_planner.playback import Playback
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # Planned limits may be touched; a motion is refused when it goes further than this beyond them.
 EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
-# Instants of each piece of a motion at which limits are looked at.
-INSTANTS = 64
 # A motion that ends later than this is refused [s].
 LONGEST_WAIT = 3600.0
+# By number of coefficients; and what differentiation multiplies them with.
+_TO_BERNSTEIN = {size: to_bernstein(size - 1) for size in (4, 5, 6)}
+_POWERS = np.arange(1.0, 6.0)[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,8 +33,8 @@ class PlaybackRules:
         Greatest distance of a new motion from the present state, per joint [rad and rad/s].
     time_scale : float
         Seconds of the motion per second of the clock, above 0 and up to 1 [-].
-    max_velocity, max_acceleration : array_like, shape (dof,)
-        What each joint may do [rad/s, rad/s^2].
+    limits : MotionLimits
+        What each joint may do; braking keeps to the jerk, a motion may have any.
 
     Raises
     ------
@@ -43,21 +45,14 @@ class PlaybackRules:
 
     start_tolerance: float
     time_scale: float
-    max_velocity: Array
-    max_acceleration: Array
+    limits: MotionLimits
 
     def __post_init__(self) -> None:
-        """Validate and freeze."""
+        """Validate."""
         if not 0.0 < self.start_tolerance < np.inf:
             raise OptionsError(f'start_tolerance: {self.start_tolerance}, expected > 0 [rad]')
         if not 0.0 < self.time_scale <= 1.0:
             raise OptionsError(f'time_scale: {self.time_scale}, expected above 0, up to 1 [-]')
-        dof = np.size(self.max_velocity)
-        for name, unit in (('max_velocity', 'rad/s'), ('max_acceleration', 'rad/s^2')):
-            value = frozen_array(getattr(self, name), (dof,), name, unit, OptionsError)
-            if not (value > 0.0).all():
-                raise OptionsError(f'{name}: {value.tolist()}, expected values > 0 [{unit}]')
-            object.__setattr__(self, name, value)
 
 
 def accept(
@@ -125,28 +120,34 @@ def _check_start(
 
 def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> None:
     """Raise MessageError where the curve of a motion leaves the bounds or limits."""
-    grid = playback.trajectory.times
-    within = np.linspace(0.0, 1.0, INSTANTS, endpoint=False)
-    instants = np.append((grid[:-1, None] + np.diff(grid)[:, None] * within).ravel(), grid[-1])
-    q, v, a = sample(playback.trajectory, instants)
-    scale = playback.time_scale
-    top = 1.0 + EXCESS
-    lowest, highest = arm.bounds[0] - BOUND_TOLERANCE, arm.bounds[1] + BOUND_TOLERANCE
-    for what, unit, value, low, high in (
-        ('position', 'rad', q, lowest, highest),
-        ('velocity', 'rad/s', v * scale, -top * rules.max_velocity, top * rules.max_velocity),
-        (
-            'acceleration',
-            'rad/s^2',
-            a * scale**2,
-            -top * rules.max_acceleration,
-            top * rules.max_acceleration,
-        ),
+    trajectory, scale, top = playback.trajectory, playback.time_scale, 1.0 + EXCESS
+    c, durations = _pieces(trajectory)
+    rates = scale / durations[:, None, None]
+    first = c[:, 1:] * _POWERS * rates
+    second = first[:, 1:] * _POWERS[:4] * rates
+    v, a = top * rules.limits.velocity, top * rules.limits.acceleration
+    for what, unit, polynomials, low, high in (
+        ('position', 'rad', c, arm.bounds[0] - BOUND_TOLERANCE, arm.bounds[1] + BOUND_TOLERANCE),
+        ('velocity', 'rad/s', first, -v, v),
+        ('acceleration', 'rad/s^2', second, -a, a),
     ):
-        excess = np.maximum(low - value, value - high)
-        k, i = np.unravel_index(np.argmax(excess), excess.shape)
-        if not excess[k, i] <= 0.0:
+        n, size, dof = polynomials.shape
+        control = np.swapaxes(_TO_BERNSTEIN[size] @ polynomials, 0, 1).reshape(size, n * dof)
+        found = first_outside(control, np.tile(low, n), np.tile(high, n))
+        if found is not None:
+            (k, i), (_, share, value) = divmod(found[0], dof), found
+            instant = trajectory.times[k] + share * durations[k]
             raise MessageError(
-                f'{arm.joint_names[i]}: {what} {value[k, i]:.6g} at {instants[k]:.6g} s, '
+                f'{arm.joint_names[i]}: {what} {value:.6g} at {instant:.6g} s, '
                 f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]'
             )
+
+
+def _pieces(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return the polynomials of all pieces, (n, 6, dof), and their durations, (n,) [s]."""
+    if len(trajectory.times) > 1:
+        return piece_coefficients(trajectory), np.diff(trajectory.times)
+    # A single point is held.
+    held = np.zeros((1, 6, trajectory.positions.shape[1]))
+    held[0, 0] = trajectory.positions[0]
+    return held, np.ones(1)

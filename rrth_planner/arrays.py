@@ -41,7 +41,7 @@ def frozen_array(
     if not fits:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
     # The sum is finite where all elements are, but for a sum that overflows.
-    with np.errstate(over='ignore'):
+    with np.errstate(over='ignore', invalid='ignore'):
         total = array.sum()
     if not math.isfinite(total) and not np.isfinite(array).all():
         raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')

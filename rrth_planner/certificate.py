@@ -3,11 +3,12 @@
 """The proof that a timed curve, as a controller will run it, never touches the wearer."""
 
 from dataclasses import dataclass
-from math import comb
+import functools
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.kernels import arm_validity
+from rrth_planner.bernstein import to_bernstein
+from rrth_planner.kernels.pieces import prove_pieces
 from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
 from rrth_planner.world import World
 
@@ -35,17 +36,7 @@ class Certificate:
     touches: bool = False
 
 
-def _to_bernstein(degree: int) -> Array:
-    """Return the matrix from powers to Bernstein coefficients, (degree + 1, degree + 1)."""
-    return np.array(
-        [
-            [comb(j, i) / comb(degree, i) if i <= j else 0.0 for i in range(degree + 1)]
-            for j in range(degree + 1)
-        ]
-    )
-
-
-_BERNSTEIN_4, _BERNSTEIN_3 = _to_bernstein(4), _to_bernstein(3)
+_BERNSTEIN_4, _BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
 
 
 def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
@@ -74,34 +65,55 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
     return speed * (1 + 1e-12) + 1e-15, bend * (1 + 1e-12) + 1e-15
 
 
-def certify(trajectory: Trajectory, world: World) -> Certificate:
+def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certificate:
     """
     Return the proof that a quintic-interpolated trajectory is free of the world's boxes.
 
     Each piece is proven by the second-order certificate of `kernels.arm_validity.prove_curve`,
     from the very numbers that the trajectory holds.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    world : World
+    begin : float
+        What comes before this time is over [s].
+
     """
-    if len(trajectory.times) == 1:
-        is_free = world.is_valid(trajectory.positions[0])
+    if len(trajectory.times) == 1 or begin >= trajectory.duration:
+        is_free = world.is_valid(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
     coefficients = piece_coefficients(trajectory)
-    speed, bend = derivative_bounds(coefficients)
-    for i, curve in enumerate(coefficients):
-        proof = arm_validity.prove_curve(
-            curve,
-            speed[i],
-            bend[i],
-            0.2 * world.resolution,
-            world.chain,
-            world.robot,
-            world.obstacles,
-        )
-        if proof != 1:
-            return Certificate(is_proven=False, piece=i, touches=proof == 0)
-    return Certificate(is_proven=True)
+    speed, bend = _bounds_of(trajectory)
+    first, share = 0, 0.0
+    if begin > 0.0:
+        times = trajectory.times
+        first = int(times.searchsorted(begin, side='right')) - 1
+        share = (begin - float(times[first])) / float(times[first + 1] - times[first])
+    found = prove_pieces(
+        coefficients,
+        speed,
+        bend,
+        first,
+        share,
+        0.2 * world.resolution,
+        world.chain,
+        world.robot,
+        world.obstacles,
+    )
+    if found < 0:
+        return Certificate(is_proven=True)
+    return Certificate(is_proven=False, piece=found // 2, touches=bool(found % 2))
 
 
-def least_clearance(trajectory: Trajectory, world: World) -> float:
-    """Return the least distance from the world's boxes, looked at every 10 ms [m]."""
-    times = np.append(np.arange(0.0, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
+@functools.lru_cache(maxsize=8)
+def _bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return the derivative bounds of a trajectory's pieces; a running motion is asked often."""
+    return derivative_bounds(piece_coefficients(trajectory))
+
+
+def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) -> float:
+    """Return the least distance from the world's boxes from a time on, every 10 ms [m]."""
+    begin = min(begin, trajectory.duration)
+    times = np.append(np.arange(begin, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
     return float(world.clearances(positions_at(trajectory, times)).min(initial=np.inf))

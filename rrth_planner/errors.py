@@ -2,9 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a broken contract raises: what was given, what was expected, the unit."""
 
+# Whatever was given may be as long as it likes; what is said of it may not [characters].
+LONGEST_SENTENCE = 1000
+
+
+def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
+    """Return a text as one printable line, cut short where it is too long."""
+    cut = text if len(text) <= longest else f'{text[: longest - 4]} ...'
+    if cut.isprintable():
+        return cut
+    return ''.join(c if c.isprintable() else ' ' if c.isspace() else '?' for c in cut)
+
 
 class RrthError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base of every error that this package raises on purpose: one line each."""
+
+    def __init__(self, sentence: str = '') -> None:
+        """Keep the sentence, which may quote what came from outside, to one line."""
+        super().__init__(one_line(sentence))
 
 
 class ModelError(RrthError):
@@ -21,3 +36,7 @@ class OptionsError(RrthError):
 
 class MessageError(RrthError):
     """Input from the wire that is refused."""
+
+
+class RecordError(RrthError):
+    """A record of an incident that says too little, too much or nothing."""

@@ -4,7 +4,7 @@
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 import math
 
@@ -13,7 +13,9 @@ from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array
 from rrth_planner.fcl_shapes import Bar, boxes_of, DOUBT
 from rrth_planner.reach import bar_ends
-from rrth_planner.scene import Scene
+from rrth_planner.scene import Box, Scene
+from rrth_planner.takeover import until
+from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, Trajectory
 from rrth_planner.travel import travelled
 
@@ -21,30 +23,11 @@ from rrth_planner.travel import travelled
 PERIOD = 0.001
 # Distances this much below the margin are rounding of the library [m].
 TOLERANCE = 3e-6
+# On the way out of boxes this distance is asked for, of boxes that much smaller: of what touches
+# the library does not say how deep [m].
+APART = 1e-3
 # Looks into a gap at once: where they are many, some may turn out to be needless.
 MOST_LOOKS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Touch:
-    """
-    Where a trajectory comes nearer to the wearer than the margin.
-
-    Parameters
-    ----------
-    time : float
-        [s].
-    distance : float
-        From the body itself [m].
-    bar, box : str
-        Which part of the arm, which box.
-
-    """
-
-    time: float
-    distance: float
-    bar: str
-    box: str
 
 
 def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Touch:
@@ -188,3 +171,46 @@ def first_touch(
     if watch.touch is None and reach > ray_guard_length:
         watch.look([(Bar(arm, watch.bars[-1].k, reach), end, ())])
     return watch.touch
+
+
+def touch_on_way_out(
+    arm: ArmModel,
+    scene: Scene,
+    depths: Array,
+    trajectory: Trajectory,
+    escape_time: float,
+    margin: float,
+    ray_guard_length: float,
+) -> Touch | None:
+    """
+    Return where a motion that leads out of boxes first comes nearer than it may, or None.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    depths : ndarray, shape (m,)
+        By how much each box, grown by the margin, would have to be smaller on every side for the
+        arm to be clear of it at the start [m]; it may come no deeper. < 0: it is clear.
+    trajectory : Trajectory
+    escape_time : float
+        When the arm is out; 0: it was not in [s].
+    margin, ray_guard_length : float
+        [m].
+
+    """
+    if escape_time == 0.0:
+        return None
+    boxes, kept = [], margin - np.maximum(depths, 0.0)
+    for box, by in zip(scene.boxes, kept.tolist(), strict=True):
+        size = box.size + 2.0 * (by - APART)
+        if not (size > 0.0).all():
+            return Touch(0.0, by, 'the arm', box.name)
+        boxes.append(Box(box.name, box.center, size, box.rotation))
+    way = until(trajectory, escape_time)
+    touch = first_touch(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0)
+    if touch is None:
+        return None
+    by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == touch.box)
+    return replace(touch, distance=touch.distance - APART + by)

@@ -133,3 +133,13 @@ class PrintedRRTHOptions(RRTHOptions):
     corner_moves: int = _option(0, 0, 0, '-', 'none: the three steps are all there is')
     target_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_T')
     check_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_C')
+
+
+# What files and parameters call the algorithms.
+ALGORITHMS: dict[str, type[TreeOptions]] = {
+    'rrt_h': RRTHOptions,
+    'rrt': RRTOptions,
+    'rrt_star': RRTStarOptions,
+    'informed_rrt_star': InformedRRTStarOptions,
+    'rrt_star_smart': RRTStarSmartOptions,
+}

@@ -9,10 +9,18 @@ import numpy as np
 from rrth_planner.aiming import GoalSet
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
+from rrth_planner.certificate import certify
 from rrth_planner.goal import PointingGoal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import Lead
+from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
+
+# A joint this far beyond its limit is at it [rad, m].
+ROUNDING = 1e-6
+# A joint that moves faster than its limit by no more than this share is let pass.
+EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +40,28 @@ class Refusal:
     sentence: str
 
 
-def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) -> Refusal | None:
-    """Return why no motion can start at q_start, shape (dof,), or None."""
+def within_limits(arm: ArmModel, q: Array) -> Array:
+    """Return a configuration, (dof,), with joints that are past a limit by rounding at it."""
+    near: Array = np.clip(q, *arm.bounds)
+    return near if float(np.abs(near - q).max()) <= ROUNDING else q
+
+
+def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None:
+    """
+    Return why no motion can start at q_start, or None.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    world : World
+        Its boxes grown by the margin and what must be left beyond it.
+    q_start : ndarray, shape (dof,)
+        [rad].
+
+    """
     for k, name in enumerate(arm.joint_names):
         low, high = arm.bounds[:, k]
-        if not low <= q_start[k] <= high:
+        if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
             unit = 'm' if arm.is_prismatic[k] else 'rad'
             return Refusal(
                 PlanStatus.START_OUT_OF_BOUNDS,
@@ -44,21 +69,67 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array, margin: float) ->
             )
     if world.is_valid(q_start):
         return None
-    distances = world.clearances(q_start)
-    bar, box = np.unravel_index(int(np.argmin(distances)), distances.shape)
-    return Refusal(
-        PlanStatus.START_IN_COLLISION,
-        f'{world.bar_names[bar]} is {_how_close(distances[bar, box], margin)} box '
-        f'"{world.box_names[box]}"',
-    )
+    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm touches the wearer')
 
 
-def _how_close(clearance: float, margin: float) -> str:
-    """Say a clearance from the grown box as a distance from the body itself."""
-    distance = clearance + margin
+def depth_sentence(world: World, depths: Array, margin: float) -> str:
+    """
+    Say which part of the arm is deepest in which box, and how deep.
+
+    Parameters
+    ----------
+    world : World
+        Its boxes grown by the margin.
+    depths : ndarray, shape (n_bars, m)
+        As `leaving.box_depths` [m].
+    margin : float
+        [m].
+
+    """
+    bar, box = np.unravel_index(int(np.argmax(depths)), depths.shape)
+    depth = max(0.0, float(depths[bar, box]))
+    distance = margin - depth
+    part, name = world.bar_names[bar], world.box_names[box]
     if distance <= 0.0:
-        return f'{-distance:.4f} m inside'
-    return f'about {distance:.4f} m, less than the margin of {margin:g} m, from'
+        where = f'{-distance:.4f} m inside box "{name}"'
+    else:
+        where = f'about {distance:.4f} m, less than the margin of {margin:g} m, from box "{name}"'
+    return f'{part} is {where}: {depth:.4f} m deep in it with its margin'
+
+
+def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) -> Refusal | None:
+    """Return why an arm that moves cannot go straight on until it could rest, or None."""
+    fastest = np.abs(lead.trajectory.velocities) / limits.velocity
+    k = int(fastest.max(axis=0).argmax())
+    if fastest[:, k].max() > 1.0 + EXCESS:
+        speed = np.abs(lead.trajectory.velocities[:, k]).max()
+        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+        return Refusal(
+            PlanStatus.START_MOVES,
+            f'{arm.joint_names[k]} moves at up to {speed:.3f} {unit}, expected at most '
+            f'{limits.velocity[k]:g} {unit} or an arm at rest',
+        )
+    ways = np.concatenate([lead.trajectory.positions, lead.q_stop[None]])
+    low, high = arm.bounds
+    beyond = np.maximum(low - ways, ways - high).max(axis=0)
+    k = int(beyond.argmax())
+    if beyond[k] > ROUNDING:
+        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        return Refusal(
+            PlanStatus.START_MOVES,
+            f'{arm.joint_names[k]} moves too fast to stop straight ahead: it would pass its '
+            f'limit by {beyond[k]:.4f} {unit}, expected an arm at rest or further from it',
+        )
+    is_free = certify(lead.trajectory, world).is_proven
+    if is_free and world.is_edge_valid(
+        np.clip(lead.trajectory.positions[-1], low, high), np.clip(lead.q_stop, low, high)
+    ):
+        return None
+    return Refusal(
+        PlanStatus.START_MOVES,
+        'the arm moves, and straight ahead it would touch the wearer before it could stop; '
+        'expected an arm at rest or one with room ahead',
+    )
 
 
 def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal | None:
@@ -70,13 +141,13 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
         if excess <= 0.0:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is inside box "{box.name}"',
+                f'the target ({where}) m is inside box "{box.name}", {-excess:.4f} m deep',
             )
         if excess <= margin:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is nearer to box "{box.name}" than the margin of '
-                f'{margin:g} m',
+                f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
+                f'margin of {margin:g} m: {margin - excess:.4f} m deep in it with its margin',
             )
     return None
 
@@ -89,15 +160,21 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
             'no posture within the joint limits aims at the target',
         )
     pairs: Counter[tuple[str, str]] = Counter()
+    least: dict[tuple[str, str], float] = {}
     for q, reach in zip(goals.q_blocked, goals.blocked_reaches, strict=True):
         distances = world.clearances(q, max(reach, world.ray_length))
         for bar, box in np.argwhere(distances < 0.0):
-            pairs[world.bar_names[bar], world.box_names[box]] += 1
+            pair = (world.bar_names[bar], world.box_names[box])
+            pairs[pair] += 1
+            least[pair] = min(least.get(pair, np.inf), float(-distances[bar, box]))
     blame = 'with next to no clearance'
     if pairs:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
-        blame = f'most often {bar} and box "{box}" ({share:.0f} %)'
+        blame = (
+            f'most often {bar} and box "{box}" ({share:.0f} %), at least {least[bar, box]:.4f} m '
+            'deep in it with its margin'
+        )
     return Refusal(
         PlanStatus.GOAL_IN_COLLISION,
         f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',

@@ -13,6 +13,7 @@ class PlanStatus(Enum):
     SAMPLE_LIMIT = 'sample limit'
     CANCELLED = 'cancelled'
     START_OUT_OF_BOUNDS = 'start out of bounds'
+    START_MOVES = 'start moves'
     START_IN_COLLISION = 'start in collision'
     GOAL_IN_COLLISION = 'goal in collision'
     GOAL_UNREACHABLE = 'goal unreachable'

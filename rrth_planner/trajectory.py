@@ -168,6 +168,20 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     )
 
 
+def jerks_at(trajectory: Trajectory, times: ArrayLike) -> Array:
+    """
+    Return the jerks at some times within the motion, (m,) [s] -> (m, dof) [rad/s^3].
+
+    At a point, where two pieces meet, that of the later one.
+    """
+    t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    if len(trajectory.times) == 1:
+        return np.zeros((len(t), trajectory.positions.shape[1]))
+    i, u, width = _locate(trajectory, t)
+    c = piece_coefficients(trajectory)[i]
+    return np.asarray(((60 * c[:, 5] * u + 24 * c[:, 4]) * u + 6 * c[:, 3]) / width**3)
+
+
 def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
     """Return the piece of each time, how far in it from 0 to 1, and its width [s]."""
     grid = trajectory.times

@@ -189,14 +189,25 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
     return rows
 
 
+@functools.lru_cache(maxsize=16)
+def _mount_inverse(arm: ArmModel) -> Array:
+    inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
+    return inverse
+
+
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
     """Return the numbers of each box, (15, m): rotation, the base's position, half extents."""
-    rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
-    T_mount_base = np.linalg.inv(arm.T_base_mount)
-    for j, box in enumerate(scene.boxes):
-        axes = (T_mount_base[:3, :3] @ box.rotation).T
-        center = T_mount_base[:3, :3] @ box.center + T_mount_base[:3, 3]
-        rows[: jit.BOX_OFFSET, j] = axes.ravel()
-        rows[jit.BOX_OFFSET : jit.BOX_HALF, j] = -axes @ center
-        rows[jit.BOX_HALF :, j] = 0.5 * box.size + margin + SLACK
+    m = len(scene.boxes)
+    rows = np.empty((jit.BOX_ROWS, m))
+    if m == 0:
+        return rows
+    T_mount_base = _mount_inverse(arm)
+    rotations = np.array([box.rotation for box in scene.boxes])
+    centers = np.array([box.center for box in scene.boxes])
+    axes = (T_mount_base[:3, :3] @ rotations).transpose(0, 2, 1)
+    centers = centers @ T_mount_base[:3, :3].T + T_mount_base[:3, 3]
+    rows[: jit.BOX_OFFSET] = axes.reshape(m, 9).T
+    rows[jit.BOX_OFFSET : jit.BOX_HALF] = -(axes @ centers[:, :, None])[:, :, 0].T
+    sizes = np.array([box.size for box in scene.boxes])
+    rows[jit.BOX_HALF :] = 0.5 * sizes.T + margin + SLACK
     return rows

@@ -136,12 +136,12 @@ def test_a_target_in_the_wearer_is_refused_by_name():
     for box in wearer().boxes:
         plan = ask(wearer(), FOLDED, box.center)
         assert plan.status is PlanStatus.GOAL_IN_COLLISION
-        assert f'inside box "{box.name}"' in plan.sentence
+        assert f'inside box "{box.name}", {0.5 * box.size.min():.4f} m deep' in plan.sentence
     near = wearer().boxes[0].center + [0.15 + 0.5 * MARGIN, 0.0, 0.0]
     plan = ask(wearer(), FOLDED, near)
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
-    assert 'margin' in plan.sentence
-    assert '"torso"' in plan.sentence
+    assert 'is 0.0100 m from box "torso"' in plan.sentence
+    assert 'margin of 0.02 m: 0.0100 m deep' in plan.sentence
 
 
 def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_and_box():
@@ -160,6 +160,7 @@ def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_a
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'pointing ray' in plan.sentence
     assert '"wall_' in plan.sentence
+    assert 'm deep in it with its margin' in plan.sentence
 
 
 def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
@@ -171,8 +172,9 @@ def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
         q = rng.uniform(*world.bounds)
         if world.is_valid(q):
             continue
-        plan = ask(wearer(), q, [1.5, 0.0, 0.3])
+        plan = ask(wearer(), q, [1.5, 0.0, 0.3], escape_depth=0.0)
         assert plan.status is PlanStatus.START_IN_COLLISION
+        assert 'm deep in it with its margin, expected less than 0 m' in plan.sentence
         bar = next(name for name in world.bar_names if plan.sentence.startswith(name))
         box = next(name for name in world.box_names if f'"{name}"' in plan.sentence)
         pair = world.bar_names.index(bar), world.box_names.index(box)

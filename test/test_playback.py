@@ -2,31 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinematic arm follows, brakes along its path, and takes only what fits."""
 
-from itertools import pairwise
-
-from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.acceptance import accept, PlaybackRules
 from rrth_planner.errors import MessageError, OptionsError
+from rrth_planner.path import Path
 from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.resources import load_arm
+from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import sample, Trajectory
+from worlds import limits
 
 ARM = load_arm()
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])
-MAX_ACCELERATION = np.full(4, 4.0)
+LIMITS = limits()
 STILL = [0.0] * 4
 
 
 def rules(**changes):
     """Return the default rules with changes."""
-    given_rules = {
-        'start_tolerance': 0.01,
-        'time_scale': 1.0,
-        'max_velocity': [1.5] * 4,
-        'max_acceleration': [4.0] * 4,
-    }
+    given_rules = {'start_tolerance': 0.01, 'time_scale': 1.0, 'limits': LIMITS}
     return PlaybackRules(**(given_rules | changes))
 
 
@@ -119,6 +114,13 @@ def test_a_motion_replaces_the_running_one_from_its_present_state():
         ),
         (motion(FOLDED, FOLDED + [2.0, 0.0, 0.0, 0.0], duration=2.0), 'joint_1: velocity'),
         (motion(FOLDED, FOLDED + [0.0, 0.0, 0.0, 0.5], duration=0.7), 'joint_4: acceleration'),
+        # Touched by so little, and so shortly, that no 64 samples of the piece see it: 1.0101
+        # times the velocity at 1.0 s, 1.0102 times the acceleration 0.4226 s from either end.
+        (motion(FOLDED, FOLDED + [1.61616, 0.0, 0.0, 0.0], duration=2.0), 'joint_1: velocity 1.5'),
+        (
+            motion(FOLDED, FOLDED - [0.0, 0.0, 0.0, 0.69997], duration=1.0),
+            'joint_4: acceleration -4.0|joint_4: acceleration 4.0',
+        ),
     ],
 )
 def test_a_motion_that_does_not_fit_is_refused(move, words):
@@ -159,50 +161,13 @@ def test_slow_motion_is_held_to_limits_as_it_is_played():
         {'time_scale': 1.1},
         {'start_tolerance': 0.0},
         {'start_tolerance': np.nan},
-        {'max_velocity': [1.0, 0.0, 1.0, 1.0]},
-        {'max_acceleration': [np.nan] * 4},
+        {'start_tolerance': np.inf},
+        {'time_scale': np.nan},
     ],
 )
 def test_rules_out_of_range_are_refused_by_name(bad):
     with pytest.raises(OptionsError, match=next(iter(bad))):
         rules(**bad)
-
-
-@settings(max_examples=30, deadline=None)
-@given(
-    corners=st.lists(
-        st.tuples(
-            st.floats(-3.0, 3.0), st.floats(-3.0, 0.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)
-        ),
-        min_size=1,
-        max_size=3,
-    ),
-    when=st.floats(0.0, 1.0),
-    scale=st.sampled_from([1.0, 0.7, 0.2]),
-)
-def test_a_stop_keeps_to_path_and_limits_and_is_never_later_than_the_end(corners, when, scale):
-    steps = [np.abs(np.subtract(b, a)).max() for a, b in pairwise([FOLDED, *corners])]
-    duration = max(0.1, *(max(s * 1.875 / 1.5, np.sqrt(s * 5.774 / 4.0)) for s in steps))
-    move = motion(FOLDED, *corners, duration=duration)
-    playback = Playback(trajectory=move, start_time=1.0, time_scale=scale)
-    time = 1.0 + when * move.duration / scale
-    stopped = stop(playback, MAX_ACCELERATION, time)
-
-    assert stopped.end_time <= playback.end_time + 1e-9
-    np.testing.assert_array_equal(stopped.state_at(time)[0], playback.state_at(time)[0])
-    instants = np.linspace(time, stopped.end_time + 0.1, 4001)
-    q, v, a = stopped.states_at(instants)
-    assert np.abs(a).max() <= 4.0 * (1.0 + 1e-3)
-    assert np.abs(v).max() <= 1.5 * (1.0 + 1e-3)
-    assert np.abs(v[-1]).max() < 1e-12
-    # Velocities are those of the positions, accelerations those of the velocities.
-    step = instants[1] - instants[0]
-    np.testing.assert_allclose(np.diff(q, axis=0) / step, 0.5 * (v[1:] + v[:-1]), atol=5e-3)
-    np.testing.assert_allclose(np.diff(v, axis=0) / step, 0.5 * (a[1:] + a[:-1]), atol=0.3)
-    # Each position is between two neighbouring ones of the path.
-    path = sample(move, np.linspace(0.0, move.duration, 4001))[0]
-    gaps = np.abs(q[::200, None] - path[None]).max(axis=2).min(axis=1)
-    assert gaps.max() <= 1.5 * move.duration / 4000
 
 
 def test_a_stop_in_full_motion_takes_effect_soon():
@@ -211,22 +176,154 @@ def test_a_stop_in_full_motion_takes_effect_soon():
         start_time=0.0,
         time_scale=1.0,
     )
-    stopped = stop(playback, MAX_ACCELERATION, 1.0)
+    stopped = stop(playback, LIMITS, 1.0)
     assert stopped.end_time < 1.9
     assert stopped.state_at(10.0)[0][1] > FOLDED[1] - 1.6
 
 
 def test_a_stop_at_rest_or_twice_changes_nothing():
     still = standing(FOLDED)
-    assert stop(still, MAX_ACCELERATION, 4.0) is still
+    assert stop(still, LIMITS, 4.0) is still
     running = taken(still, motion(FOLDED, FOLDED - 0.5, duration=2.0))
-    once = stop(running, MAX_ACCELERATION, 0.9)
-    assert stop(once, MAX_ACCELERATION, 1.0) is once
-    assert stop(running, MAX_ACCELERATION, 2.1) is running
+    once = stop(running, LIMITS, 0.9)
+    assert stop(once, LIMITS, 1.0) is once
+    assert stop(running, LIMITS, 2.1) is running
 
 
 def test_a_stop_before_the_motion_begins_drops_it():
     waiting = Playback(
         trajectory=motion(FOLDED, FOLDED - 0.5, duration=2.0), start_time=5.0, time_scale=1.0
     )
-    assert (stop(waiting, MAX_ACCELERATION, 4.0).state_at(9.0)[0] == FOLDED).all()
+    assert (stop(waiting, LIMITS, 4.0).state_at(9.0)[0] == FOLDED).all()
+
+
+def test_limits_hold_between_any_samples_and_jerk_is_the_planners_choice():
+    # The velocity's bulge of 1.5e-5 above the limit lasts 4 ms of 2 s.
+    top = 1.5 * 1.01 * 2.0 / 1.875
+    for size, is_taken in ((top * (1 - 1e-6), True), (top * (1 + 1e-6), False)):
+        move = motion(FOLDED, FOLDED - [size, 0.0, 0.0, 0.0], duration=2.0)
+        if is_taken:
+            taken(standing(FOLDED), move)
+        else:
+            with pytest.raises(MessageError, match='joint_1: velocity -1.515'):
+                taken(standing(FOLDED), move)
+    # Up to 0.3 rad/s^2 within 1 ms: 300 rad/s^3.
+    q, v = FOLDED + 0.3 * 1e-6 / 6.0, np.full(4, 0.3 * 1e-3 / 2.0)
+    jerky = Trajectory(
+        times=[0.0, 1e-3, 2.0],
+        positions=[FOLDED, q, FOLDED],
+        velocities=[STILL, v, STILL],
+        accelerations=[STILL, [0.3] * 4, STILL],
+    )
+    assert taken(standing(FOLDED), jerky).end_time == 2.0
+
+
+def test_a_single_point_is_held_if_the_arm_is_there():
+    assert taken(standing(FOLDED), motion(FOLDED, duration=1.0)).state_at(9.0)[0] is not None
+    with pytest.raises(MessageError, match='begins at position'):
+        taken(standing(FOLDED), motion(FOLDED - 0.1, duration=1.0))
+
+
+def turn_from(state, q_goal, duration):
+    """Return a motion from a moving state to rest."""
+    q, v, a = state
+    return Trajectory(
+        times=[0.0, duration],
+        positions=[q, q_goal],
+        velocities=[v, STILL],
+        accelerations=[a, STILL],
+    )
+
+
+@pytest.mark.parametrize(
+    ('off', 'words'),
+    [
+        ((0.009, 0.0), None),
+        ((0.0, 0.009), None),
+        ((0.011, 0.0), 'begins at position'),
+        ((0.0, 0.011), 'begins at velocity'),
+    ],
+)
+def test_in_mid_motion_only_a_motion_from_the_present_state_takes_over(off, words):
+    running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
+    q, v, a = running.state_at(0.8)
+    turned = turn_from((q + off[0], v + off[1], a), FOLDED, 2.5)
+    if words is None:
+        assert taken(running, turned, 0.8).trajectory is turned
+        return
+    with pytest.raises(MessageError, match=words):
+        taken(running, turned, 0.8)
+    # What was refused is nowhere: the running motion is a value of its own.
+    assert (running.state_at(2.0)[0] == FOLDED - 0.5).all()
+
+
+def test_in_slow_motion_a_motion_from_the_present_state_is_as_slow_as_the_one_it_replaces():
+    running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0), time_scale=0.5)
+    q, v, a = running.state_at(1.6)
+    # The new motion is scaled too, so it is to be given as it would be at full rate.
+    turned = turn_from((q, v / 0.5, a / 0.25), FOLDED, 2.5)
+    replaced = taken(running, turned, 1.6, time_scale=0.5)
+    for one, other in zip(replaced.state_at(1.6), (q, v, a), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    with pytest.raises(MessageError, match='begins at velocity'):
+        taken(running, turn_from((q, v, a), FOLDED, 2.5), 1.6, time_scale=0.5)
+
+
+def test_a_braking_arm_takes_a_motion_from_its_present_state():
+    running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 1.0, duration=2.5))
+    stopped = stop(running, LIMITS, 1.0)
+    replaced = taken(stopped, turn_from(stopped.state_at(1.1), FOLDED, 2.5), 1.1)
+    for one, other in zip(replaced.state_at(1.1), stopped.state_at(1.1), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    again = stop(replaced, LIMITS, 1.6)
+    assert again.end_time < replaced.end_time
+
+
+def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
+    rng, now, n_motions, n_stops, n_turns = np.random.default_rng(5), 0.0, 0, 0, 0
+    playback = standing(FOLDED)
+    low, high = ARM.bounds + np.array([[0.3], [-0.3]])
+    while now < 3600.0:
+        q, v, a = playback.state_at(now)
+        assert not v.any()
+        q_goal = np.clip(q + rng.uniform(-1.5, 1.5, 4), low, high)
+        move = parameterize(Path(np.stack([q, q_goal])), (), LIMITS)
+        scale = float(rng.choice([1.0, 1.0, 0.5]))
+        playback = taken(playback, move, now, time_scale=scale)
+        n_motions += 1
+        kind = rng.integers(0, 4)
+        at = now + rng.uniform(0.2, 0.8) * (playback.end_time - now)
+        if kind == 0:
+            before = playback.state_at(at)
+            playback = stop(playback, LIMITS, at)
+            for one, other in zip(playback.state_at(at), before, strict=True):
+                np.testing.assert_allclose(one, other, atol=1e-9)
+            n_stops += 1
+        elif kind == 1:
+            state = playback.state_at(at)
+            turned = turn_from(state, q, 6.0)
+            try:
+                playback = taken(playback, turned, at)
+            except MessageError:
+                # It swings out of the bounds: the running motion goes on.
+                pass
+            else:
+                n_turns += 1
+        # Each state lies on the motion, at the time that has passed.
+        times = np.sort(rng.uniform(playback.start_time, playback.end_time, 8))
+        states = playback.states_at(times)
+        expected = sample(playback.trajectory, playback.phase(times)[0])[0]
+        np.testing.assert_allclose(states[0], expected, atol=1e-9)
+        until = np.minimum(times, playback.brake_time)
+        passed = playback.time_scale * (until - playback.start_time)
+        unbraked = times <= playback.brake_time
+        expected = sample(playback.trajectory, passed)[0]
+        np.testing.assert_allclose(states[0][unbraked], expected[unbraked], atol=1e-9)
+        now = playback.end_time + rng.uniform(0.01, 0.5)
+        q_end, v_end, a_end = playback.state_at(now)
+        assert not v_end.any()
+        assert not a_end.any()
+        if playback.brake is None:
+            np.testing.assert_allclose(q_end, playback.trajectory.positions[-1], atol=1e-9)
+    assert n_motions > 1000
+    assert min(n_stops, n_turns) > 100

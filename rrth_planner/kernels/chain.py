@@ -13,10 +13,11 @@ from typing import Any
 from numba.core.types import float64, int64
 from rrth_planner.kernels.jit import (
     A,
-    CACHE_FOLDER,
+    cache_folder,
     COS_ALPHA,
     D,
     first_class,
+    forgo_cache,
     kernel,
     KIND,
     NO_BAR,
@@ -204,21 +205,35 @@ def chain_of(rows: Any) -> Any:
     if digest not in _COMPILED:
         name = f'chain_{digest}'
         space: dict[str, Any] = {'__name__': f'rrth_planner.kernels.{name}'}
-        if CACHE_FOLDER is None:
+        file = _kept(name, text)
+        if file is None:
             exec(compile(text, f'<{name}>', 'exec'), space)  # noqa: S102
         else:
-            space = vars(_module(CACHE_FOLDER / f'{name}.py', text))
+            space = vars(_module(file))
         _COMPILED[digest] = first_class(space['chain'])
     return _COMPILED[digest]
 
 
-def _module(file: Path, text: str) -> Any:
-    """Return the module of a file that is written if it is not there."""
+def _kept(name: str, text: str) -> Path | None:
+    """Return the file of a module, written if it is not there; None where it cannot be."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    file, draft = folder / f'{name}.py', folder / f'{name}.{os.getpid()}'
     # numba keeps compiled code by the file's path and time, so it is written once.
     if not file.exists():
-        draft = file.with_suffix(f'.{os.getpid()}')
-        draft.write_text(text, encoding='utf-8')
-        draft.replace(file)
+        try:
+            draft.write_text(text, encoding='utf-8')
+            draft.replace(file)
+        except OSError as problem:
+            forgo_cache(problem)
+            draft.unlink(missing_ok=True)
+            return None
+    return file
+
+
+def _module(file: Path) -> Any:
+    """Return the module of a file."""
     spec = importlib.util.spec_from_file_location(file.stem, file)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

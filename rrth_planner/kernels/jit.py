@@ -7,6 +7,7 @@ import contextlib
 import hashlib
 import os
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 import warnings
 
@@ -24,6 +25,7 @@ MAT = types.Array(float64, 2, 'C', readonly=True)
 READ_INTS = types.Array(int64, 1, 'C', readonly=True)
 OUT_VEC = types.Array(float64, 1, 'C')
 OUT_MAT = types.Array(float64, 2, 'C')
+CUBE = types.Array(float64, 3, 'C', readonly=True)
 OUT_CUBE = types.Array(float64, 3, 'C')
 OUT_CUBES = types.Array(float64, 4, 'C')
 OUT_FLAGS = types.Array(types.int8, 1, 'C')
@@ -107,23 +109,43 @@ def _cache_folder() -> Path | None:
         if not os.access(folder, os.W_OK):
             raise PermissionError('not writable')
     except OSError as problem:
-        warnings.warn(
-            f'compiled kernels are not kept: {folder}: {problem}; expected a writable folder '
-            '(environment variable RRTH_CACHE_DIR)',
-            RuntimeWarning,
-            stacklevel=2,
-        )
+        _warn_once(folder, problem)
         return None
     return folder
 
 
-CACHE_FOLDER = _cache_folder()
+def _warn_once(folder: Path | None, problem: Exception) -> None:
+    global _has_warned
+    if not _has_warned:
+        _has_warned = True
+        warnings.warn(
+            f'compiled kernels are not kept: {folder}: {problem}; expected a writable folder with '
+            'room for them (environment variable RRTH_CACHE_DIR)',
+            RuntimeWarning,
+            stacklevel=3,
+        )
+
+
+_has_warned = False
+_folder = _cache_folder()
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of the compiled code, or None where none can be written."""
+    return _folder
+
+
+def forgo_cache(problem: OSError) -> None:
+    """Keep no more code, since the folder turned out not to take any: warned about once."""
+    global _folder
+    _warn_once(_folder, problem)
+    _folder = None
 
 
 def _stamp() -> Path | None:
     # numba files what it keeps by the path of the source, so another checkout compiles anew.
     path = hashlib.sha256(os.path.realpath(__file__).encode()).hexdigest()[:16]
-    return None if CACHE_FOLDER is None else CACHE_FOLDER / f'complete-{path}'
+    return None if _folder is None else _folder / f'complete-{path}'
 
 
 def is_compiled() -> bool:
@@ -147,21 +169,30 @@ def kernel(signature: Any, inline: str = 'never') -> Callable[[Callable[..., Any
     inline: 'always' writes the kernel out where it is called, for the few whose call costs as much
     as what they do; the compiler itself takes only the smallest.
     """
+    # No `nnan`: a NaN must fail every comparison, and so never be certified.
+    options = {
+        'nogil': True,
+        'error_model': 'numpy',
+        'inline': inline,
+        'fastmath': {'contract', 'arcp', 'nsz'},
+    }
 
     def decorate(function: Callable[..., Any]) -> Any:
-        given = config.CACHE_DIR
-        if CACHE_FOLDER is not None:
-            config.CACHE_DIR = str(CACHE_FOLDER)
+        if _folder is not None:
+            try:
+                return kept(function)
+            except OSError as problem:
+                # A full disk, for one: what is compiled from here on stays in memory.
+                forgo_cache(problem)
+            except (EOFError, UnpicklingError, ValueError) as problem:
+                # What is kept of this kernel was cut short.
+                _warn_once(_folder, problem)
+        return njit(signature, **options)(function)
+
+    def kept(function: Callable[..., Any]) -> Any:
+        given, config.CACHE_DIR = config.CACHE_DIR, str(_folder)
         try:
-            # No `nnan`: a NaN must fail every comparison, and so never be certified.
-            return njit(
-                signature,
-                cache=CACHE_FOLDER is not None,
-                nogil=True,
-                error_model='numpy',
-                inline=inline,
-                fastmath={'contract', 'arcp', 'nsz'},
-            )(function)
+            return njit(signature, cache=True, **options)(function)
         finally:
             config.CACHE_DIR = given
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, SceneError
+from rrth_planner.errors import MessageError, one_line, SceneError
 from rrth_planner.ros.fields import numbers, position_of, rotation_of, seconds_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
 from rrth_planner.scene import Box, Scene
@@ -18,6 +18,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 MOST_BOXES = 10000
 # So many markers whose lifetime has passed are remembered, to be named.
 MOST_EXPIRED = 100
+# A body is kept, and so are its names [characters]; longer texts are cut short.
+LONGEST_NAMESPACE, LONGEST_NAME = 256, 100
 
 Key = tuple[str, int]
 
@@ -87,7 +89,12 @@ class WearerBody:
         """Return the body without the parts whose lifetime has passed at a time [s]."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        gone = dict(self.expired) | {k: part for k, part in self.parts if part.expires <= now}
+        # Their first box is enough to name them.
+        gone = dict(self.expired) | {
+            k: BodyPart(part.boxes[:1], part.expires)
+            for k, part in self.parts
+            if part.expires <= now
+        }
         return WearerBody(
             tuple(item for item in self.parts if item[1].expires > now),
             tuple(gone.items())[-MOST_EXPIRED:],
@@ -170,11 +177,16 @@ def scene_of(body: WearerBody) -> Scene:
 
 def marker_name(marker: Any) -> str:
     """Return what sentences call a marker: its text, or `ns/id` where it has none."""
-    return marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
+    name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
+    return one_line(name, LONGEST_NAME)
 
 
 def _edit(label: str, marker: Any, now: float, base_frame: str, lookup: Lookup | None) -> Edit:
     key = (marker.ns, marker.id)
+    if len(marker.ns) > LONGEST_NAMESPACE:
+        raise MessageError(
+            f'{label}: ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
+        )
     if marker.action in (Marker.DELETE, Marker.DELETEALL):
         return Edit(marker.action, key)
     if marker.action != Marker.ADD:
@@ -202,10 +214,12 @@ def _body_part(marker: Any, now: float, base_frame: str, lookup: Lookup | None) 
         raise MessageError(f'lifetime: {lifetime}, expected 0 (for ever) or more [s]')
     T = pose_in_base(marker.header.frame_id, base_frame, lookup)
     rotation_base = T[:3, :3] @ rotation
-    boxes = tuple(
-        Box(name, T[:3, :3] @ (center + rotation @ offset) + T[:3, 3], size, rotation_base)
-        for name, offset in _boxes_of(marker)
-    )
+    # What overflows is infinite, which a box refuses.
+    with np.errstate(over='ignore', invalid='ignore'):
+        boxes = tuple(
+            Box(name, T[:3, :3] @ (center + rotation @ offset) + T[:3, 3], size, rotation_base)
+            for name, offset in _boxes_of(marker)
+        )
     return BodyPart(boxes, now + lifetime if lifetime > 0.0 else float('inf'))
 
 

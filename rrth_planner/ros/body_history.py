@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from rrth_planner.ros.bodies import Edit, WearerBody
 
-# So many arrays are remembered.
-REMEMBERED = 100
+# So many arrays are remembered, and so many boxes at most.
+REMEMBERED, REMEMBERED_BOXES = 100, 20_000
 
 
 class BodyHistory:
@@ -21,6 +21,7 @@ class BodyHistory:
     def __init__(self) -> None:
         """Begin with nothing remembered."""
         self._heard: list[tuple[int, float, tuple[Edit, ...]]] = []
+        self._has_forgotten = False
 
     def apply(
         self, body: WearerBody, edits: Sequence[Edit], sent: int, received: float
@@ -46,12 +47,24 @@ class BodyHistory:
 
         """
         newer = [item for item in self._heard if item[0] > sent]
-        if newer and len(newer) == len(self._heard) == REMEMBERED:
+        if newer and len(newer) == len(self._heard) and self._has_forgotten:
             # Newer arrays may be forgotten: what they put there must not be lost.
             return body.with_older(edits, received)
         body = body.edited(edits, received)
         for _, time, later in newer:
             body = body.edited(later, time)
         older = self._heard[: len(self._heard) - len(newer)]
-        self._heard = [*older, (sent, received, tuple(edits)), *newer][-REMEMBERED:]
+        self._heard = [*older, (sent, received, tuple(edits)), *newer]
+        self._forget()
         return body.at(received)
+
+    def _forget(self) -> None:
+        """Keep to the arrays that were sent last."""
+        n_boxes = n_kept = 0
+        for _, _, edits in reversed(self._heard[-REMEMBERED:]):
+            n_boxes += sum(1 if edit.part is None else len(edit.part.boxes) for edit in edits)
+            if n_kept and n_boxes > REMEMBERED_BOXES:
+                break
+            n_kept += 1
+        self._has_forgotten |= n_kept < len(self._heard)
+        del self._heard[:-n_kept]

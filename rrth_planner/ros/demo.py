@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo: planner and playback as processes, three targets, each motion judged and drawn."""
+"""The demo: planner and playback as processes, targets, a wearer who moves; judged and drawn."""
 
 import argparse
 from collections.abc import Sequence
@@ -19,6 +19,7 @@ from rclpy.signals import SignalHandlerOptions
 from rrth_planner.arm import pointing_error
 from rrth_planner.errors import RrthError
 from rrth_planner.inspection import inspect_motion
+from rrth_planner.oracle import first_contact, least_clearance
 from rrth_planner.resources import load_arm, load_yaml, resource_path
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.demo_client import DemoClient, DemoError
@@ -30,6 +31,8 @@ from visualization_msgs.msg import MarkerArray
 
 POINTING_TOLERANCE = 1e-3
 DOTS_PER_INCH = 110
+# On the way to the last of these targets, so long after the arm set off, the wearer moves [s].
+RAISED, RAISED_ON_THE_WAY, RAISED_AFTER = 'body_arm_raised', ('left', 'low'), 0.5
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"aims past":>12}'
 )
@@ -117,7 +120,9 @@ def _run(options: argparse.Namespace) -> None:
         client.tell_body(body)
         lines, figure = _visit(client, settings, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
+        went_round = _raise_arm(client, settings)
     print('\n' + '\n'.join([HEADER, *lines]))
+    print(went_round)
     print(f'\nEvery motion was judged safe by an independent check. Picture: {options.output}')
 
 
@@ -170,6 +175,33 @@ def _visit(
             )
         )
     return lines, motion_figure(arm, scene, motions, limits, ray_guard_length)
+
+
+def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
+    """Have the wearer raise an arm into the way of a motion; return what came of it."""
+    frame, arm = settings['base_frame'], load_arm(settings.get('arm'))
+    raised = _example(RAISED, MarkerArray)
+    scene = scene_of(WearerBody().apply(raised, 0.0, frame))
+    for name in RAISED_ON_THE_WAY:
+        message = _example(f'target_{name}', PointStamped)
+        client.tell_target(message)
+        client.watch()
+        trajectory, _ = client.ask_for_motion()
+        if name != RAISED_ON_THE_WAY[-1]:
+            client.wait_for_arrival(trajectory)
+    print('The wearer raises an arm in mid-motion.', flush=True)
+    q = client.raise_arm(raised, RAISED_AFTER)
+    contact = first_contact(arm, scene, q, settings['ray_guard_length'], 0.0)
+    if contact is not None:
+        raise DemoError(f'bar {contact.bar} of the arm touched {contact.box} after it was raised')
+    clearance = least_clearance(arm, scene, q, settings['ray_guard_length'])
+    error = pointing_error(arm, client.positions(), goal_from_msg(message, frame).target)
+    if not error <= POINTING_TOLERANCE:
+        raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
+    return (
+        f'{name:10} the wearer raised an arm in mid-motion: the arm stopped, went round it at '
+        f'{clearance:.3f} m, and aims {1e3 * error:.3f} mm past the target'
+    )
 
 
 def _show(name: str, line: str) -> None:

@@ -59,6 +59,9 @@ class DemoClient(Node):
         self._arm, self._timeout, self._check = arm, timeout, check
         self._state: JointState | None = None
         self._motion: JointTrajectory | None = None
+        # All that the arm was told, and where it was, since `watch` was called.
+        self._told: list[JointTrajectory] = []
+        self._seen: list[JointState] = []
         self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self.create_subscription(JointState, 'joint_states', self._on_state, 10)
@@ -127,6 +130,31 @@ class DemoClient(Node):
             trajectory.duration + self._timeout,
         )
 
+    def watch(self) -> None:
+        """Begin to write down what the arm is told and where it is."""
+        self._told, self._seen = [], []
+
+    def raise_arm(self, body: MarkerArray, after: float) -> Array:
+        """
+        Publish another body so long after the arm set off [s]; return where the arm was from then.
+
+        Waits until the arm has been stopped, has been told how to go on, and has arrived there.
+        """
+        end = time.monotonic() + after
+        while time.monotonic() < end:
+            self._spinner.spin_once(timeout_sec=0.005)
+        n = len(self._told)
+        self._seen = []
+        self.tell_body(body)
+        # The stop begins in motion, what comes after it at rest.
+        self.wait_for(
+            lambda: len(self._told) > n + 1 and not any(self._told[-1].points[0].velocities),
+            'a stop and a way round',
+            self._timeout,
+        )
+        self.wait_for_arrival(joint_trajectory_from_msg(self._told[-1], self._arm.joint_names))
+        return np.array([configuration_from_msg(m, self._arm.joint_names) for m in self._seen])
+
     def _wait_for_listener(self, publisher: Any) -> None:
         self.wait_for(
             lambda: publisher.get_subscription_count() > 0,
@@ -157,6 +185,8 @@ class DemoClient(Node):
 
     def _on_state(self, msg: JointState) -> None:
         self._state = msg
+        self._seen.append(msg)
 
     def _on_motion(self, msg: JointTrajectory) -> None:
         self._motion = msg
+        self._told.append(msg)

@@ -2,13 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the planner is doing, as diagnostics."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+import math
+from types import MappingProxyType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rrth_planner.errors import one_line
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
+
+# Durations are counted in bins, so many a decade from the shortest on [s].
+BINS, DECADES, SHORTEST = 48, 8, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +55,41 @@ class PlanReport:
     clearance: float = float('nan')
 
 
+class Figures:
+    """How often something was done, and how long it took the last time, mostly and at most [s]."""
+
+    def __init__(self) -> None:
+        """Begin with nothing done."""
+        self.n, self.last, self.most = 0, 0.0, 0.0
+        # As many numbers after a year as after a minute.
+        self._counts = [0] * (BINS * DECADES)
+
+    def add(self, elapsed: float) -> None:
+        """Count once more."""
+        self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
+        at = math.ceil(BINS * math.log10(max(elapsed, SHORTEST) / SHORTEST))
+        self._counts[min(at, len(self._counts) - 1)] += 1
+
+    def quantile(self, share: float) -> float:
+        """Return what a share of all took at most, rounded up by no more than 5 % [s]."""
+        wanted, seen = share * self.n, 0
+        for k, count in enumerate(self._counts):
+            seen += count
+            if count and seen >= wanted:
+                return min(self.most, SHORTEST * 10.0 ** (k / BINS))
+        return self.most
+
+    def __str__(self) -> str:
+        """Return the figures in a line."""
+        shown = {
+            'last': self.last,
+            'p50': self.quantile(0.5),
+            'p99': self.quantile(0.99),
+            'at most': self.most,
+        }
+        return ', '.join([str(self.n), *(f'{k} {1e3 * v:.3f} ms' for k, v in shown.items())])
+
+
 def diagnostics_msg(
     node_name: str,
     stamp: Any,
@@ -55,6 +97,8 @@ def diagnostics_msg(
     heard: Inputs,
     parameters: PlannerParameters,
     report: PlanReport,
+    guard: tuple[str, str] = ('', ''),
+    figures: Mapping[str, Figures | int | str] = MappingProxyType({}),
 ) -> DiagnosticArray:
     """
     Return the diagnostics of the planner.
@@ -71,6 +115,10 @@ def diagnostics_msg(
     parameters : PlannerParameters
         For the timeouts.
     report : PlanReport
+    guard : tuple of str
+        What the guard of the running motion does, and why.
+    figures : mapping
+        Of what it did, and of incidents, by name.
 
     """
     body = heard.body.value.at(now)
@@ -89,8 +137,11 @@ def diagnostics_msg(
         'boxes': str(body.n_boxes),
         'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
     }
+    values['guard'], values['last stop'] = guard
+    values.update({name: str(figure) for name, figure in figures.items()})
     for name, topic in heard.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
+        values[f'good messages, {name}'] = str(topic.n_good)
         values[f'refused messages, {name}'] = str(topic.n_refused)
         values[f'last refusal, {name}'] = str(topic.refusal or '')
     status = DiagnosticStatus(
@@ -99,7 +150,7 @@ def diagnostics_msg(
         hardware_id='rrth_planner',
         message=message,
     )
-    status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
+    status.values = [KeyValue(key=key, value=one_line(value)) for key, value in values.items()]
     msg = DiagnosticArray(status=[status])
     msg.header.stamp = stamp
     return msg

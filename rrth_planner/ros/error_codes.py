@@ -4,6 +4,7 @@
 
 from enum import IntEnum
 
+from rrth_planner.errors import one_line
 from rrth_planner.status import PlanStatus
 
 
@@ -33,6 +34,7 @@ CODE_OF_STATUS = {
     PlanStatus.SAMPLE_LIMIT: ErrorCode.PLANNING_FAILED,
     PlanStatus.CANCELLED: ErrorCode.PREEMPTED,
     PlanStatus.START_OUT_OF_BOUNDS: ErrorCode.START_STATE_INVALID,
+    PlanStatus.START_MOVES: ErrorCode.START_STATE_INVALID,
     PlanStatus.START_IN_COLLISION: ErrorCode.START_STATE_IN_COLLISION,
     PlanStatus.GOAL_IN_COLLISION: ErrorCode.GOAL_IN_COLLISION,
     PlanStatus.GOAL_UNREACHABLE: ErrorCode.NO_IK_SOLUTION,
@@ -41,5 +43,5 @@ CODE_OF_STATUS = {
 
 
 def answer(code: ErrorCode, sentence: str) -> str:
-    """Return what a service answers: `NAME (number): sentence`."""
-    return f'{code.name} ({code.value}): {sentence}'
+    """Return what a service answers, in one line: `NAME (number): sentence`."""
+    return one_line(f'{code.name} ({code.value}): {sentence}')

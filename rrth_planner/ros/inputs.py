@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
@@ -14,10 +15,12 @@ from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.messages import FrameError, JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
+from rrth_planner.takeover import REST_SPEED, Takeover, takeover
+from rrth_planner.trajectory import Trajectory
 
 T = TypeVar('T')
-# An arm that moves faster is not at rest [rad/s].
-REST_SPEED = 0.01
+# A message from further ahead was heard before the clock was set back: nobody knows when [s].
+CLOCK_STEP = 0.1
 
 
 class RequestError(RrthError):
@@ -47,7 +50,7 @@ class Input(Generic[T]):
         self.topic = topic
         self.value = empty
         self.received: float | None = None
-        self.n_refused = 0
+        self.n_good, self.n_refused = 0, 0
         self.refusal: MessageError | None = None
         self.is_last_refused = False
 
@@ -61,12 +64,15 @@ class Input(Generic[T]):
             self.is_last_refused = True
             return False
         self.received = now
+        self.n_good += 1
         self.is_last_refused = False
         return True
 
     def age(self, now: float) -> float:
-        """Return the time since the last good message; inf before it [s]."""
-        return float('inf') if self.received is None else max(0.0, now - self.received)
+        """Return the time since the last good message; inf before it, or where unknown [s]."""
+        if self.received is None or now < self.received - CLOCK_STEP:
+            return float('inf')
+        return max(0.0, now - self.received)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,21 +88,38 @@ class PlanInputs:
         """Where the arm is, shape (dof,) [rad]."""
         return self.joints.positions
 
+    def is_moving(self, now: float) -> bool:
+        """Return whether the arm moves at a time [s]."""
+        joints = self.joints
+        return now <= joints.velocities_expire and not bool(
+            (np.abs(joints.velocities) <= REST_SPEED).all()
+        )
+
     def require_rest(self, now: float, arm: ArmModel) -> None:
-        """Raise RequestError where the arm moves at a time [s]: motions begin at rest."""
-        if now > self.joints.velocities_expire:
-            return
-        speeds = abs(self.joints.velocities).tolist()
-        for name, speed, is_prismatic in zip(
-            arm.joint_names, speeds, arm.is_prismatic, strict=True
-        ):
-            if not speed <= REST_SPEED:
-                unit = 'm/s' if is_prismatic else 'rad/s'
-                raise RequestError(
-                    ErrorCode.START_STATE_INVALID,
-                    f'{name} moves at {speed:.3f} {unit}, expected an arm at rest (at most '
-                    f'{REST_SPEED:g} {unit})',
-                )
+        """Raise RequestError where the arm moves at a time [s]."""
+        if self.is_moving(now):
+            raise RequestError(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
+            )
+
+    def ahead(self, running: Trajectory | None, time: float, arm: ArmModel) -> Takeover:
+        """Return what an arm that moves will do at a time [s], or raise RequestError."""
+        joints = self.joints
+        if not np.isfinite(joints.velocities).all():
+            raise RequestError(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected a velocity for every joint',
+            )
+        # Speeds that overflow belong to no motion, and are refused as too fast.
+        with np.errstate(all='ignore'):
+            return takeover(joints.positions, joints.velocities, running, time - joints.taken)
+
+    def _fastest(self, arm: ArmModel) -> str:
+        speeds = np.abs(self.joints.velocities)
+        k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
+        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+        return f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}'
 
 
 class Inputs:

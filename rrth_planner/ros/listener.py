@@ -8,6 +8,7 @@ from typing import Any
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
+from rrth_planner.errors import MessageError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.bodies import read_edits
 from rrth_planner.ros.body_history import BodyHistory
@@ -55,12 +56,32 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
+        # Called after each good body; set once there is somebody to tell.
+        self.on_body: Callable[[], None] = lambda: None
         self._history = BodyHistory()
         self._subscriptions = [
-            OpenSubscription(node, MarkerArray, 'body_boxes', self._on_body, self._on_body),
-            OpenSubscription(node, PointStamped, 'target', self._on_target),
-            OpenSubscription(node, JointState, 'joint_states', self._on_joints),
+            self._subscribe(
+                MarkerArray, 'body_boxes', inputs.body, self._on_body, on_late=self._on_body
+            ),
+            self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
+            self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
         ]
+
+    def _subscribe(
+        self,
+        kind: type,
+        topic: str,
+        heard: Input[Any],
+        on_message: Callable[[Any, int], None],
+        on_late: Callable[[Any, int], None] | None = None,
+    ) -> OpenSubscription:
+        def refuse(problem: MessageError) -> None:
+            def read() -> Any:
+                raise problem
+
+            self._take(heard, read, self._now())
+
+        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse)
 
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
@@ -75,7 +96,8 @@ class Listener:
             edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
             return self._history.apply(body.value, edits, sent, now)
 
-        self._take(body, read, now)
+        if self._take(body, read, now):
+            self.on_body()
 
     def _on_target(self, msg: PointStamped, _: int) -> None:
         if not msg.header.frame_id:
@@ -91,13 +113,14 @@ class Listener:
         if set(self._joint_names) <= set(msg.name):
             self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
 
-    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> None:
+    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> bool:
         was_good = heard.received is not None and not heard.is_last_refused
         is_good = heard.accept(read, now)
         if not is_good:
             self._warn(heard)
         if is_good != was_good:
             self._on_change()
+        return is_good
 
     def _warn(self, heard: Input[Any]) -> None:
         present = time.monotonic()

@@ -15,7 +15,7 @@ from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import MessageError, SceneError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.fields import position_of
+from rrth_planner.ros.fields import position_of, seconds_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
 from rrth_planner.ros.trajectories import (
     joint_trajectory_from_msg,
@@ -25,6 +25,8 @@ from rrth_planner.ros.trajectories import (
 )
 from sensor_msgs.msg import JointState
 
+# A message may be so long on its way; its stamp is of another clock if it seems longer [s].
+LONGEST_WAY = 1.0
 # Positions that are older than this say nothing about the present velocity [s].
 DIFFERENCE_AGE = 0.5
 
@@ -67,7 +69,9 @@ def goal_from_msg(
     point = position_of(msg.point, 'point')
     T = pose_in_base(msg.header.frame_id, base_frame, lookup)
     try:
-        return PointingGoal(T[:3, :3] @ point + T[:3, 3])
+        # What overflows is infinite, which a goal refuses.
+        with np.errstate(over='ignore', invalid='ignore'):
+            return PointingGoal(T[:3, :3] @ point + T[:3, 3])
     except SceneError as problem:
         raise MessageError(str(problem)) from problem
 
@@ -114,6 +118,9 @@ class JointReading:
         [rad].
     velocities : ndarray, shape (dof,)
         As they were given, NaN included, or how the positions changed [rad/s].
+    taken : float
+        When the arm was there: the stamp of the message if it is a little older than its
+        reception, else that [s].
     received : float
         [s].
     velocities_expire : float
@@ -123,6 +130,7 @@ class JointReading:
 
     positions: Array
     velocities: Array
+    taken: float
     received: float
     velocities_expire: float
 
@@ -149,7 +157,8 @@ def joint_reading(
 
     """
     q = configuration_from_msg(msg, joint_names)
-    names = list(msg.name)
+    names, stamp = list(msg.name), seconds_of(msg.header.stamp)
+    taken = stamp if 0.0 <= received - stamp <= LONGEST_WAY else received
     if len(msg.velocity):
         if len(msg.velocity) != len(names):
             raise MessageError(
@@ -157,10 +166,12 @@ def joint_reading(
                 'one a name [rad/s]'
             )
         v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
-        return JointReading(q, v, received, float('inf'))
-    if before is None:
-        return JointReading(q, np.zeros_like(q), received, received)
+        return JointReading(q, v, taken, received, float('inf'))
+    if before is None or received < before.received:
+        # A clock that was set back tells no time that passed.
+        return JointReading(q, np.zeros_like(q), taken, received, received)
     step = max(received - before.received, 1e-9)
-    return JointReading(
-        q, (q - before.positions) / step, received, before.received + DIFFERENCE_AGE
-    )
+    # What overflows is infinite, and never at rest.
+    with np.errstate(over='ignore'):
+        v = (q - before.positions) / step
+    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE)

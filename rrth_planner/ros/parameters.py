@@ -13,25 +13,11 @@ from rclpy.parameter import Parameter
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError, RrthError
-from rrth_planner.options import (
-    InformedRRTStarOptions,
-    RRTHOptions,
-    RRTOptions,
-    RRTStarOptions,
-    RRTStarSmartOptions,
-    TreeOptions,
-)
+from rrth_planner.options import ALGORITHMS, TreeOptions
 from rrth_planner.resources import load_arm
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 from rrth_planner.trajectory import MotionLimits
 
-ALGORITHMS: dict[str, type[TreeOptions]] = {
-    'rrt_h': RRTHOptions,
-    'rrt': RRTOptions,
-    'rrt_star': RRTStarOptions,
-    'informed_rrt_star': InformedRRTStarOptions,
-    'rrt_star_smart': RRTStarSmartOptions,
-}
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 LONGEST_TIMEOUT = 86400.0
@@ -52,12 +38,37 @@ def settings(dof: int) -> tuple[Setting, ...]:
         Setting(
             'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
         ),
+        Setting(
+            'escape_depth',
+            0.05,
+            0.0,
+            1.0,
+            'm',
+            'an arm at rest less deep in the boxes with their margin first leaves them; 0: never',
+        ),
         Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
         Setting(
             'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
         ),
         Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
         Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting(
+            'max_body_speed',
+            0.0,
+            0.0,
+            10.0,
+            'm/s',
+            'up to which boxes seen to move are foreseen to go on, while the arm moves',
+        ),
+        Setting(
+            'incident_folder',
+            '',
+            None,
+            None,
+            'path',
+            'for files about what never should happen; empty: rrth_planner/ of the ROS logs',
+        ),
+        Setting('replan', True, None, None, '-', 'plan again after a stop for the wearer'),
         Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
         *(
             Setting(
@@ -84,10 +95,15 @@ class PlannerParameters:
     base_frame : str
     seed : int
         -1: fresh each time.
-    margin, ray_guard_length : float
+    margin, ray_guard_length, escape_depth : float
         [m].
     body_timeout, joint_timeout : float
         [s]; 0: never.
+    max_body_speed : float
+        [m/s].
+    replan : bool
+    incident_folder : str
+        Empty: a folder of the ROS logs.
     limits : MotionLimits
     options : TreeOptions
         Their class is the algorithm.
@@ -99,8 +115,12 @@ class PlannerParameters:
     seed: int
     margin: float
     ray_guard_length: float
+    escape_depth: float
     body_timeout: float
     joint_timeout: float
+    max_body_speed: float
+    replan: bool
+    incident_folder: str
     limits: MotionLimits
     options: TreeOptions
 
@@ -129,8 +149,12 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         seed=values['seed'],
         margin=values['margin'],
         ray_guard_length=values['ray_guard_length'],
+        escape_depth=values['escape_depth'],
         body_timeout=values['body_timeout'],
         joint_timeout=values['joint_timeout'],
+        max_body_speed=values['max_body_speed'],
+        replan=values['replan'],
+        incident_folder=values['incident_folder'],
         limits=MotionLimits(
             velocity=_of_each_joint('max_velocity', values, arm.dof),
             acceleration=_of_each_joint('max_acceleration', values, arm.dof),

@@ -5,22 +5,26 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from threading import Lock
+from threading import RLock
 import time
 import traceback
 from typing import Any
 
 from nav_msgs.msg import Path
+import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
+from rrth_planner.ros.guard import Guard
+from rrth_planner.ros.incidents import cause_of, incident_of, keep, PlanError
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.takeover import REST_SPEED
+from rrth_planner.underway import RunningMotion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +48,10 @@ class Response:
     text: str
     tool_path: Callable[[], Path]
     conclude: Callable[[], None]
+
+
+# So much longer than its brake an arm may need to come to rest [s].
+LONGEST_SETTLING = 1.0
 
 
 class _Ticket:
@@ -80,7 +88,9 @@ class PlanQueue:
         self._publishers = PlanPublishers(node)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         # Held while a motion is published, so that what was cancelled before never is.
-        self._lock = Lock()
+        self._lock = RLock()
+        self.guard = Guard(node, heard, reporter, self._publishers, self._lock)
+        self.guard.plan_again = self._plan_again
         self._open: set[_Ticket] = set()
         self._is_closed = False
 
@@ -139,22 +149,31 @@ class PlanQueue:
         with self._lock:
             self._is_closed = True
         self.cancel()
+        self.guard.close()
         self._worker.shutdown(wait=True, cancel_futures=True)
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
         """Plan and publish; called in the worker's thread."""
-        figures, shown = PlanReport(), None
+        figures, shown, incident, outcome = PlanReport(), None, None, None
         parameters = self._reporter.parameters
+        n_brakes, running = self.guard.n_brakes, self.guard.running
         try:
             outcome = self._plan_request(
-                self._heard, parameters, self._now, lambda: ticket.is_cancelled, goal
+                self._heard,
+                parameters,
+                self._now,
+                lambda: ticket.is_cancelled,
+                goal,
+                None if running is None else running.trajectory,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
+            incident = outcome.incident
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if self._settle(ticket, outcome.trajectory, parameters):
+            refusal = self._settle(ticket, outcome, parameters, n_brakes)
+            if refusal is not None:
                 if code is not ErrorCode.PREEMPTED:
-                    code, sentence = ErrorCode.PREEMPTED, 'the request was cancelled'
+                    code, sentence = refusal
             elif outcome.trajectory is not None:
                 shown = outcome
                 figures = replace(
@@ -170,6 +189,11 @@ class PlanQueue:
             with self._lock:
                 self._open.discard(ticket)
             code, sentence, shown = ErrorCode.FAILURE, _in_a_sentence(problem), None
+            incident = incident_of(_with_question(problem, outcome))
+        if incident is not None:
+            noted, file = keep(incident, parameters.incident_folder)
+            sentence += noted
+            self._reporter.incident(file)
 
         def tool_path() -> Path:
             return Path() if shown is None else self._tool_path(shown, parameters)
@@ -183,16 +207,64 @@ class PlanQueue:
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
     def _settle(
-        self, ticket: _Ticket, trajectory: Trajectory | None, parameters: PlannerParameters
-    ) -> bool:
-        """Return whether a request was cancelled; publish its motion, if it has one, if not."""
+        self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters, n_brakes: int
+    ) -> tuple[ErrorCode, str] | None:
+        """Publish a request's motion, if it has one, or return why not."""
         with self._lock:
             if ticket.is_cancelled or self._is_closed:
-                return True
-            if trajectory is not None:
-                self._publishers.publish_motion(trajectory, parameters)
+                return ErrorCode.PREEMPTED, 'the request was cancelled'
             self._open.discard(ticket)
-            return False
+            if outcome.trajectory is None:
+                return None
+            if n_brakes != self.guard.n_brakes:
+                return (
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    'the arm was stopped for the wearer while its motion was planned',
+                )
+            begin = 0.0 if outcome.start is None else outcome.start.time
+            self._publishers.publish_motion(outcome.trajectory, parameters, begin)
+            self.guard.begin(
+                RunningMotion(
+                    trajectory=outcome.trajectory,
+                    start_time=begin or self._now(),
+                    reach=outcome.plan.reach,
+                    escape_time=outcome.plan.escape_time,
+                ),
+                outcome.inputs.goal,
+                parameters,
+            )
+            return None
+
+    def _plan_again(self, goal: PointingGoal, wait: float) -> None:
+        """Plan for a goal once more as soon as the arm, which brakes, rests."""
+        ticket = _Ticket()
+
+        def work() -> None:
+            self._wait_for_rest(ticket, wait)
+            if ticket.is_cancelled:
+                return
+            response = self._work(goal, time.perf_counter(), ticket)
+            response.conclude()
+            if not response.is_solved:
+                self.guard.hold(response.text)
+
+        with self._lock:
+            self._open.add(ticket)
+        self.prepare(work)
+
+    def _wait_for_rest(self, ticket: _Ticket, wait: float) -> None:
+        """Return when the arm has come to rest, or the time for it is over [s]."""
+        end = time.monotonic() + wait + LONGEST_SETTLING
+        begin = self._now()
+        while time.monotonic() < end and not ticket.is_cancelled:
+            reading = self._heard.joints.value
+            if (
+                reading is not None
+                and reading.received >= begin + wait
+                and (np.abs(reading.velocities) <= REST_SPEED).all()
+            ):
+                return
+            time.sleep(0.005)
 
     def _tool_path(self, outcome: Any, parameters: PlannerParameters) -> Path:
         """Return the tool's path; a failure of this does not unsay the motion."""
@@ -213,4 +285,14 @@ class PlanQueue:
 
 
 def _in_a_sentence(problem: Exception) -> str:
-    return f'planning failed unexpectedly: {type(problem).__name__}: {problem}'
+    cause = cause_of(problem)
+    return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'
+
+
+def _with_question(problem: Exception, outcome: Any) -> Exception:
+    """Return an error with what was asked, where that is known."""
+    if outcome is None or outcome.question is None:
+        return problem
+    known = PlanError(outcome.question, outcome.trajectory)
+    known.__cause__ = problem
+    return known

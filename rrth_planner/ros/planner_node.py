@@ -21,7 +21,7 @@ from rclpy.node import Node
 from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
-from rrth_planner.kernels.jit import is_compiled
+from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.frames import FrameError
@@ -59,6 +59,7 @@ class PlannerNode(Node):
         self._reporter = Reporter(self, heard, parameters)
         self._listener = Listener(self, parameters, heard, self._reporter.publish)
         self._queue = PlanQueue(self, heard, self._reporter, self._load_planner())
+        self._listener.on_body = self._queue.guard.on_body
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)
@@ -78,10 +79,10 @@ class PlannerNode(Node):
                 '(pip install python-fcl)'
             )
         if not is_compiled():
-            self.get_logger().info(
-                'compiling kernels, once for this machine: takes up to a minute'
-            )
-            compile_kernels()
+            how_often = 'at every start' if cache_folder() is None else 'once for this machine'
+            self.get_logger().info(f'compiling kernels, {how_often}: takes up to a minute')
+            if cache_folder() is not None:
+                compile_kernels()
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node `arm_playback`: an arm that moves exactly as it is told, for trials without one."""
 
+from array import array
+import gc
 import sys
+import traceback
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -12,10 +15,11 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
 from rrth_planner.acceptance import accept
 from rrth_planner.arm import tool_pose
-from rrth_planner.errors import RrthError
-from rrth_planner.playback import standing, stop
+from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages import joint_trajectory_from_msg, pose_to_msg
 from rrth_planner.ros.playback_parameters import (
@@ -23,9 +27,15 @@ from rrth_planner.ros.playback_parameters import (
     initial_positions,
     playback_rules,
 )
+from rrth_planner.ros.subscriptions import decoded
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
+
+# Of a trajectory; what is longer is not decoded, which would hold up the joint states.
+MOST_BYTES = 2 * 1024 * 1024
+# Two clocks are read as one when that takes no longer [ns]; else again, so many times.
+AT_ONCE, READINGS = 20_000, 5
 
 
 class PlaybackNode(Node):
@@ -41,7 +51,11 @@ class PlaybackNode(Node):
         is_simulated = self.get_parameter('use_sim_time').value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._motion_clock: Clock = self.get_clock() if is_simulated else steady
-        self._latest = self._now()
+        self._latest, _ = self._now()
+        self._state = JointState(name=list(self._arm.joint_names))
+        self._pose = PoseStamped()
+        # Since when the messages above say where the arm stands for good [s].
+        self._told_rest = float('inf')
         reliable = QoSProfile(
             depth=1,
             reliability=ReliabilityPolicy.RELIABLE,
@@ -51,50 +65,76 @@ class PlaybackNode(Node):
         self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
         self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
         self.create_subscription(
-            JointTrajectory, 'joint_trajectory', self._on_trajectory, reliable
+            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
         )
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_timer(
             1.0 / self.get_parameter('rate').value, self._publish, clock=self._motion_clock
         )
 
-    def _now(self) -> float:
-        """Return the time on the clock of the motion [s]."""
-        return float(self._motion_clock.now().nanoseconds / NANOSECONDS)
+    def _now(self) -> tuple[float, int]:
+        """Return the present on the clock of the motion [s], and on the node's clock [ns]."""
+        clock = self.get_clock()
+        if self._motion_clock is clock:
+            now = clock.now().nanoseconds
+            return now / NANOSECONDS, now
+        for _ in range(READINGS):
+            before = self._motion_clock.now().nanoseconds
+            now = clock.now().nanoseconds
+            after = self._motion_clock.now().nanoseconds
+            if after - before <= AT_ONCE:
+                break
+        return 0.5 * (before + after) / NANOSECONDS, now
 
-    def _advance(self) -> float:
-        """Return the time now [s]; a simulated clock that was set back leaves the arm in place."""
-        now = self._now()
+    def _advance(self) -> tuple[float, int]:
+        """Return `_now`; a simulated clock that was set back leaves the arm in place."""
+        now, stamp = self._now()
         if now < self._latest:
-            self._playback = standing(self._playback.state_at(self._latest)[0])
+            self._follow(standing(self._playback.state_at(self._latest)[0]))
         self._latest = now
-        return now
+        return now, stamp
+
+    def _follow(self, playback: Playback) -> None:
+        self._playback, self._told_rest = playback, float('inf')
 
     def _publish(self) -> None:
-        q, v, _ = self._playback.state_at(self._advance())
-        stamp = self.get_clock().now().to_msg()
-        state = JointState(
-            name=list(self._arm.joint_names), position=q.tolist(), velocity=v.tolist()
-        )
-        state.header.stamp = stamp
-        self._joint_states.publish(state)
-        pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
-        pose.header.stamp = stamp
-        self._tool_pose.publish(pose)
+        """Say where the arm is at the very time that the messages are stamped with."""
+        time, nanoseconds = self._advance()
+        # While it stands still only the stamps change.
+        if not time >= self._told_rest:
+            q, v, _ = self._playback.state_at(time)
+            self._state.position, self._state.velocity = array('d', q), array('d', v)
+            self._pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
+            self._told_rest = time if time >= self._playback.end_time else float('inf')
+        stamp = Time(nanoseconds=nanoseconds).to_msg()
+        self._state.header.stamp = self._pose.header.stamp = stamp
+        self._joint_states.publish(self._state)
+        self._tool_pose.publish(self._pose)
+
+    def _on_raw_trajectory(self, data: bytes) -> None:
+        try:
+            self._on_trajectory(decoded(data, JointTrajectory, MOST_BYTES))
+        except MessageError as problem:
+            self.get_logger().warning(f'joint_trajectory refused: {problem}')
+        except Exception:
+            # Whatever it is, the arm keeps to what it does.
+            self.get_logger().error(traceback.format_exc())
 
     def _on_trajectory(self, msg: JointTrajectory) -> None:
-        time = self._advance()
-        ros_time = self.get_clock().now().nanoseconds / NANOSECONDS
+        time, nanoseconds = self._advance()
+        ros_time = nanoseconds / NANOSECONDS
         stamp = seconds_of(msg.header.stamp)
         try:
             trajectory = joint_trajectory_from_msg(msg, self._arm.joint_names, ros_time)
-            self._playback = accept(
-                self._playback,
-                trajectory,
-                self._arm,
-                playback_rules(self, self._arm),
-                start_time=time if stamp == 0.0 else time + stamp - ros_time,
-                time=time,
+            self._follow(
+                accept(
+                    self._playback,
+                    trajectory,
+                    self._arm,
+                    playback_rules(self, self._arm),
+                    start_time=time if stamp == 0.0 else time + stamp - ros_time,
+                    time=time,
+                )
             )
         except RrthError as problem:
             stays = 'keeps to its motion' if time < self._playback.end_time else 'stays'
@@ -106,10 +146,8 @@ class PlaybackNode(Node):
         )
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        time = self._advance()
-        self._playback = stop(
-            self._playback, playback_rules(self, self._arm).max_acceleration, time
-        )
+        time, _ = self._advance()
+        self._follow(stop(self._playback, playback_rules(self, self._arm).limits, time))
         left = self._playback.end_time - time
         response.success = True
         response.message = (
@@ -127,6 +165,9 @@ def main(args: list[str] | None = None) -> int:
     try:
         rclpy.init(args=args)
         node = PlaybackNode()
+        # What lives as long as the node need not be looked at by the collector in mid-motion.
+        gc.collect()
+        gc.freeze()
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

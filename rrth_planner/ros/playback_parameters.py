@@ -12,6 +12,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError
 from rrth_planner.resources import load_arm
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
+from rrth_planner.trajectory import MotionLimits
 
 FOLDED = [0.0, -0.35, np.pi / 2, np.pi / 2]
 EACH = 'a value for each joint, or one for all'
@@ -33,6 +34,7 @@ SETTINGS = (
         f'more is refused, and brakes keep to it; {EACH}',
         True,
     ),
+    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'brakes keep to it; {EACH}', True),
     Setting(
         'time_scale',
         1.0,
@@ -75,8 +77,11 @@ def playback_rules(node: Node, arm: ArmModel) -> PlaybackRules:
     return PlaybackRules(
         start_tolerance=node.get_parameter('start_tolerance').value,
         time_scale=node.get_parameter('time_scale').value,
-        max_velocity=_per_joint(node, arm, 'max_velocity'),
-        max_acceleration=_per_joint(node, arm, 'max_acceleration'),
+        limits=MotionLimits(
+            velocity=_per_joint(node, arm, 'max_velocity'),
+            acceleration=_per_joint(node, arm, 'max_acceleration'),
+            jerk=_per_joint(node, arm, 'max_jerk'),
+        ),
     )
 
 

@@ -31,10 +31,14 @@ class PlanPublishers:
         self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
 
-    def publish_motion(self, trajectory: Trajectory, parameters: PlannerParameters) -> None:
-        """Publish a motion for the arm to begin at once."""
+    def publish_motion(
+        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+    ) -> None:
+        """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
         self._trajectory.publish(
-            joint_trajectory_to_msg(trajectory, parameters.arm.joint_names, parameters.base_frame)
+            joint_trajectory_to_msg(
+                trajectory, parameters.arm.joint_names, parameters.base_frame, begin
+            )
         )
 
     def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:

@@ -3,18 +3,22 @@
 """Tell how requests ended: to the log, and to diagnostics."""
 
 from dataclasses import replace
+from pathlib import Path
 from threading import Lock
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport
+from rrth_planner.errors import one_line
+from rrth_planner.ros.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 
 PERIOD = 1.0
+# So many boxes are remembered as named.
+MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
 
@@ -38,6 +42,10 @@ class Reporter:
         self.report = PlanReport()
         self._node, self._heard = node, heard
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        # What the guard of the running motion does, and why.
+        self.guard = ('no motion', '')
+        self._recertified, self._braked = Figures(), Figures()
+        self._n_incidents, self._last_incident = 0, ''
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -48,6 +56,23 @@ class Reporter:
             node.create_timer(PERIOD, self._publish, clock=steady),
             node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
         ]
+
+    def recertified(self, elapsed: float) -> None:
+        """Count that a running motion was held against a new body, and how long it took [s]."""
+        self._recertified.add(elapsed)
+
+    def braked(self, elapsed: float) -> None:
+        """Count a brake, and how long after the body's arrival it was published [s]."""
+        self._braked.add(elapsed)
+
+    def incident(self, file: Path | None) -> None:
+        """Count an incident, and keep the name of its file if there is one."""
+        self._n_incidents += 1
+        self._last_incident = '' if file is None else str(file)
+
+    def publish_soon(self) -> None:
+        """Publish the diagnostics within a tenth of a second."""
+        self._is_changed = True
 
     def publish(self) -> None:
         """Publish the diagnostics of now, or, when the last are too recent, soon."""
@@ -73,6 +98,13 @@ class Reporter:
                     self._heard,
                     self.parameters,
                     self.report,
+                    self.guard,
+                    {
+                        'motions held against a new body': self._recertified,
+                        'brakes': self._braked,
+                        'incidents': self._n_incidents,
+                        'last incident': self._last_incident,
+                    },
                 )
             )
 
@@ -81,8 +113,10 @@ class Reporter:
         expired = self._heard.body.value.at(now).expired
         new = [(key, part) for key, part in expired if key not in self._named]
         if new:
+            if len(self._named) > MOST_NAMED:
+                self._named = {key for key, _ in expired}
             self._named.update(key for key, _ in new)
-            names = ', '.join(f'"{box.name}"' for _, part in new for box in part.boxes)
+            names = one_line(', '.join(f'"{box.name}"' for _, p in new for box in p.boxes))
             self._node.get_logger().warning(
                 f'{self._heard.body.topic}: the lifetime of {names} has passed, plans no longer '
                 'regard them'
@@ -90,7 +124,7 @@ class Reporter:
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
         """Log and publish how a request ended, and return the answer to it."""
-        text = answer(code, sentence)
+        text, sentence = answer(code, sentence), one_line(sentence)
         is_solved = code is ErrorCode.SUCCESS
         self.report = replace(
             figures,
@@ -102,6 +136,8 @@ class Reporter:
         logger = self._node.get_logger()
         if is_solved:
             logger.info(text)
+        elif code is ErrorCode.FAILURE:
+            logger.error(text)
         else:
             logger.warning(text)
         self.publish()

@@ -3,6 +3,7 @@
 """A subscription that hears every publisher: best effort, reliable, or latched before it began."""
 
 from collections.abc import Callable
+import traceback
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -11,8 +12,12 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from rrth_planner.errors import MessageError
 
 DEPTH = 50
+# Longer messages are not decoded, which would hold up everything else: half a second for a
+# megabyte of markers.
+MOST_BYTES = 512 * 1024
 # Copies of a message arrive within milliseconds of each other; so many are remembered.
 REMEMBERED = 1024
 # How often publishers are looked at where the middleware does not announce them [s].
@@ -20,6 +25,18 @@ POLL_PERIOD = 0.2
 
 # (source timestamp, sequence number): the same for all copies of a message.
 Stamp = tuple[int, int]
+
+
+def decoded(data: bytes, msg_type: type, most_bytes: int = MOST_BYTES) -> Any:
+    """Return a message as it came from the wire, or raise MessageError."""
+    name = msg_type.__name__
+    if len(data) > most_bytes:
+        raise MessageError(f'{len(data)} bytes, expected a {name} of at most {most_bytes}')
+    try:
+        return deserialize_message(data, msg_type)
+    except Exception as problem:
+        # Whoever may write to a topic may write anything.
+        raise MessageError(f'{len(data)} bytes that are no {name}: {problem}') from problem
 
 
 class DuplicateFilter:
@@ -83,6 +100,8 @@ class OpenSubscription:
     on_late : callable, optional
         Gets each message that is older than one before, and when it was sent [ns]; without,
         these are dropped, since the last one wins.
+    on_refusal : callable, optional
+        Gets the MessageError of each message that is too long, or is none of this type.
 
     """
 
@@ -93,8 +112,10 @@ class OpenSubscription:
         topic: str,
         on_message: Callable[[Any, int], None],
         on_late: Callable[[Any, int], None] | None = None,
+        on_refusal: Callable[[MessageError], None] = lambda problem: None,
     ) -> None:
         """Begin to listen."""
+        self._on_refusal = on_refusal
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
@@ -143,7 +164,7 @@ class OpenSubscription:
 
     def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
         if self._filter.counts_live(_stamp_of(info)):
-            self._on_message(deserialize_message(data, self._msg_type), self._filter.newest)
+            self._hand_on(data, self._on_message, self._filter.newest)
 
     def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
         stamp = _stamp_of(info)
@@ -151,9 +172,23 @@ class OpenSubscription:
         if not self._filter.counts_reliable(stamp):
             return
         if not is_late:
-            self._on_message(deserialize_message(data, self._msg_type), self._filter.newest)
+            self._hand_on(data, self._on_message, self._filter.newest)
         elif self._on_late is not None:
-            self._on_late(deserialize_message(data, self._msg_type), stamp[0])
+            self._hand_on(data, self._on_late, stamp[0])
+
+    def _hand_on(self, data: bytes, hearer: Callable[[Any, int], None], sent: int) -> None:
+        """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
+        try:
+            msg = decoded(data, self._msg_type)
+        except MessageError as problem:
+            self._on_refusal(problem)
+            return
+        try:
+            hearer(msg, sent)
+        except Exception:
+            self._node.get_logger().error(
+                f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+            )
 
 
 def _stamp_of(info: dict[str, Any]) -> Stamp:

@@ -22,14 +22,16 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 REST_VELOCITY = float(np.finfo(np.float32).eps)
 # Residues of rounding at the ends, which are written as exact zeros.
 RESIDUE = 1e-6
+# More is refused: looking through them holds up the node.
+MOST_POINTS = 10_000
 UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
 
 
 def joint_trajectory_to_msg(
-    trajectory: Trajectory, joint_names: Sequence[str], frame: str
+    trajectory: Trajectory, joint_names: Sequence[str], frame: str, begin: float = 0.0
 ) -> JointTrajectory:
     """
-    Return a trajectory as a message that starts on reception (stamp 0).
+    Return a trajectory as a message that starts at a time [s], or on reception (stamp 0).
 
     Times are rounded to whole nanoseconds; velocities and accelerations of both ends are exact
     zeros where they are zero but for rounding.
@@ -52,6 +54,8 @@ def joint_trajectory_to_msg(
     _check_times(times)
     msg = JointTrajectory(joint_names=list(joint_names))
     msg.header.frame_id = frame
+    stamp = msg.header.stamp
+    stamp.sec, stamp.nanosec = divmod(round(begin * NANOSECONDS), NANOSECONDS)
     rows = zip(times, trajectory.positions, velocities, accelerations, strict=True)
     for time, q, v, a in rows:
         # Arrays are taken as they are; lists would be checked number by number.
@@ -92,6 +96,8 @@ def joint_trajectory_from_msg(
         raise MessageError(f'joint_names: {names}, expected each of {list(joint_names)} once')
     if not msg.points:
         raise MessageError('points: none, expected at least one')
+    if len(msg.points) > MOST_POINTS:
+        raise MessageError(f'points: {len(msg.points)}, expected at most {MOST_POINTS}')
     times = [nanoseconds_of(point.time_from_start) for point in msg.points]
     if times[0] != 0:
         raise MessageError(

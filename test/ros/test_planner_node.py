@@ -26,13 +26,15 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
-from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
+from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import requests  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -255,6 +257,66 @@ def test_each_obstacle_to_planning_has_its_code(start, messages, answer):
     assert not stranger.heard['joint_trajectory']
 
 
+def leaned():
+    """Return a wearer whose hand the tool of the folded arm is in."""
+    arm, body = load_arm(), wearer()
+    T = tool_pose(arm, np.array(FOLDED))
+    # Behind the ray, 0.5 m down, which runs 0.0075 m inside its edge.
+    center = T[:3, 3] + 0.5 * T[:3, 2] - np.array([0.05 + 0.02 - 0.012, 0.0, 0.0])
+    body.markers.append(box('hand', center=tuple(center), size=(0.1, 0.1, 0.1)))
+    return body
+
+
+def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(start):
+    planner, stranger = start(seed=3)
+    say_all(planner, stranger, body_boxes=leaned())
+    response = stranger.answer()
+    assert response.success, response.message
+    assert ', first leaves box "hand/0", 0.0275 m deep at pointing ray' in response.message
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    # The present body, said again, does not stop it.
+    stranger.publishers['body_boxes'].publish(leaned())
+    stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
+    (msg,) = stranger.heard['joint_trajectory']
+    trajectory = joint_trajectory_from_msg(msg, JOINTS)
+    np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
+    for values in (trajectory.velocities, trajectory.accelerations):
+        assert not values[[0, -1]].any()
+
+
+def test_deeper_than_escape_depth_is_refused(start):
+    planner, stranger = start(escape_depth=0.01)
+    say_all(planner, stranger, body_boxes=leaned())
+    response = stranger.answer()
+    assert not response.success
+    assert response.message.startswith(
+        'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": 0.0275 m '
+        'deep in it with its margin, expected less than 0.01 m (escape_depth)'
+    )
+    planner.set_parameters([Parameter(name='escape_depth', value=0.03)])
+    assert stranger.answer().success
+
+
+def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger, body_boxes=leaned())
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    moves = iter((leaned(), fenced()))
+
+    def plan_while_the_body_changes(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        body, changed = inputs.body.value, next(moves)
+        changed.markers.append(box('far', center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1)))
+        stranger.publishers['body_boxes'].publish(changed)
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_body_changes)
+    assert stranger.answer().success
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+
+
 @pytest.mark.parametrize(
     ('timeout', 'answer'),
     [('body_timeout', 'SENSOR_INFO_STALE (-24)'), ('joint_timeout', 'ROBOT_STATE_STALE (-23)')],
@@ -310,8 +372,8 @@ def test_messages_are_heard_and_callers_wait_while_it_plans(start, wait_until):
     assert all(f.result().success for f in futures)
 
 
-def test_whatever_goes_wrong_is_answered(start, monkeypatch):
-    planner, stranger = start()
+def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
 
     def fail(*_, **__):
@@ -320,9 +382,9 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(requests, 'plan_motion', fail)
         message = stranger.answer().message
-    assert message == (
-        'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test'
-    )
+    sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
+    (file,) = tmp_path.iterdir()
+    assert message == f'{sentence}to replay it: ./run exec replay {file}'
     assert not stranger.heard['joint_trajectory']
     assert stranger.answer().success
 
@@ -360,18 +422,36 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     assert not stranger.heard['joint_trajectory']
 
 
-@pytest.mark.parametrize(('speed', 'said'), [(1.5, '1.500'), (-0.02, '0.020'), (NAN, 'nan')])
-def test_nothing_is_planned_while_the_arm_moves(start, speed, said):
+def test_an_arm_that_moves_is_taken_over_from_its_present_velocity(start):
     planner, stranger = start()
-    moving = joints(velocity=[speed, 0.0, 0.0, 0.0])
-    say_all(planner, stranger, joint_states=moving)
+    say_all(planner, stranger, joint_states=joints(velocity=[0.3, 0.0, 0.0, -0.2]))
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    msg = stranger.heard['joint_trajectory'][-1]
+    assert list(msg.points[0].velocities) == [0.3, 0.0, 0.0, -0.2]
+    assert not any(msg.points[-1].velocities)
+    # It begins at a time that it names, so that what is late on its way does not jump.
+    assert msg.header.stamp.sec > 0
+
+
+def test_velocities_that_are_no_numbers_are_refused(start):
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[NAN, 0.0, 0.0, 0.0]))
     assert stranger.answer().message == (
-        f'START_STATE_INVALID (-26): joint_1 moves at {said} rad/s, expected an arm at rest '
-        '(at most 0.01 rad/s)'
+        'START_STATE_INVALID (-26): joint_1 moves at nan rad/s, expected a velocity for every '
+        'joint'
     )
     stranger.publishers['joint_states'].publish(joints(velocity=[0.009] * 4))
     stranger.wait_until(lambda: inputs_of(planner).joints.value.velocities[1] == 0.009)
     assert stranger.answer().success
+
+
+def test_an_arm_that_moves_faster_than_it_may_is_not_taken_over(start):
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 1.7, 0.0, 0.0]))
+    assert stranger.answer().message.startswith(
+        'START_STATE_INVALID (-26): joint_2 moves at up to 1.700 rad/s, expected at most 1.5 '
+    )
 
 
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
@@ -409,8 +489,8 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
     assert stranger.answer().success
 
 
-def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until):
-    planner, stranger = start()
+def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
     inputs, plan_motion = inputs_of(planner), requests.plan_motion
     asked = []
@@ -425,13 +505,18 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
 
     def disagree(*args):
         asked.append(args)
-        return 'a touch' if len(asked) == 1 else None
+        return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
     monkeypatch.setattr(requests, 'first_touch', disagree)
     message = stranger.answer().message
-    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
+    (file,) = tmp_path.iterdir()
+    incident = read_incident(file)
+    # Planned for two boxes, judged for three.
+    assert len(incident.question.scene.boxes) == 2
+    assert [box.name for box in incident.present.boxes][-1] == 'far/0'
     assert stranger.answer().success
     assert len(asked) == 2
 

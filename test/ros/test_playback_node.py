@@ -171,6 +171,19 @@ BAD = {
         lambda m: _set('accelerations', [0.0])(m.points[0]),
         'points[0].accelerations',
     ),
+    'a velocity that is not a number': (
+        lambda m: _set('velocities', [0.0, np.nan, 0.0, 0.0])(m.points[1]),
+        'points[1].velocities: [0.0, nan',
+    ),
+    'no velocities': (lambda m: _set('velocities', [])(m.points[1]), 'points[1].velocities'),
+    'no accelerations': (
+        lambda m: _set('accelerations', [])(m.points[1]),
+        'points[1].accelerations',
+    ),
+    'late first time': (
+        lambda m: setattr(m.points[0].time_from_start, 'nanosec', 1),
+        'points[0].time_from_start',
+    ),
     'efforts': (lambda m: _set('effort', [0.0] * 4)(m.points[0]), 'effort'),
     'not a number': (
         lambda m: _set('positions', [np.nan, *FOLDED[1:]])(m.points[1]),
@@ -336,6 +349,8 @@ def test_a_signal_ends_the_process_with_code_0_and_no_traceback(observer, number
         'initial_positions:=[.nan, -1.0, 0.0, 0.0]',
         'max_velocity:=[1.0, 1.0]',
         'max_acceleration:=[0.0]',
+        'max_jerk:=[-40.0]',
+        'max_jerk:=[40.0, 40.0]',
         'max_velocity:=[]',
         'rate:=100',
         'tiem_scale:=0.5',
@@ -358,7 +373,7 @@ def test_the_packaged_file_holds_every_parameter_with_its_default():
     defaults = {setting.name: setting.default for setting in SETTINGS}
     assert file.keys() == defaults.keys()
     for name, value in file.items():
-        one_for_all = name in ('max_velocity', 'max_acceleration')
+        one_for_all = name in ('max_velocity', 'max_acceleration', 'max_jerk')
         assert value == (defaults[name] * 4 if one_for_all else defaults[name])
 
 

@@ -1,0 +1,111 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Soaks the nodes, body moving at 100 Hz, and writes docs/reliability.md with its picture."""
+
+import argparse
+from collections.abc import Callable, Sequence
+import gc
+from importlib.util import find_spec
+from pathlib import Path
+import sys
+import tempfile
+
+NEEDED = ('rclpy', 'psutil', 'tqdm', 'matplotlib', 'fcl')
+MISSING = """{}: not installed, and nothing can be soaked without; install what it needs by
+    ./run exec python -m pip install -r requirements/benchmark.txt"""
+PLANS, QUICK = 100_000, 500
+HANDS, QUICK_HANDS = 300, 15
+FOREVER = 1e9
+SWITCH_INTERVAL = 2e-4
+
+
+def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] = find_spec) -> int:
+    """Soak, then write the report; an interruption leaves a report of what was seen."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(arguments)
+    missing = [name for name in NEEDED if find(name) is None]
+    if missing:
+        print(MISSING.format(', '.join(missing)), file=sys.stderr)
+        return 2
+    from rrth_planner.errors import RrthError
+
+    try:
+        return _run(options)
+    except (RrthError, OSError) as problem:
+        print(f'soak: {problem}', file=sys.stderr)
+        return 1
+
+
+def _run(options: argparse.Namespace) -> int:
+    from rrth_planner.campaign.store import replace_file
+
+    from benchmarks.soak_guard import soak_guard
+    from benchmarks.soak_plans import soak_plans
+    from benchmarks.soak_report import draw_memory, report
+
+    # What lives as long as the client, and threads that hand the interpreter to each other.
+    gc.collect()
+    gc.freeze()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    n_plans = QUICK if options.quick else options.plans
+    n_hands = QUICK_HANDS if options.quick else options.hands
+    longest = 60.0 * options.minutes if options.minutes else FOREVER
+    plans = guard = None
+    with tempfile.TemporaryDirectory(prefix='rrth-soak-') as name:
+        if n_plans:
+            plans = soak_plans(n_plans, longest, Path(name))
+        if n_hands and not (plans and plans.is_interrupted):
+            guard = soak_guard(n_hands, longest, Path(name))
+    default = Path('build/reliability.md' if options.quick else 'docs/reliability.md')
+    target = options.output or default
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if plans and plans.memory:
+        draw_memory(plans.memory, target.parent / 'images' / 'reliability')
+    text = report(plans, guard, _command(options))
+    replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
+    print(text.partition('## Plans')[0])
+    print(f'{target}: written')
+    return 130 if any(part and part.is_interrupted for part in (plans, guard)) else 0
+
+
+def _command(options: argparse.Namespace) -> str:
+    """Return the command without files, which belong to one machine."""
+    parts = ['python -m benchmarks.soak']
+    parts += ['--quick'] if options.quick else []
+    parts += [f'--plans {options.plans}'] if options.plans != PLANS else []
+    parts += [f'--hands {options.hands}'] if options.hands != HANDS else []
+    parts += [f'--minutes {options.minutes:g}'] if options.minutes else []
+    return ' '.join(parts)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='python -m benchmarks.soak', description=__doc__)
+    parser.add_argument(
+        '--quick', action='store_true', help=f'{QUICK} plans, {QUICK_HANDS} hands: two minutes'
+    )
+    parser.add_argument(
+        '--plans', type=_count, default=PLANS, metavar='N', help=f'how many ({PLANS}; 0: none)'
+    )
+    parser.add_argument(
+        '--hands',
+        type=_count,
+        default=HANDS,
+        metavar='N',
+        help=f'held into the way of running motions ({HANDS}; 0: none)',
+    )
+    parser.add_argument('--minutes', type=float, help='the longest time for each of the two parts')
+    parser.add_argument(
+        '--output', type=Path, help='the report (docs/reliability.md; --quick: in build/)'
+    )
+    return parser
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f'{text}: expected 0 or more')
+    return value
+
+
+if __name__ == '__main__':
+    sys.exit(main())

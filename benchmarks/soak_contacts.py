@@ -1,0 +1,98 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What came of a hand that was held into the way of the arm, judged by the oracle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.oracle import first_contact
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import Trajectory
+
+from benchmarks.soak_body import BodyAt, HAND, scene_of_body
+from benchmarks.soak_judge import COARSE, MARGIN, RAY, SLACK, states_of
+
+BRAKED, WENT_ON = 'braked', 'no brake, none was needed'
+MISSED = 'no brake, though the rest of the motion came too near'
+PUT_ON = 'touched: the hand was put right onto the arm'
+TOO_LATE = 'touched: within the distance it takes to brake'
+TOUCHED = 'touched otherwise'
+RAY_ONLY = 'only the pointing ray touched'
+AGAIN, HELD, NOT_OVER = 'planned again and went on', 'held, and said why', 'not at rest in time'
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Episode:
+    """
+    A hand that was held into the way of a motion, and what followed.
+
+    Parameters
+    ----------
+    body : BodyAt
+        With the hand.
+    motion : Trajectory
+        That ran.
+    phase : float
+        When the hand came, since the motion began [s].
+    published : tuple of (int, int)
+        When motions were published after that, and when they came [ns].
+    followed : tuple of Trajectory
+        These motions.
+    times, positions : ndarray, shape (n,), (n, dof)
+        Of the arm from just before the hand came [ns, rad].
+    guard : str
+        What the guard did at last.
+
+    """
+
+    body: BodyAt
+    motion: Trajectory
+    phase: float
+    published: tuple[tuple[int, int], ...]
+    followed: tuple[Trajectory, ...]
+    times: NDArray[np.int64]
+    positions: Array
+    guard: str
+
+
+def judge_episode(arm: ArmModel, episode: Episode) -> tuple[str, ...]:
+    """Return the words that hold of an episode."""
+    words = []
+    scene = scene_of_body(episode.body)
+    if episode.followed:
+        words.append(BRAKED)
+        if episode.guard == 'holds':
+            words.append(HELD)
+        elif episode.guard == 'no motion':
+            words.append(AGAIN)
+        else:
+            words.append(NOT_OVER)
+    else:
+        q = states_of(episode.motion, COARSE)
+        left = q[min(len(q) - 1, round(episode.phase / COARSE)) :]
+        is_free = first_contact(arm, scene, left, RAY, MARGIN - SLACK) is None
+        words.append(WENT_ON if is_free else MISSED)
+    touch = touch_word(arm, scene, episode)
+    return (*words, touch) if touch else tuple(words)
+
+
+def touch_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
+    """Return how the arm touched the body after the hand came; empty where it did not."""
+    after = episode.times >= episode.body.sent
+    q = episode.positions[after]
+    # A ray has no body: it is reported, but it is not the arm that touches.
+    if first_contact(arm, scene, q, 0.0, 0.0) is None:
+        return RAY_ONLY if first_contact(arm, scene, q, RAY, 0.0) is not None else ''
+    hand = Scene(tuple(box for box in scene.boxes if box.name == HAND))
+    before = episode.positions[~after][-1:]
+    present = np.concatenate([before, q[:1]])
+    if first_contact(arm, hand, present, 0.0, 0.0) is not None:
+        return PUT_ON
+    if episode.followed:
+        braked = states_of(episode.followed[0], COARSE)
+        if first_contact(arm, hand, braked, 0.0, 0.0) is not None:
+            return TOO_LATE
+    return TOUCHED

@@ -1,0 +1,208 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The shortest way out for an arm that the wearer leaned into."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.leaving import box_depths, leads_out
+from rrth_planner.path import Path
+from rrth_planner.refusal import depth_sentence, Refusal
+from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import after
+from rrth_planner.timing import parameterize
+from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.world import grown, World
+
+# A way out is no longer than this [rad or m], and is looked for in so many random directions.
+LONGEST, N_DIRECTIONS = 1.5, 48
+# Spacing of the looks for the end of a way, and how often it is then halved [rad].
+LOOK, HALVINGS = 0.03, 6
+# Rounds of pushing the arm out, and of the solution of each of them.
+N_ROUNDS, N_SWEEPS = 12, 200
+# Pairs of a bar and a box that are further apart do not push [m].
+NEAR = 0.05
+STEP = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Escape:
+    """
+    A straight motion out of the boxes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        From rest at the start to rest where the arm is out.
+    sentence : str
+        Which boxes it leaves, and how deep the arm was in them.
+
+    """
+
+    trajectory: Trajectory
+    sentence: str
+
+    @property
+    def q_end(self) -> Array:
+        """Where the arm is out, shape (dof,) [rad]."""
+        q: Array = self.trajectory.positions[-1]
+        return q
+
+
+def way_out(
+    world: World,
+    q_start: Array,
+    limits: MotionLimits,
+    *,
+    margin: float,
+    spares: tuple[float, ...],
+    escape_depth: float,
+    seed: int,
+    should_stop: Callable[[], bool],
+) -> Escape | Refusal:
+    """
+    Return the shortest straight motion found that is proven to lead out, or why there is none.
+
+    Parameters
+    ----------
+    world : World
+        Its boxes grown by the margin.
+    q_start : ndarray, shape (dof,)
+        Where the arm is, at rest, within its limits and in a box [rad].
+    limits : MotionLimits
+    margin : float
+        [m].
+    spares : tuple of float
+        Clearance beyond the margin to end with; the next where there is no room for one [m].
+    escape_depth : float
+        Deeper in a box there is no way out [m].
+    seed : int
+        Of the random directions.
+    should_stop : callable
+        True cancels.
+
+    """
+    depths = box_depths(world, q_start)
+    sentence = depth_sentence(world, depths, margin)
+    if not max(0.0, float(depths.max())) < escape_depth:
+        return Refusal(
+            PlanStatus.START_IN_COLLISION,
+            f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
+        )
+    for spare in spares:
+        roomy, rng = grown(world, spare), np.random.default_rng(seed)
+        best, longest = None, LONGEST
+        # What pushes the arm out directly is mostly the shortest way.
+        for look in (_pushed, _scattered):
+            tries = list(look(roomy, q_start, spare, longest, rng))
+            for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
+                if should_stop():
+                    return Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+                trajectory = parameterize(Path(np.stack([q_start, q_end])), (), limits)
+                if leads_out(trajectory, world, trajectory.duration):
+                    best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
+                    break
+        if best is not None:
+            return Escape(trajectory=best, sentence=_said(world, depths, spares[-1]))
+    return Refusal(
+        PlanStatus.START_IN_COLLISION,
+        f'{sentence}, and no straight way out of it is proven free; expected a start clear of '
+        'the wearer',
+    )
+
+
+def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
+    """Return what is left of a motion when the arm is out, at one of its points [s]."""
+    if escape_time == 0.0:
+        return trajectory
+    return after(trajectory, int(np.abs(trajectory.times - escape_time).argmin()))
+
+
+def _said(world: World, depths: Array, hair: float) -> str:
+    """Say which boxes the arm leaves, the one it is deepest in first."""
+    parts = []
+    for box in np.argsort(-depths.max(axis=0)).tolist():
+        bar = int(np.argmax(depths[:, box]))
+        if depths[bar, box] > -hair:
+            depth = max(0.0, float(depths[bar, box]))
+            parts.append(
+                f'box "{world.box_names[box]}", {depth:.4f} m deep at {world.bar_names[bar]}'
+            )
+    return f'first leaves {" and ".join(parts)}'
+
+
+def _pushed(
+    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+) -> Iterator[Array]:
+    """
+    Yield where the boxes push the arm: to the nearest configuration that is free of all of them.
+
+    Sequential quadratic programming: the depths are taken as linear where the arm has come to, and
+    of the configurations that are then free the one nearest to the start is next.
+    """
+    q = q_start.copy()
+    for _ in range(N_ROUNDS):
+        depths, slopes = _slopes(roomy, q)
+        is_near = depths > -NEAR
+        G, s = slopes[is_near], depths[is_near] + 1e-6 + 0.01 * spare
+        # Rows g x <= b for the way x from the start: the depths, and the limits of the joints.
+        rows = np.concatenate([G, np.eye(len(q)), -np.eye(len(q))])
+        bounds = np.concatenate(
+            [G @ (q - q_start) - s, roomy.bounds[1] - q_start, q_start - roomy.bounds[0]]
+        )
+        x = _least(rows, bounds)
+        if not np.isfinite(x).all() or np.linalg.norm(x) > longest:
+            break
+        q = np.clip(q_start + x, *roomy.bounds)
+        if roomy.is_valid(q):
+            yield q
+
+
+def _slopes(world: World, q: Array) -> tuple[Array, Array]:
+    """Return the depths of all pairs, (n,) [m], and by each joint their slopes, (n, dof)."""
+    steps = STEP * np.eye(len(q))
+    depths = box_depths(world, np.concatenate([q[None], q + steps, q - steps]))
+    flat = depths.reshape(len(depths), -1)
+    n = len(q)
+    return flat[0], ((flat[1 : n + 1] - flat[n + 1 :]) / (2.0 * STEP)).T
+
+
+def _least(rows: Array, bounds: Array) -> Array:
+    """Return the shortest x with rows x <= bounds, by Hildreth's method (1957) on the dual."""
+    norms = (rows * rows).sum(axis=1)
+    weights, x = np.zeros(len(rows)), np.zeros(rows.shape[1])
+    for _ in range(N_SWEEPS):
+        change = 0.0
+        for i in np.flatnonzero(norms > 1e-12).tolist():
+            step = max((rows[i] @ x - bounds[i]) / norms[i], -weights[i])
+            weights[i] += step
+            x = x - step * rows[i]
+            change = max(change, abs(step) * norms[i])
+        if change < 1e-9:
+            break
+    return x
+
+
+def _scattered(
+    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+) -> Iterator[Array]:
+    """Yield where the arm is first free along each joint and in random directions."""
+    dof = len(q_start)
+    random = rng.standard_normal((N_DIRECTIONS, dof))
+    for direction in np.concatenate([np.eye(dof), -np.eye(dof), random]):
+        u = direction / np.linalg.norm(direction)
+        for far in np.arange(LOOK, longest, LOOK).tolist():
+            if not roomy.is_in_bounds(q_start + far * u):
+                break
+            if roomy.is_valid(q_start + far * u):
+                near = far - LOOK
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (near + far)
+                    if roomy.is_valid(q_start + middle * u):
+                        far = middle
+                    else:
+                        near = middle
+                yield q_start + far * u
+                break

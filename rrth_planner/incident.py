@@ -1,0 +1,217 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What must never happen and did: a record with everything that is needed to replay it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from enum import Enum
+import functools
+import hashlib
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+import platform
+from typing import Any
+
+from rrth_planner.errors import RecordError
+from rrth_planner.question import PlanQuestion
+from rrth_planner.records import (
+    entries,
+    number,
+    plain,
+    question_from_mapping,
+    scene_from_mapping,
+    text,
+    touch_from_mapping,
+    trajectory_from_mapping,
+)
+from rrth_planner.scene import Scene
+from rrth_planner.touch import Disagreement, Touch
+from rrth_planner.trajectory import Trajectory
+
+# Of the layout of a record; another one is refused.
+FORMAT = 1
+PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
+
+
+class IncidentKind(Enum):
+    """What happened."""
+
+    DISAGREEMENT = 'disagreement'
+    ERROR = 'error'
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Incident:
+    """
+    A plan that went wrong in a way that it never should.
+
+    Parameters
+    ----------
+    kind : IncidentKind
+        The two judges disagree, or an error that nobody expected.
+    sentence : str
+        What was said of it.
+    time : str
+        When, ISO 8601.
+    question : PlanQuestion
+        What the plan began with.
+    trajectory : Trajectory or None
+        The motion in question, if there was one already.
+    touch : Touch or None
+        What python-fcl saw of it.
+    present : Scene or None
+        The wearer that the motion was judged for, where that is not the one it was planned for:
+        he moved meanwhile.
+    escape_time : float
+        Until then the motion leads out of boxes that the arm was in [s].
+    error, traceback : str
+        The name of the error's type, and where it came from; empty for a disagreement.
+    versions : mapping
+        Of what took part.
+
+    Raises
+    ------
+    RecordError
+        A disagreement without a motion, or one of another number of joints than the arm's.
+
+    """
+
+    kind: IncidentKind
+    sentence: str
+    time: str
+    question: PlanQuestion
+    trajectory: Trajectory | None = None
+    touch: Touch | None = None
+    present: Scene | None = None
+    escape_time: float = 0.0
+    error: str = ''
+    traceback: str = ''
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.kind is IncidentKind.DISAGREEMENT and None in (self.trajectory, self.touch):
+            raise RecordError('incident: a disagreement without trajectory and touch')
+        if self.trajectory is not None:
+            width, dof = self.trajectory.positions.shape[1], self.question.arm.dof
+            if width != dof:
+                raise RecordError(
+                    f'trajectory: of {width} joints, expected those of the arm, {dof}'
+                )
+
+
+def disagreement_incident(
+    question: PlanQuestion, found: Disagreement, present: Scene | None = None
+) -> Incident:
+    """Return the record of a disagreement of now; `present` as in `Incident`."""
+    return Incident(
+        kind=IncidentKind.DISAGREEMENT,
+        sentence=found.sentence(question.margin),
+        time=_now(),
+        question=question,
+        trajectory=found.trajectory,
+        touch=found.touch,
+        present=present,
+        escape_time=found.escape_time,
+        versions=versions(),
+    )
+
+
+def error_incident(
+    question: PlanQuestion, problem: BaseException, where: str, trajectory: Trajectory | None
+) -> Incident:
+    """Return the record of an error of now; where: its traceback."""
+    return Incident(
+        kind=IncidentKind.ERROR,
+        sentence=str(problem),
+        time=_now(),
+        question=question,
+        trajectory=trajectory,
+        error=type(problem).__name__,
+        traceback=where,
+        versions=versions(),
+    )
+
+
+def incident_to_mapping(incident: Incident) -> dict[str, Any]:
+    """Return an incident as numbers, texts, lists and mappings."""
+    return {'format': FORMAT, **plain(incident)}
+
+
+def incident_from_mapping(data: Any) -> Incident:
+    """
+    Return the incident that a mapping describes, as `incident_to_mapping` writes it.
+
+    Raises
+    ------
+    RrthError
+        What is missing, unknown or out of its range.
+
+    """
+    try:
+        return _incident(data)
+    except (ArithmeticError, AttributeError, TypeError, ValueError) as problem:
+        # A number that is too large, say.
+        raise RecordError(f'incident: {problem}, expected what was written') from problem
+
+
+def _incident(data: Any) -> Incident:
+    if isinstance(data, Mapping) and data.get('format') != FORMAT:
+        raise RecordError(f'format: {data.get("format")!r}, expected {FORMAT}')
+    given = entries(data, Incident, 'incident', ('format',))
+    kinds = [kind.value for kind in IncidentKind]
+    if given['kind'] not in kinds:
+        raise RecordError(f'kind: {given["kind"]!r}, expected {" or ".join(kinds)}')
+    if not isinstance(given['versions'], Mapping):
+        raise RecordError(f'versions: {given["versions"]!r}, expected a mapping')
+    trajectory, touch, present = given['trajectory'], given['touch'], given['present']
+    return Incident(
+        kind=IncidentKind(given['kind']),
+        sentence=text(given['sentence'], 'sentence'),
+        time=text(given['time'], 'time'),
+        question=question_from_mapping(given['question']),
+        trajectory=(
+            None if trajectory is None else trajectory_from_mapping(trajectory, 'trajectory')
+        ),
+        touch=None if touch is None else touch_from_mapping(touch),
+        present=None if present is None else scene_from_mapping(present, 'present'),
+        escape_time=number(given['escape_time'], 'escape_time', 's'),
+        error=text(given['error'], 'error'),
+        traceback=text(given['traceback'], 'traceback'),
+        versions={
+            text(key, 'versions'): text(value, f'versions: {key}')
+            for key, value in given['versions'].items()
+        },
+    )
+
+
+@functools.cache
+def versions() -> Mapping[str, str]:
+    """Return the versions of what takes part in a plan, and the kind of machine."""
+    return {
+        **{package: _version(package) for package in PACKAGES},
+        'sources': _digest_of_sources(),
+        'python': platform.python_version(),
+        'platform': platform.platform(),
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        # A source tree, or a package of the system.
+        return 'unknown'
+
+
+def _digest_of_sources() -> str:
+    """Return a short digest of this package: without a version, or between two."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.rglob('*.py')):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _now() -> str:
+    return datetime.now(timezone.utc).isoformat(timespec='microseconds')

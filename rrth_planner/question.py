@@ -1,0 +1,82 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a plan begins with, in one value: asked again, it has the same answer."""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import OptionsError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import TreeOptions
+from rrth_planner.scene import Scene
+from rrth_planner.takeover import Takeover
+from rrth_planner.trajectory import MotionLimits
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlanQuestion:
+    """
+    The arguments of `pipeline.plan_motion` that decide about its answer, by their names.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+    q_start : array_like, shape (dof,)
+        [rad].
+    goal : PointingGoal
+    limits : MotionLimits
+    options : TreeOptions
+    margin, ray_guard_length : float
+        >= 0 [m].
+    seed : int
+        >= 0.
+    moving : Takeover or None
+    escape_depth : float
+        >= 0 [m].
+
+    Raises
+    ------
+    OptionsError
+        A number out of its range, or values of another number of joints than the arm's.
+
+    """
+
+    arm: ArmModel
+    scene: Scene
+    q_start: Array
+    goal: PointingGoal
+    limits: MotionLimits
+    options: TreeOptions
+    margin: float
+    ray_guard_length: float
+    seed: int
+    moving: Takeover | None = None
+    escape_depth: float = 0.05
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        dof = self.arm.dof
+        q_start = frozen_array(self.q_start, (dof,), 'q_start', 'rad', OptionsError)
+        object.__setattr__(self, 'q_start', q_start)
+        widths = {'limits': self.limits.velocity.shape[-1]}
+        if self.moving is not None:
+            widths['moving'] = self.moving.state.positions.shape[-1]
+            if self.moving.running is not None:
+                widths['running'] = self.moving.running.positions.shape[-1]
+        for name, width in widths.items():
+            if width != dof:
+                raise OptionsError(f'{name}: of {width} joints, expected those of the arm, {dof}')
+        for name in ('margin', 'ray_guard_length', 'escape_depth'):
+            value = getattr(self, name)
+            if not 0.0 <= value < float('inf'):
+                raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
+        if self.seed < 0:
+            raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The arguments of `plan_motion` by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -1,0 +1,283 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""While the arm moves the wearer may move too: each new body is held against what is left."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from enum import Enum
+from threading import RLock
+import time
+
+import numpy as np
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rrth_planner.braking import brake
+from rrth_planner.certificate import least_clearance
+from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.messages import scene_of
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.publishers import PlanPublishers
+from rrth_planner.ros.reporter import Reporter
+from rrth_planner.scene import Scene
+from rrth_planner.takeover import follows, joined
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
+from rrth_planner.world import arm_world
+
+# How often the age of the body is looked at [s].
+PERIOD = 0.02
+# Between two times of a running motion from which the soonest stop is found ahead [s].
+FORESEEN = 0.04
+# An arm that is not on its stop after this time is told again [s].
+PATIENCE = 0.05
+# An arm that stands still so long after the begin of a motion does not follow it [s].
+LATE = 0.25
+# An arm that is that long after the end of its motion is taken to have arrived [s].
+GRACE = 0.5
+
+
+class Watch(Enum):
+    """What the guard is doing."""
+
+    IDLE = 'no motion'
+    WATCHING = 'watches the motion'
+    BRAKING = 'brakes'
+    HOLDING = 'holds'
+
+
+class Guard:
+    """
+    Stops the arm when what is left of its motion is no longer proven free of the wearer.
+
+    Parameters
+    ----------
+    node : Node
+    heard : Inputs
+    reporter : Reporter
+    publishers : PlanPublishers
+    lock : RLock
+        Held while a motion is published.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        heard: Inputs,
+        reporter: Reporter,
+        publishers: PlanPublishers,
+        lock: RLock,
+    ) -> None:
+        """Begin with no motion."""
+        self._node, self._heard, self._reporter = node, heard, reporter
+        self._publishers, self._lock = publishers, lock
+        self.running: RunningMotion | None = None
+        self._goal: PointingGoal | None = None
+        self._state = Watch.IDLE
+        # Motions that were planned before a brake are of no use after it.
+        self.n_brakes = 0
+        self._stopped_from: RunningMotion | None = None
+        # Those of the plan: another margin since then says nothing against its motion.
+        self._parameters = reporter.parameters
+        # Stops from some times of the running motion on, found while it runs.
+        self._stops: list[tuple[float, Trajectory]] = []
+        self._foreseer = ThreadPoolExecutor(max_workers=1, thread_name_prefix='stops')
+        self._before: tuple[Scene, float] | None = None
+        # Plans again for a goal, once the arm rests; set by the owner.
+        self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
+
+    def begin(
+        self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
+    ) -> None:
+        """Watch a motion from now on by the parameters of its plan; the lock is held."""
+        self._parameters = parameters
+        self.running, self._goal, self._stopped_from = running, goal, None
+        self._stops = []
+        self._foreseer.submit(self._foresee, running, self._stops)
+        self._say(Watch.WATCHING, '')
+        # The body may have changed since the motion was last looked at.
+        self.on_body()
+
+    def close(self) -> None:
+        """Foresee nothing any more."""
+        self.running = None
+        self._foreseer.shutdown(wait=True, cancel_futures=True)
+
+    def _foresee(self, running: RunningMotion, stops: list[tuple[float, Trajectory]]) -> None:
+        """Find the soonest stop from every so many times on, which takes milliseconds each."""
+        limits = self._parameters.limits
+        for begin in np.arange(FORESEEN, running.trajectory.duration, FORESEEN).tolist():
+            if self.running is not running:
+                return
+            stops.append((begin, brake(running.trajectory, begin, limits)))
+
+    def _stop_of(self, running: RunningMotion, phase: float) -> Trajectory:
+        """Return the soonest stop that is known, from where the arm is."""
+        motion = running.trajectory
+        phase = min(max(phase, 0.0), motion.duration)
+        stop = emergency_stop(motion, phase, self._parameters.limits)
+        for begin, foreseen in self._stops:
+            # What has to reach the controller takes its time.
+            if begin >= phase + ON_ITS_WAY:
+                if begin - phase + foreseen.duration < stop.duration:
+                    stop = joined(between(motion, phase, begin), foreseen)
+                break
+        return stop
+
+    def on_body(self) -> None:
+        """Hold the body as it is now against what is left of the motion."""
+        begin = time.perf_counter()
+        with self._lock:
+            now, parameters = self._now(), self._parameters
+            speeds, most = None, self._reporter.parameters.max_body_speed
+            if self.running is None and most == 0.0:
+                return
+            scene = scene_of(self._heard.body.value.at(now))
+            if most > 0.0 and self._before is not None:
+                before, then = self._before
+                speeds = box_speeds(before, scene, now - then, most)
+            self._before = (scene, now)
+            phase = self._phase(now)
+            if phase is None or self._state is not Watch.WATCHING:
+                return
+            assert self.running is not None
+            if not scene.boxes:
+                self._stop(phase, now, scene, 'the body is empty', begin)
+            elif not is_still_free(
+                self.running,
+                phase,
+                parameters.arm,
+                scene,
+                margin=parameters.margin,
+                ray_guard_length=parameters.ray_guard_length,
+                speeds=speeds,
+            ):
+                self._stop(phase, now, scene, 'the wearer moved into the way', begin)
+            else:
+                self._reporter.recertified(time.perf_counter() - begin)
+
+    def _on_timer(self) -> None:
+        """Stop an arm whose wearer is not seen any more, or that goes on for all that."""
+        if self._state is Watch.IDLE:
+            return
+        with self._lock:
+            now, timeout = self._now(), self._reporter.parameters.body_timeout
+            self._insist(now)
+            age, phase = self._heard.body.age(now), self._phase(now)
+            if phase is None or self._state is not Watch.WATCHING or not 0.0 < timeout < age:
+                return
+            scene = scene_of(self._heard.body.value.at(now))
+            why = f'the body is {age:.3f} s old, expected at most {timeout:g} s (body_timeout)'
+            self._stop(phase, now, scene, why, time.perf_counter())
+
+    def _insist(self, now: float) -> None:
+        """Stop the arm again where it is seen to go on with the motion it was to stop."""
+        stop, before, reading = self.running, self._stopped_from, self._heard.joints.value
+        if stop is None or before is None or reading is None:
+            return
+        elapsed = reading.taken - stop.start_time
+        if elapsed < PATIENCE or follows(stop.trajectory, elapsed, reading.positions):
+            return
+        self._stopped_from = None
+        phase = before.phase(reading.positions, reading.velocities, reading.taken, now)
+        if phase is None or phase >= before.trajectory.duration:
+            return
+        stop = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
+        self._stopped_from, self.running = before, stop
+        self._publishers.publish_motion(stop.trajectory, self._parameters, now)
+        self._node.get_logger().error('the arm did not stop as it was told: it is told again')
+
+    def _phase(self, now: float) -> float | None:
+        """Return the time within the running motion; None where there is none any more."""
+        running, reading = self.running, self._heard.joints.value
+        if running is None or reading is None:
+            return None
+        late = now - running.start_time - running.trajectory.duration
+        if late > GRACE and not self._is_moving():
+            self.running = None
+            if self._state is not Watch.HOLDING:
+                self._say(Watch.IDLE, '')
+            return None
+        if reading.taken - running.start_time > LATE and not self._is_moving():
+            # Nobody follows the motion, or it is over.
+            return None
+        return running.phase(reading.positions, reading.velocities, reading.taken, now)
+
+    def _is_moving(self) -> bool:
+        reading = self._heard.joints.value
+        return bool(reading is not None and abs(reading.velocities).max() > 0.0)
+
+    def _stop(self, phase: float, now: float, scene: Scene, why: str, begin: float) -> None:
+        """Publish the braking trajectory from where the arm is; the lock is held."""
+        running, parameters, goal = self.running, self._parameters, self._goal
+        assert running is not None
+        if phase >= running.trajectory.duration:
+            return
+        stopped = RunningMotion(
+            trajectory=self._stop_of(running, phase),
+            start_time=now,
+        )
+        warning = ''
+        if len(scene.boxes) and not self._is_free(stopped, parameters, scene):
+            # Whatever it does now may touch: what keeps further away is less bad.
+            world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
+            ahead = least_clearance(running.trajectory, world, phase)
+            braked = least_clearance(stopped.trajectory, world)
+            warning = f'; braking is not proven safe either, least clearance {braked:.4f} m'
+            if ahead > braked:
+                warning += f', going on keeps {ahead:.4f} m and is less bad: the arm goes on'
+                self._warn_once(f'{why}{warning}')
+                self._say(Watch.WATCHING, f'{why}{warning}')
+                return
+        self._publishers.publish_motion(stopped.trajectory, parameters, now)
+        took = time.perf_counter() - begin
+        self._stopped_from = running
+        self.running, self.n_brakes = stopped, self.n_brakes + 1
+        sentence = (
+            f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
+        )
+        self._say(Watch.BRAKING, sentence)
+        self._reporter.braked(took)
+        # A line each: rclpy raises where one and the same line logs at another severity.
+        if warning:
+            self._node.get_logger().error(sentence)
+        else:
+            self._node.get_logger().warning(sentence)
+        if self._reporter.parameters.replan and goal is not None:
+            self.plan_again(goal, stopped.trajectory.duration)
+        else:
+            self._say(Watch.HOLDING, sentence)
+
+    def _is_free(self, motion: RunningMotion, parameters: PlannerParameters, scene: Scene) -> bool:
+        return is_still_free(
+            motion,
+            0.0,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        )
+
+    def hold(self, why: str) -> None:
+        """Stay where the arm came to rest, since it cannot go on."""
+        with self._lock:
+            sentence = f'the arm holds where it is: {why}'
+            self._say(Watch.HOLDING, sentence)
+            self._node.get_logger().warning(sentence)
+
+    def _warn_once(self, sentence: str) -> None:
+        if self._reporter.guard[1] != sentence:
+            self._node.get_logger().error(sentence)
+
+    def _say(self, state: Watch, sentence: str) -> None:
+        self._state = state
+        self._reporter.guard = (state.value, sentence)
+        self._reporter.publish_soon()
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9

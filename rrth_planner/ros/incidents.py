@@ -1,0 +1,60 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a node keeps its incidents, and what it says of them."""
+
+from pathlib import Path
+import shlex
+import traceback
+
+from rclpy.logging import get_logging_directory
+from rrth_planner.errors import RrthError
+from rrth_planner.incident import error_incident, Incident
+from rrth_planner.incident_files import write_incident
+from rrth_planner.question import PlanQuestion
+from rrth_planner.trajectory import Trajectory
+
+
+class PlanError(RrthError):
+    """An error that nobody expected, its cause, beside the question that led to it."""
+
+    def __init__(self, question: PlanQuestion, trajectory: Trajectory | None = None) -> None:
+        """Keep the question, and the motion if there was one already."""
+        super().__init__('planning failed')
+        self.question, self.trajectory = question, trajectory
+
+
+def incident_folder(given: str) -> Path:
+    """Return the folder of a parameter, by default one among the logs of ROS."""
+    if given:
+        return Path(given).expanduser()
+    return Path(get_logging_directory()) / 'rrth_planner'
+
+
+def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
+    """
+    Write an incident to its file; return what to add to the answer, and the file.
+
+    Whatever is wrong with the folder, the answer must not suffer.
+    """
+    try:
+        path = write_incident(incident, incident_folder(folder))
+    except Exception as problem:
+        reason = ' '.join(f'{type(problem).__name__}: {problem}'.split())
+        return f'; no file was written to replay it: {reason}', None
+    return f'; to replay it: ./run exec replay {shlex.quote(str(path))}', path
+
+
+def incident_of(problem: BaseException) -> Incident | None:
+    """Return the record of an error, where what was asked is known."""
+    if not isinstance(problem, PlanError):
+        return None
+    cause = cause_of(problem)
+    where = ''.join(traceback.format_exception(type(cause), cause, cause.__traceback__))
+    return error_incident(problem.question, cause, where, problem.trajectory)
+
+
+def cause_of(problem: BaseException) -> BaseException:
+    """Return the error itself, without what was put round it."""
+    if isinstance(problem, PlanError) and problem.__cause__ is not None:
+        return problem.__cause__
+    return problem

@@ -1,0 +1,246 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A motion that takes over from one that runs: from the present velocity, without a jerk."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.braking import brake
+from rrth_planner.kernels.speeds import ramp_time
+from rrth_planner.trajectory import MotionLimits, positions_at, sample, Trajectory
+
+# An arm that moves no faster is at rest [rad/s].
+REST_SPEED = 0.01
+# Accelerations die away in whole ticks, so that no two points are closer [s].
+TICK = 1e-3
+# The joints' limits less this, for the end of the lead-in to spend.
+RESERVE = 0.99
+# A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
+SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
+SEARCH_SPACING = 1e-3
+# Two points of a part of a motion are at least so far apart [s].
+CLOSEST = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MotionState:
+    """
+    Where the arm is and how it moves.
+
+    Parameters
+    ----------
+    positions, velocities, accelerations : ndarray, shape (dof,)
+        [rad, rad/s, rad/s^2].
+
+    """
+
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Lead:
+    """
+    From a moving state to constant velocity, and where straight on leads to rest.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        From the state to constant velocity; its last point does not rest.
+    speed : float
+        Of the last point, along the line through all joints; 0: it rests there [rad/s].
+    q_stop : ndarray, shape (dof,)
+        Where the arm comes to rest when it goes straight on and slows down [rad].
+
+    """
+
+    trajectory: Trajectory
+    speed: float
+    q_stop: Array
+
+
+def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
+    """
+    Return how an arm that moves gets onto a straight line.
+
+    Each joint's acceleration dies away at constant jerk, a little less than its limit; from then
+    on the velocity is constant. Between two points every joint follows a cubic, which the quintic
+    of a controller reproduces.
+
+    Parameters
+    ----------
+    state : MotionState
+        Within the limits, and so that the velocity stays within them while acceleration fades.
+    limits : MotionLimits
+
+    """
+    a = state.accelerations
+    fade = np.ceil(np.abs(a) / (RESERVE * limits.jerk) / TICK) * TICK
+    times = np.unique(np.concatenate([[0.0], np.round(fade / TICK) * TICK]))
+    t = np.minimum(times[:, None], fade)
+    jerk = np.divide(-a, fade, out=np.zeros_like(a), where=fade > 0.0)
+    v_end = state.velocities + a * fade + 0.5 * jerk * fade**2
+    velocities = state.velocities + a * t + 0.5 * jerk * t**2
+    positions = state.positions + state.velocities * t + 0.5 * a * t**2 + jerk * t**3 / 6
+    positions += v_end * (times[:, None] - t)
+    accelerations = np.where(times[:, None] < fade, a + jerk * t, 0.0)
+    speed = float(np.linalg.norm(velocities[-1]))
+    u = velocities[-1] / max(speed, 1e-300)
+    share = np.abs(u) + 1e-300
+    grip = RESERVE * float((limits.acceleration / share).min())
+    snap = RESERVE * float((limits.jerk / share).min())
+    length = 0.5 * speed * ramp_time(speed, grip, snap) * (1 + 1e-6)
+    return Lead(
+        trajectory=Trajectory(
+            times=times, positions=positions, velocities=velocities, accelerations=accelerations
+        ),
+        speed=speed,
+        q_stop=positions[-1] + u * length,
+    )
+
+
+def reserved(limits: MotionLimits) -> MotionLimits:
+    """Return the limits that the path after a lead-in is timed with: those it was made for."""
+    return MotionLimits(
+        velocity=limits.velocity,
+        acceleration=RESERVE * limits.acceleration,
+        jerk=RESERVE * limits.jerk,
+    )
+
+
+def joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Return two trajectories in one, the second from the last point of the first on."""
+    return Trajectory(
+        times=np.concatenate([before.times, before.times[-1] + after.times[1:]]),
+        positions=np.concatenate([before.positions, after.positions[1:]]),
+        velocities=np.concatenate([before.velocities, after.velocities[1:]]),
+        accelerations=np.concatenate([before.accelerations, after.accelerations[1:]]),
+    )
+
+
+def until(trajectory: Trajectory, time: float) -> Trajectory:
+    """
+    Return a trajectory up to a time within it [s].
+
+    A part of a quintic is the quintic through its ends: nothing changes but the points.
+    """
+    if time >= trajectory.duration:
+        return trajectory
+    q, v, a = sample(trajectory, [time])
+    is_before = trajectory.times < time - CLOSEST
+    if not is_before.any():
+        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
+    return Trajectory(
+        times=np.append(trajectory.times[is_before], time),
+        positions=np.concatenate([trajectory.positions[is_before], q]),
+        velocities=np.concatenate([trajectory.velocities[is_before], v]),
+        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
+    )
+
+
+def after(trajectory: Trajectory, index: int) -> Trajectory:
+    """Return a trajectory from one of its points on."""
+    return Trajectory(
+        times=trajectory.times[index:] - trajectory.times[index],
+        positions=trajectory.positions[index:],
+        velocities=trajectory.velocities[index:],
+        accelerations=trajectory.accelerations[index:],
+    )
+
+
+def follows(trajectory: Trajectory, time: float, q: Array) -> bool:
+    """Return whether an arm at q is where a trajectory is at a time [s]."""
+    return bool(np.abs(positions_at(trajectory, [time])[0] - q).max() <= SAME_POSITION)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Takeover:
+    """
+    What an arm that moves does when a motion takes over from its present one.
+
+    Parameters
+    ----------
+    state : MotionState
+        At that time.
+    running : Trajectory or None
+        The motion that it follows until then; None where that is not known.
+    time : float
+        Within that motion [s].
+
+    """
+
+    state: MotionState
+    running: Trajectory | None = None
+    time: float = 0.0
+
+
+def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
+    """Return the lead that is a stop along the present motion; None where that is not known."""
+    if moving.running is None:
+        return None
+    stop = brake(moving.running, moving.time, limits)
+    return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1])
+
+
+def takeover(
+    positions: Array,
+    velocities: Array,
+    running: Trajectory | None,
+    ahead: float,
+) -> Takeover:
+    """
+    Return what an arm will do, from a reading of it.
+
+    An arm that is seen to follow a known motion, at whatever rate, goes on to follow it, and what
+    it is told next it follows at the same rate: the state is that of the motion. Any other goes on
+    at the velocity it has; of its acceleration nothing is known.
+
+    Parameters
+    ----------
+    positions, velocities : ndarray, shape (dof,)
+        Of the reading [rad, rad/s].
+    running : Trajectory or None
+        The motion that the arm was last told to follow.
+    ahead : float
+        From the reading on, >= 0 [s].
+
+    """
+    found = None if running is None else phase_of(positions, velocities, running)
+    if running is None or found is None:
+        return Takeover(
+            state=MotionState(
+                positions=positions + ahead * velocities,
+                velocities=velocities,
+                accelerations=np.zeros_like(velocities),
+            )
+        )
+    phase, rate = found
+    time = min(phase + rate * ahead, running.duration)
+    q, v, a = (values[0] for values in sample(running, [time]))
+    return Takeover(
+        state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time
+    )
+
+
+def phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
+    """Return the time within a motion at which the arm is, and at which rate it follows it."""
+    n = max(2, int(running.duration / SEARCH_SPACING))
+    times = np.linspace(0.0, running.duration, n)
+    path, along, _ = sample(running, times)
+    # A motion that passes a place twice does so in another direction.
+    speed, pace = float(np.linalg.norm(v)), np.linalg.norm(along, axis=1)
+    heading = along @ v / (pace * speed + 1e-300)
+    gaps = np.linalg.norm(path - q, axis=1) + np.where(heading > 0.9, 0.0, np.inf)
+    phase = float(times[int(np.argmin(gaps))])
+    if not np.isfinite(gaps.min()):
+        return None
+    for _ in range(3):
+        # The nearest point, by Newton's method.
+        p, w, _ = (values[0] for values in sample(running, [phase]))
+        phase = float(np.clip(phase + (q - p) @ w / (w @ w + 1e-300), 0.0, running.duration))
+    p, w, _ = (values[0] for values in sample(running, [phase]))
+    rate = float(v @ w / (w @ w + 1e-300))
+    is_same = np.abs(q - p).max() <= SAME_POSITION and np.abs(v - rate * w).max() <= SAME_VELOCITY
+    return (phase, rate) if is_same else None

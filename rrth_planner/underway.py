@@ -1,0 +1,189 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A motion that an arm was told to follow: how far it is, and what is proven of the rest."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.certificate import certify
+from rrth_planner.leaving import leads_out
+from rrth_planner.scene import Box, Scene
+from rrth_planner.takeover import follows, phase_of
+from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.world import arm_world
+
+# How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
+SLOW, LATEST = 0.05, 0.05
+# Two points of a part of a motion are at least so far apart [s].
+CLOSEST = 1e-4
+# Stretches of time in each of which boxes that move are as large as they get in it.
+STRETCHES = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunningMotion:
+    """
+    A motion and when it began.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    start_time : float
+        [s].
+    reach : float
+        How much of the pointing ray must be clear at the end [m].
+    escape_time : float
+        Until then the motion may lead out of the wearer [s].
+
+    """
+
+    trajectory: Trajectory
+    start_time: float
+    reach: float = 0.0
+    escape_time: float = 0.0
+
+    def phase(self, q: Array, v: Array, taken: float, now: float) -> float | None:
+        """
+        Return the time within the motion that the arm is at now [s]; None where it is elsewhere.
+
+        Parameters
+        ----------
+        q, v : ndarray, shape (dof,)
+            A reading of the arm [rad, rad/s].
+        taken, now : float
+            When it was read, and now [s].
+
+        """
+        guess = taken - self.start_time
+        if follows(self.trajectory, guess, q):
+            # The arm began when it heard of the motion: a little late, which at 4 rad/s^2 is more
+            # than a controller lets a motion that takes over be off in velocity.
+            at = guess
+            for _ in range(2):
+                p, w, _ = (values[0] for values in sample(self.trajectory, [at]))
+                if np.abs(w).max() > SLOW:
+                    at += float((q - p) @ w / (w @ w))
+                at = min(max(at, guess - LATEST), guess + LATEST)
+            return at + now - taken
+        found = phase_of(q, v, self.trajectory)
+        return None if found is None else found[0] + found[1] * (now - taken)
+
+
+def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
+    """
+    Return the part of a trajectory between two times within it [s], which begins at time 0.
+
+    A part of a quintic is the quintic through its ends: nothing changes but the points.
+    """
+    states = sample(trajectory, [begin, end])
+    times = trajectory.times
+    is_inside = (times > begin + CLOSEST) & (times < end - CLOSEST)
+    if end - begin < CLOSEST:
+        return Trajectory(
+            times=np.zeros(1),
+            positions=states[0][1:],
+            velocities=states[1][1:],
+            accelerations=states[2][1:],
+        )
+    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    q, v, a = (
+        np.concatenate([ends[:1], row[is_inside], ends[1:]])
+        for ends, row in zip(states, rows, strict=True)
+    )
+    return Trajectory(
+        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
+        positions=q,
+        velocities=v,
+        accelerations=a,
+    )
+
+
+def is_still_free(
+    running: RunningMotion,
+    phase: float,
+    arm: ArmModel,
+    scene: Scene,
+    *,
+    margin: float,
+    ray_guard_length: float,
+    speeds: Array | None = None,
+) -> bool:
+    """
+    Return whether what is left of a motion is proven free of the wearer as seen now.
+
+    Parameters
+    ----------
+    running : RunningMotion
+    phase : float
+        Time within the motion that it has come to [s].
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    margin, ray_guard_length : float
+        [m].
+    speeds : ndarray, shape (m,), optional
+        How fast each box may go on moving, in any direction: until the arm has passed it counts
+        as that much larger [m/s].
+
+    """
+    trajectory = running.trajectory
+    q_end = trajectory.positions[-1]
+    checked = phase
+    if phase < running.escape_time:
+        world = arm_world(arm, scene, margin, ray_guard_length)
+        if not leads_out(trajectory, world, running.escape_time, phase):
+            return False
+        checked = running.escape_time
+    if speeds is None or not speeds.any():
+        world = arm_world(arm, scene, margin, ray_guard_length)
+        is_free = certify(trajectory, world, checked).is_proven
+        return is_free and world.is_valid(q_end, running.reach)
+    # Within a stretch of time the boxes are as large as they get at its end.
+    now = min(max(checked, 0.0), trajectory.duration)
+    for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
+        world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
+        if not certify(between(trajectory, begin, end), world).is_proven:
+            return False
+    return world.is_valid(q_end, running.reach)
+
+
+def _swollen(scene: Scene, by: Array) -> Scene:
+    """Return a scene whose boxes are larger by so much on every side, (m,) [m]."""
+    return Scene(
+        tuple(
+            Box(box.name, box.center, box.size + 2.0 * growth, box.rotation)
+            for box, growth in zip(scene.boxes, by.tolist(), strict=True)
+        )
+    )
+
+
+def box_speeds(before: Scene, after: Scene, elapsed: float, most: float) -> Array:
+    """
+    Return how fast the boxes of a scene move, from where they were before, shape (m,) [m/s].
+
+    The greatest speed of any of a box's corners, no more than `most`; a box that was not there
+    before may move as fast as any.
+
+    Parameters
+    ----------
+    before, after : Scene
+        Boxes are the same where their names are.
+    elapsed : float
+        Between the two [s].
+    most : float
+        [m/s].
+
+    """
+    known = {box.name: box for box in before.boxes}
+    result = np.full(len(after.boxes), most)
+    for i, box in enumerate(after.boxes):
+        old = known.get(box.name)
+        if old is not None and elapsed > 0.0:
+            turned = np.linalg.norm(box.rotation - old.rotation, 2) * np.linalg.norm(box.size)
+            moved = np.linalg.norm(box.center - old.center) + 0.5 * turned
+            grown = 0.5 * np.linalg.norm(np.maximum(box.size - old.size, 0.0))
+            result[i] = min(most, (moved + grown) / elapsed)
+    return result

@@ -1,0 +1,162 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planner and playback as processes: the wearer moves into the way of a running motion."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
+from geometry_msgs.msg import PointStamped  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner import oracle  # noqa: E402
+from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
+from rrth_planner.scene import Box, Scene  # noqa: E402
+from rrth_planner.trajectory import sample  # noqa: E402
+import samples  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+import worlds  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+FAR, OTHER = (1.0, 1.5, 0.8), (2.0, 0.3, 0.4)
+
+
+class Client(Node):
+    """Tells the planner everything, and writes down what the nodes say."""
+
+    def __init__(self):
+        """Connect to both nodes."""
+        super().__init__('guarded')
+        self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
+        self.target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self.states, self.motions, self.figures = [], [], {}
+        self.create_subscription(JointState, 'joint_states', self.states.append, 500)
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, LATCHED)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_figures, 10)
+        self.plan = self.create_client(Trigger, 'rrth_planner/plan')
+
+    def _on_figures(self, msg):
+        self.figures = {pair.key: pair.value for pair in msg.status[0].values}
+
+    def speed(self):
+        """Return how fast the arm moved last [rad/s]."""
+        return float(np.abs(self.states[-1].velocity).max()) if self.states else 0.0
+
+    def motion(self, k=-1):
+        """Return a motion that was published."""
+        return joint_trajectory_from_msg(self.motions[k], worlds.table_1_arm().joint_names)
+
+
+def body(*more):
+    """Return the wearer, and some boxes more, as a message and as a scene."""
+    markers, boxes = [samples.command(Marker.DELETEALL)], [*worlds.wearer().boxes, *more]
+    for box in boxes:
+        marker = samples.box(box.name, center=box.center.tolist(), size=box.size.tolist())
+        o = marker.pose.orientation
+        o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
+        markers.append(marker)
+    return samples.array(*markers), Scene(tuple(boxes))
+
+
+@pytest.fixture
+def scene_of_a_motion(wait_until, spinning):
+    """Have an arm on its way to a target; give the client."""
+
+    def begin(*settings):
+        client = Client()
+        planner, playback = (f'rrth_planner.ros.{n}_node' for n in ('planner', 'playback'))
+        ros = ['--ros-args', '-p', 'seed:=7']
+        for setting in settings:
+            ros += ['-p', setting]
+        stack.enter_context(ChildProcess(planner, ros, said.append))
+        stack.enter_context(ChildProcess(playback, [], said.append))
+        stack.enter_context(spinning(client))
+        wait_until(client.plan.service_is_ready, 120.0)
+        wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')
+        client.body.publish(body()[0])
+        client.target.publish(samples.target(*FAR))
+        for publisher in (client.body, client.target):
+            assert publisher.wait_for_all_acked()
+        future = client.plan.call_async(Trigger.Request())
+        wait_until(future.done)
+        assert future.result().success
+        wait_until(lambda: client.motions and client.speed() > 0.3)
+        return client, said
+
+    from contextlib import ExitStack
+
+    said = []
+    with ExitStack() as stack:
+        yield begin
+
+
+def in_the_way(client, ahead):
+    """Return a box that the arm would touch so much later [s]."""
+    arm, motion = worlds.table_1_arm(), client.motion()
+    gaps = np.linspace(0.0, motion.duration, 500)
+    q, _, _ = sample(motion, gaps)
+    now = gaps[np.argmin(np.linalg.norm(q - client.states[-1].position, axis=1))]
+    later, _, _ = sample(motion, [now + ahead])
+    tip = oracle.frames(arm, later)[0, -1]
+    # On the ray, where the tool does not get.
+    return Box('hand', tip[:3, 3] + 0.4 * tip[:3, 2], np.full(3, 0.05), np.eye(3))
+
+
+def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
+    scene_of_a_motion, wait_until
+):
+    client, said = scene_of_a_motion()
+    n, box = len(client.states), in_the_way(client, 0.8)
+    msg, scene = body(box)
+    client.body.publish(msg)
+    wait_until(lambda: len(client.motions) == 2)
+    brake = client.motion(1)
+    assert brake.velocities[0].any()
+    assert brake.duration < client.motion(0).duration
+    # It goes on by itself, or holds and says so.
+    wait_until(lambda: len(client.motions) == 3 or 'holds' in client.figures.get('guard', ''))
+    wait_until(lambda: client.speed() == 0.0)
+    q = np.array([state.position for state in client.states[n:]])
+    touch = oracle.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
+    assert touch is None
+    assert any('the wearer moved into the way' in line for line in said)
+    assert not [line for line in said if 'refused' in line]
+    wait_until(lambda: client.figures['brakes'].startswith('1,'))
+
+
+def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_until):
+    client, _ = scene_of_a_motion()
+    away = Box('hand', np.array([0.0, -3.0, 0.0]), np.full(3, 0.1), np.eye(3))
+    for _ in range(5):
+        client.body.publish(body(away)[0])
+        n = len(client.states)
+        wait_until(lambda n=n: len(client.states) > n + 2)
+    wait_until(lambda: client.speed() == 0.0)
+    assert len(client.motions) == 1
+    assert np.allclose(client.states[-1].position, client.motion().positions[-1])
+
+
+def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, wait_until):
+    client, said = scene_of_a_motion('body_timeout:=0.3')
+    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.speed() == 0.0)
+    assert any('body_timeout' in line for line in said)
+    assert len(client.motions) == 2
+
+
+def test_without_replan_the_arm_holds_where_it_stopped(scene_of_a_motion, wait_until):
+    client, said = scene_of_a_motion('replan:=false')
+    client.body.publish(body(in_the_way(client, 0.8))[0])
+    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.speed() == 0.0)
+    assert len(client.motions) == 2

@@ -1,0 +1,254 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What never should happen, through the node: answered, kept in a file, never published."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
+from rcl_interfaces.msg import Log  # noqa: E402
+from rrth_planner import pipeline  # noqa: E402
+from rrth_planner.incident import IncidentKind  # noqa: E402
+from rrth_planner.incident_files import read_incident  # noqa: E402
+from rrth_planner.options import RRTStarOptions  # noqa: E402
+from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.touch import Touch  # noqa: E402
+import samples  # noqa: E402
+from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+ROOT = Path(__file__).parent.parent.parent
+TOUCH = Touch(0.25, 0.0123, 'pointing ray', 'head')
+SENTENCE = (
+    'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
+    'at 0.250 s, expected at least 0.02 m'
+)
+
+
+LEVELS = {10: 'debug', 20: 'info', 30: 'warning', 40: 'error'}
+
+
+def replayed(file):
+    """Replay a file in a process of its own; return its exit code and the last line."""
+    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    found = subprocess.run(
+        [sys.executable, '-m', 'rrth_planner.replay', str(file)],
+        env={**os.environ, 'PYTHONPATH': paths},
+        capture_output=True,
+        text=True,
+        timeout=300.0,
+        check=False,
+    )
+    assert found.stderr == ''
+    return found.returncode, found.stdout
+
+
+def level(stranger):
+    return stranger.heard['/diagnostics'][-1].status[0].level
+
+
+def nothing_published(stranger):
+    topics = ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers')
+    return not any(stranger.heard[topic] for topic in topics)
+
+
+@pytest.mark.parametrize('velocity', [None, [0.3, 0.0, 0.0, -0.2]], ids=['at rest', 'moving'])
+def test_a_disagreement_is_answered_and_kept_to_be_replayed(
+    start, monkeypatch, tmp_path, velocity
+):
+    planner, stranger = start(
+        incident_folder=str(tmp_path), seed=5, margin=0.02, algorithm='rrt_star', max_samples=500
+    )
+    say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        message = stranger.answer().message
+    (file,) = tmp_path.iterdir()
+    assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
+    stranger.wait_until(lambda: stranger.value('last incident') == str(file))
+    assert stranger.value('incidents') == '1'
+    assert stranger.value('last code') == 'FAILURE (99999)'
+    assert level(stranger) == DiagnosticStatus.ERROR
+    assert nothing_published(stranger)
+
+    incident = read_incident(file)
+    question = incident.question
+    assert incident.kind is IncidentKind.DISAGREEMENT
+    assert incident.touch == TOUCH
+    assert incident.present is None
+    assert (question.seed, question.margin, question.ray_guard_length) == (5, 0.02, 1.0)
+    assert question.options == RRTStarOptions(max_samples=500)
+    assert [box.name for box in question.scene.boxes] == ['torso/0', 'head/0']
+    np.testing.assert_array_equal(question.goal.target, [1.5, 0.1, 0.3])
+    np.testing.assert_array_equal(incident.trajectory.positions[0], question.q_start)
+    if velocity is None:
+        assert question.moving is None
+        np.testing.assert_array_equal(question.q_start, samples.FOLDED)
+    else:
+        np.testing.assert_array_equal(question.moving.state.velocities, velocity)
+        np.testing.assert_array_equal(incident.trajectory.velocities[0], velocity)
+
+    # Without the patch they agree, and the node lives on.
+    code, out = replayed(file)
+    assert code == 1
+    assert 'the same motion to the bit: yes' in out
+    assert out.splitlines()[-1] == (
+        'not reproduced: the judges agree now that the recorded motion is free'
+    )
+    stranger.publishers['joint_states'].publish(samples.joints())
+    stranger.wait_until(lambda: not inputs_of(planner).joints.value.velocities.any())
+    assert stranger.answer().success
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkeypatch, tmp_path):
+    file = tmp_path / 'file'
+    file.write_text('')
+    planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
+    say_all(planner, stranger)
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        message = stranger.answer().message
+    assert message.startswith(
+        f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
+    )
+    assert nothing_published(stranger)
+    stranger.wait_until(lambda: stranger.value('incidents') == '1')
+    assert stranger.value('last incident') == ''
+    assert stranger.answer().success
+
+
+def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    with monkeypatch.context() as patch:
+        patch.setenv('ROS_LOG_DIR', str(tmp_path))
+        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        message = stranger.answer().message
+    (file,) = (tmp_path / 'rrth_planner').iterdir()
+    assert message.endswith(str(file))
+
+
+def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path), seed=5)
+    say_all(planner, stranger)
+
+    def fail(*_):
+        raise OSError('no publisher')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
+        message = stranger.answer().message
+    (file,) = tmp_path.iterdir()
+    assert message == (
+        'FAILURE (99999): planning failed unexpectedly: OSError: no publisher; to replay it: '
+        f'./run exec replay {file}'
+    )
+    incident = read_incident(file)
+    assert (incident.kind, incident.error) == (IncidentKind.ERROR, 'OSError')
+    assert "raise OSError('no publisher')" in incident.traceback
+    assert incident.trajectory is not None
+    code, out = replayed(file)
+    assert code == 1
+    assert out.splitlines()[-1] == (
+        'not reproduced: the OSError came after the motion had been planned'
+    )
+    assert stranger.answer().success
+
+
+def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
+    say_all(planner, stranger)
+
+    def fail(*_):
+        raise ValueError('of a test')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, '_question', fail)
+        message = stranger.answer().message
+    assert message == 'FAILURE (99999): planning failed unexpectedly: ValueError: of a test'
+    assert not list(tmp_path.iterdir())
+    assert stranger.answer().success
+
+
+def test_each_request_is_logged_once_with_figures_or_with_its_code(start):
+    planner, stranger = start(seed=3)
+    stranger.hear('/rosout', Log, 100)
+    name = planner.get_logger().name
+    say_all(planner, stranger)
+    stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
+    answers = [stranger.answer() for _ in range(3)]
+    stranger.say('target', samples.target(0.0, 0.0, 0.0))
+    stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
+    answers.append(stranger.answer())
+
+    def lines():
+        return [msg for msg in stranger.heard['/rosout'] if msg.name == name and '): ' in msg.msg]
+
+    stranger.wait_until(lambda: len(lines()) == len(answers))
+    assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
+    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'info', 'warning']
+    for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
+        assert word in lines()[0].msg
+    assert lines()[-1].msg.startswith('GOAL_IN_COLLISION (-12): the target (0.000, 0.000, 0.000)')
+
+
+def test_diagnostics_say_everything(start):
+    planner, stranger = start(seed=3)
+    say_all(planner, stranger)
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
+    for name in (
+        *('planning time [ms]', 'request to trajectory [ms]', 'duration [s]', 'path length [rad]'),
+        *('least clearance [m]', 'seed', 'boxes', 'requests', 'solved', 'incidents'),
+        *(
+            f'{kind} {name}{unit}'
+            for name in ('body', 'target', 'joints')
+            for kind, unit in (('age of', ' [s]'), ('refused messages,', ''))
+        ),
+    ):
+        assert float(stranger.value(name)) >= 0.0, name
+    for name in ('last sentence', 'last incident', 'guard', 'last stop', 'last refusal, body'):
+        assert isinstance(stranger.value(name), str)
+
+
+def test_every_end_of_a_plan_has_a_code_of_its_own_kind():
+    assert set(CODE_OF_STATUS) == set(pipeline.PlanStatus)
+    assert {code for code in ErrorCode if code not in CODE_OF_STATUS.values()} == {
+        # What a request ends with before or after it is planned.
+        ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+        ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+        ErrorCode.INVALID_GOAL_CONSTRAINTS,
+        ErrorCode.FRAME_TRANSFORM_FAILURE,
+        ErrorCode.ROBOT_STATE_STALE,
+        ErrorCode.SENSOR_INFO_STALE,
+    }
+
+
+def test_what_is_in_the_way_is_named_with_the_part_of_the_arm(start):
+    planner, stranger = start()
+    pack = samples.box('pack', center=(-0.3, -0.1, 0.3), text='back pack')
+    say_all(planner, stranger, body_boxes=samples.array(pack))
+    message = stranger.answer().message
+    assert message.startswith('START_STATE_IN_COLLISION (-10): link ')
+    assert ' m inside box "back pack"' in message
+
+
+def test_postures_that_all_touch_are_told_with_part_and_box(start):
+    planner, stranger = start()
+    body = samples.wearer()
+    # A wall between the arm and the target, larger than the arm can look past.
+    body.markers.append(samples.box('wall', 7, (1.0, 0.0, 0.0), (0.1, 20.0, 20.0)))
+    say_all(planner, stranger, body_boxes=body)
+    message = stranger.answer().message
+    assert message.startswith('GOAL_IN_COLLISION (-12): all ')
+    assert 'pointing ray and box "wall' in message

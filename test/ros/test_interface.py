@@ -1,0 +1,409 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes promise of names, frames, clocks and lives, seen from outside."""
+
+import time
+from types import SimpleNamespace
+
+from builtin_interfaces.msg import Time
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from geometry_msgs.msg import Point, PointStamped, TransformStamped  # noqa: E402
+from rclpy.clock import ROSClock  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.ros import frames, requests  # noqa: E402
+from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from samples import array, box, command, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from test_planner_node import (  # noqa: E402, F401
+    _start,
+    inputs_of,
+    LATCHED,
+    say_all,
+    Stranger,
+    VOLATILE,
+)
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+
+
+def motion(q_to, seconds):
+    """Return a motion from the folded state."""
+    msg = JointTrajectory(joint_names=JOINTS)
+    for k, q in enumerate((FOLDED, list(q_to))):
+        point = JointTrajectoryPoint(positions=q, velocities=[0.0] * 4, accelerations=[0.0] * 4)
+        point.time_from_start.sec = k * seconds
+        msg.points.append(point)
+    return msg
+
+
+def test_markers_act_over_the_wire_as_in_rviz(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    body = inputs_of(planner).body
+
+    def boxes():
+        now = planner.get_clock().now().nanoseconds * 1e-9
+        return {b.name for _, part in body.value.at(now).parts for b in part.boxes}
+
+    def say(*markers):
+        stranger.publishers['body_boxes'].publish(array(*markers))
+
+    hands = box('hands', center=(0.1, 0.0, 0.0), size=(0.05, 0.05, 0.05))
+    hands.type, hands.points = Marker.CUBE_LIST, [Point(y=0.3), Point(y=-0.3)]
+    hat = box('hat', center=(0.0, 0.0, 0.7), size=(0.2, 0.2, 0.1))
+    hat.lifetime.nanosec = 3 * 10**8
+    say(hands, hat)
+    of_hands = {'hands/0[0]', 'hands/0[1]'}
+    stranger.wait_until(lambda: boxes() == {'torso/0', 'head/0', 'hat/0', *of_hands})
+    assert stranger.answer().success
+    stranger.wait_until(lambda: boxes() == {'torso/0', 'head/0', *of_hands})
+    say(command(Marker.DELETE, 'hands'), command(Marker.DELETE, 'head', 7))
+    stranger.wait_until(lambda: boxes() == {'torso/0', 'head/0'})
+    say(command(Marker.DELETEALL, 'head'))
+    stranger.wait_until(lambda: boxes() == {'torso/0'})
+    say(command(Marker.DELETEALL))
+    stranger.wait_until(lambda: not boxes())
+    message = stranger.answer().message
+    assert message.startswith('UNABLE_TO_AQUIRE_SENSOR_DATA (-5): the body on ')
+    assert 'is empty' in message
+
+
+def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_until):
+    words = ['--ros-args', '-r', 'body_boxes:=/wearer', '-r', '__ns:=']
+    planners = [PlannerNode(cli_args=[*words[:-1], f'{words[-1]}{ns}']) for ns in ('/a', '/b')]
+    strangers = [Stranger(ns, wait_until) for ns in ('/a', '/b')]
+    assert [p.get_fully_qualified_name() for p in planners] == [
+        '/a/rrth_planner',
+        '/b/rrth_planner',
+    ]
+    points = ((1.5, 0.5, 0.3), (1.5, -0.5, 0.3))
+    with spinning(*planners), spinning(*(s.node for s in strangers)):
+        # One wearer for both, but a target and joints for each.
+        strangers[0].say('/wearer', wearer())
+        strangers[0].say('joint_states', joints())
+        strangers[0].say('target', target(*points[0]))
+        heard = [inputs_of(p) for p in planners]
+        wait_until(lambda: heard[0].target.received is not None)
+        wait_until(lambda: heard[0].joints.received is not None)
+        wait_until(lambda: all(inputs.body.received is not None for inputs in heard))
+        assert strangers[0].answer().success
+        assert 'no target yet on /b/target' in strangers[1].answer().message
+        strangers[1].say('joint_states', joints())
+        strangers[1].say('target', target(*points[1]))
+        wait_until(lambda: heard[1].joints.received is not None)
+        wait_until(lambda: heard[1].target.received is not None)
+        assert strangers[1].answer().success
+        wait_until(lambda: all(s.heard['joint_trajectory'] for s in strangers))
+    for stranger, point in zip(strangers, points, strict=True):
+        (msg,) = stranger.heard['joint_trajectory']
+        q = np.array(msg.points[-1].positions)
+        assert pointing_error(load_arm(), q, np.array(point)) < 1e-6
+    for planner, stranger in zip(planners, strangers, strict=True):
+        planner.close()
+        planner.destroy_node()
+        stranger.node.destroy_node()
+
+
+class FakeTransformError(Exception):
+    """What tf2_ros raises for a frame that it does not know."""
+
+
+class FakeBuffer:
+    """The part of tf2_ros.Buffer that the planner uses: one frame is known."""
+
+    def __init__(self, *, node):
+        self.node, self.listener = node, None
+
+    def lookup_transform(self, target_frame, source_frame, time):
+        """Return the latest transform: a metre forward, turned about z by 90 degrees."""
+        assert target_frame == 'torso'
+        assert time.nanoseconds == 0
+        if source_frame == 'broken':
+            return TransformStamped()
+        if source_frame != 'camera':
+            raise FakeTransformError(f'"{source_frame}" passed to lookupTransform\nis unknown')
+        stamped = TransformStamped()
+        stamped.transform.translation.x = 1.0
+        r = stamped.transform.rotation
+        r.z = r.w = float(np.sqrt(0.5))
+        return stamped
+
+
+class FakeListener:
+    """Fills a buffer, in the life of a node."""
+
+    def __init__(self, buffer, node):
+        buffer.listener = node
+
+
+@pytest.fixture(name='tf')
+def _tf(monkeypatch):
+    fake = SimpleNamespace(
+        Buffer=FakeBuffer, TransformListener=FakeListener, TransformException=FakeTransformError
+    )
+    monkeypatch.setattr(frames, 'tf2_ros', fake)
+
+
+@pytest.mark.usefixtures('tf')
+def test_frames_that_tf_knows_are_transformed_and_others_named(start):
+    planner, stranger = start()
+    buffer = planner._listener._frames._buffer
+    assert buffer.node is buffer.listener is planner
+    # (0.1, -0.5, 0.3) from the camera is (1.5, 0.1, 0.3) from the torso.
+    say_all(planner, stranger, target=target(0.1, -0.5, 0.3, 'camera'))
+    inputs = inputs_of(planner)
+    np.testing.assert_allclose(inputs.target.value.target, [1.5, 0.1, 0.3], atol=1e-12)
+    hat = box('hat', center=(0.0, 1.0, 0.7), size=(0.3, 0.2, 0.1), frame='camera')
+    stranger.publishers['body_boxes'].publish(array(hat))
+    stranger.wait_until(lambda: inputs.body.value.n_boxes == 3)
+    placed = inputs.body.value.parts[-1][1].boxes[0]
+    np.testing.assert_allclose(placed.center, [0.0, 0.0, 0.7], atol=1e-12)
+    np.testing.assert_allclose(placed.rotation[:, 0], [0.0, 1.0, 0.0], atol=1e-12)
+    assert stranger.answer().success
+    stranger.publishers['target'].publish(target(frame='gone'))
+    stranger.wait_until(lambda: inputs.target.is_last_refused)
+    message = stranger.answer().message
+    assert message.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
+    assert 'frame "gone", expected a frame that TF can transform to "torso": ' in message
+    assert message.isprintable()
+
+
+@pytest.fixture(name='clock')
+def _clock(spinning):
+    node = Node('clock')
+    publisher = node.create_publisher(Clock, '/clock', 10)
+
+    def tell(seconds):
+        sec, nanosec = divmod(round(seconds * 10**9), 10**9)
+        msg = Clock(clock=Time(sec=sec, nanosec=nanosec))
+        publisher.publish(msg)
+
+    yield tell
+    node.destroy_node()
+
+
+def seconds(node):
+    """Return what time it is for a node [s]."""
+    assert isinstance(node.get_clock(), ROSClock)
+    return node.get_clock().now().nanoseconds * 1e-9
+
+
+def set_clock(clock, now, wait_until, *nodes):
+    """Tell a time until everybody has heard it; clocks are often said, not latched."""
+
+    def is_told():
+        clock(now)
+        return all(abs(seconds(node) - now) < 1e-6 for node in nodes)
+
+    wait_until(is_told)
+
+
+def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until):
+    planner, stranger = start(use_sim_time=True, body_timeout=1.0, joint_timeout=5.0)
+    # Before anybody has told the time it is 0, and plans are made all the same.
+    say_all(planner, stranger)
+    assert seconds(planner) == 0.0
+    assert stranger.answer().success
+    set_clock(clock, 100.0, wait_until, planner)
+    inputs = inputs_of(planner)
+    for now, is_fresh in ((100.0, True), (100.5, True), (101.5, False), (20.0, False)):
+        if now == 100.0:
+            say_inputs(stranger, inputs, wait_until, 100.0)
+        set_clock(clock, now, wait_until, planner)
+        message = stranger.answer().message
+        assert message.startswith('SUCCESS' if is_fresh else 'SENSOR_INFO_STALE (-24)'), message
+    # What is heard after the clock was set back counts from then on.
+    say_inputs(stranger, inputs, wait_until, 20.0)
+    assert stranger.answer().success
+    for _ in range(3):
+        assert stranger.answer().success
+
+
+def say_inputs(stranger, inputs, wait_until, now):
+    """Say all inputs again and wait until they are heard at a time [s]."""
+    for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
+        stranger.publishers[name].publish(msg)
+    wait_until(lambda: all(abs(heard.received - now) < 1e-6 for heard in inputs.all.values()))
+
+
+def test_an_arm_in_motion_is_taken_over_while_simulated_time_stands_still(
+    start, clock, wait_until
+):
+    planner, stranger = start(use_sim_time=True)
+    set_clock(clock, 7.0, wait_until, planner)
+    say_all(planner, stranger, joint_states=joints(velocity=[0.1, 0.0, 0.0, 0.0]))
+    assert stranger.answer().message
+
+
+def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_back(
+    spinning, clock, wait_until
+):
+    node = PlaybackNode(
+        namespace='/sim', parameter_overrides=[Parameter('use_sim_time', value=True)]
+    )
+    observer, states = Node('observer', namespace='/sim'), []
+    observer.create_subscription(JointState, 'joint_states', states.append, 100)
+    motions = observer.create_publisher(JointTrajectory, 'joint_trajectory', VOLATILE)
+    with spinning(node), spinning(observer):
+        wait_until(lambda: motions.get_subscription_count() > 0)
+        set_clock(clock, 50.0, wait_until, node)
+        there = (np.array(FOLDED) - 0.3).tolist()
+        before = node._playback
+        motions.publish(motion(there, 2))
+        wait_until(lambda: node._playback is not before)
+        for k in range(100):
+            set_clock(clock, 50.0 + 0.01 * k, wait_until, node)
+        wait_until(lambda: states and abs(states[-1].position[0] - FOLDED[0]) > 0.05)
+        n = len(states)
+        # While the clock stands still the arm does too.
+        for _ in range(20):
+            clock(50.99)
+        assert len(states) <= n + 3
+        stood = node._playback.state_at(50.99)[0]
+        for k in range(1, 100):
+            set_clock(clock, 10.0 + 0.01 * k, wait_until, node)
+        wait_until(lambda: states[-1].header.stamp.sec == 10)
+        np.testing.assert_allclose(states[-1].position, stood, atol=0.01)
+        assert not any(states[-1].velocity)
+        # And it moves again from there.
+        back = motion(FOLDED, 2)
+        back.points[0].positions = list(states[-1].position)
+        before = node._playback
+        motions.publish(back)
+        wait_until(lambda: node._playback is not before)
+    node.destroy_node()
+    observer.destroy_node()
+
+
+def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
+    planner, stranger = start(seed=5)
+    say_all(planner, stranger)
+    jerks, plan_motion = [], requests.plan_motion
+
+    def plan_while_it_is_set(*args, **kwargs):
+        if not jerks:
+            planner.set_parameters(
+                [Parameter('seed', value=6), Parameter('max_jerk', value=[30.0])]
+            )
+        jerks.append(kwargs['limits'].jerk[0])
+        return plan_motion(*args, **kwargs)
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_it_is_set)
+    assert stranger.answer().message.endswith('seed 5')
+    assert stranger.answer().message.endswith('seed 6')
+    assert jerks == [40.0, 30.0]
+
+
+@pytest.mark.parametrize('profile', [LATCHED, VOLATILE])
+def test_the_playback_hears_reliable_publishers(spinning, wait_until, profile):
+    node, planner = PlaybackNode(namespace='/quality'), Node('planner', namespace='/quality')
+    motions = planner.create_publisher(JointTrajectory, 'joint_trajectory', profile)
+    with spinning(node, planner):
+        wait_until(lambda: motions.get_subscription_count() > 0)
+        before = node._playback
+        motions.publish(motion((np.array(FOLDED) - 0.1).tolist(), 1))
+        wait_until(lambda: node._playback is not before)
+    node.destroy_node()
+    planner.destroy_node()
+
+
+def test_bytes_and_huge_messages_from_the_wire_end_no_node(start, spinning, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, topics = inputs_of(planner), ('body_boxes', 'target', 'joint_states')
+    for k, (topic, heard) in enumerate(zip(topics, inputs.all.values(), strict=True)):
+        before = heard.value
+        stranger.publishers[topic].publish(b'\0\1\0\0' + b'\xff' * 40)
+        wait_until(lambda h=heard: h.n_refused == 1)
+        assert 'bytes that are no ' in str(heard.refusal)
+        assert heard.value is before, k
+    stranger.publishers['body_boxes'].publish(array(*(box(index=k) for k in range(3000))))
+    wait_until(lambda: inputs.body.n_refused == 2)
+    assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.refusal)
+    for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
+        stranger.publishers[name].publish(msg)
+    wait_until(lambda: not any(heard.is_last_refused for heard in inputs.all.values()))
+    assert stranger.answer().success
+
+
+class Watcher(Node):
+    """Tells a planner of its own namespace where to point, and writes down the states."""
+
+    def __init__(self):
+        super().__init__('watcher', namespace='/killed')
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.body = self.create_publisher(MarkerArray, 'body_boxes', latched)
+        self.target = self.create_publisher(PointStamped, 'target', latched)
+        self.states = []
+        self.create_subscription(JointState, 'joint_states', self.states.append, 500)
+        self.plan = self.create_client(Trigger, 'rrth_planner/plan')
+
+    @property
+    def speed(self):
+        """How fast the arm moved last [rad/s]."""
+        return float(np.abs(self.states[-1].velocity).max()) if self.states else 0.0
+
+
+def test_a_planner_that_was_killed_is_replaced_in_mid_motion(spinning, wait_until):
+    watcher, said, lines = Watcher(), [], []
+    ros = ['--ros-args', '-r', '__ns:=/killed', '-p', 'seed:=7']
+    # So slow that the next planner comes up long before the motion is over.
+    slow = [*ros, '-p', 'max_velocity:=[0.03]']
+    module = 'rrth_planner.ros.planner_node'
+
+    def ask():
+        # A killed node stays in the lists of others for a while: some requests are for nobody.
+        wait_until(watcher.plan.service_is_ready, 120.0)
+        while True:
+            future, end = watcher.plan.call_async(Trigger.Request()), time.monotonic() + 2.0
+            while time.monotonic() < end and not future.done():
+                time.sleep(0.005)
+            # A node that has just come up may know nothing yet, or what is half a second old.
+            early = ('UNABLE_TO_AQUIRE', 'MOTION_PLAN_INVALIDATED')
+            if future.done() and not future.result().message.startswith(early):
+                return future.result()
+
+    with (
+        ChildProcess('rrth_planner.ros.playback_node', ros[:3], said.append) as playback,
+        spinning(watcher),
+    ):
+        watcher.body.publish(wearer())
+        watcher.target.publish(target())
+        with ChildProcess(module, slow, lambda _: None) as first:
+            answer = ask()
+            assert answer.success, answer.message
+            wait_until(lambda: watcher.speed > 0.02)
+            first._process.kill()
+            first._process.wait()
+        watcher.target.publish(target(1.2, 0.9, 0.6))
+        with ChildProcess(module, ros, lines.append) as second:
+            wait_until(lambda: any('ready after' in line for line in lines), 120.0)
+            # All this time the playback went on.
+            assert watcher.speed > 0.02
+            playback.check()
+            answer = ask()
+            was_moving = watcher.speed > 0.02
+            assert answer.success, answer.message
+            wait_until(lambda: watcher.speed == 0.0)
+            second.check()
+    assert was_moving
+    assert not [line for line in said if 'refused' in line], said
+    q = np.array([state.position for state in watcher.states])
+    assert np.abs(np.diff(q, axis=0)).max() < 0.05
+    assert pointing_error(load_arm(), q[-1], np.array([1.2, 0.9, 0.6])) < 1e-3
+    watcher.destroy_node()

@@ -1,0 +1,210 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""How much of everything is taken: more is refused in one sentence, at once and whole."""
+
+import time
+
+from geometry_msgs.msg import Point
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
+from rrth_planner.ros import body_history  # noqa: E402
+from rrth_planner.ros.bodies import (  # noqa: E402
+    LONGEST_NAME,
+    LONGEST_NAMESPACE,
+    MOST_BOXES,
+    read_edits,
+    scene_of,
+    WearerBody,
+)
+from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
+from rrth_planner.ros.error_codes import answer, ErrorCode  # noqa: E402
+from rrth_planner.ros.inputs import Input  # noqa: E402
+from rrth_planner.ros.messages import (  # noqa: E402
+    goal_from_msg,
+    joint_reading,
+    joint_trajectory_from_msg,
+)
+from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  # noqa: E402
+from rrth_planner.ros.subscriptions import decoded, MOST_BYTES  # noqa: E402
+from rrth_planner.ros.trajectories import MOST_POINTS  # noqa: E402
+from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+
+def refusal(call, *arguments):
+    """Return the sentence of a MessageError, which is one line of bounded length."""
+    with pytest.raises(MessageError) as caught:
+        call(*arguments)
+    sentence = str(caught.value)
+    assert 0 < len(sentence) <= LONGEST_SENTENCE
+    assert sentence.isprintable()
+    return sentence
+
+
+def cube_list(n, index=0):
+    """Return a CUBE_LIST marker."""
+    marker = box(index=index, size=(0.01, 0.01, 0.01))
+    marker.type, marker.points = Marker.CUBE_LIST, [Point(x=0.001 * k) for k in range(n)]
+    return marker
+
+
+def test_a_million_markers_are_refused_before_they_are_decoded():
+    one = serialize_message(array(box()))
+    # What the middleware hands over: header, number of markers, markers.
+    data = one[:4] + (10**6).to_bytes(4, 'little') + one[8:] * 10**6
+    assert len(data) > 10**8
+    begin = time.process_time()
+    sentence = refusal(decoded, data, MarkerArray)
+    assert time.process_time() - begin < 0.1
+    assert sentence == f'{len(data)} bytes, expected a MarkerArray of at most {MOST_BYTES}'
+
+
+@pytest.mark.parametrize('length', [2**31 - 1, 2**32 - 1, 10**6])
+@pytest.mark.parametrize('msg_type', [MarkerArray, JointState, JointTrajectory])
+def test_a_length_that_the_message_does_not_have_is_no_message(msg_type, length):
+    lie = length.to_bytes(4, 'little')
+    assert 'bytes that are no ' in refusal(decoded, b'\0\1\0\0' + lie * 20, msg_type)
+
+
+def test_as_many_boxes_as_are_taken_fit_into_a_message():
+    msg = decoded(serialize_message(array(cube_list(MOST_BOXES))), MarkerArray)
+    body = WearerBody().edited(read_edits(msg, 0.0, 'torso'), 0.0)
+    assert body.n_boxes == MOST_BOXES
+    sentence = refusal(body.edited, read_edits(array(box('hat')), 0.0, 'torso'), 0.0)
+    assert sentence == f'{MOST_BOXES + 1} boxes, expected at most {MOST_BOXES} in all'
+    sentence = refusal(read_edits, array(cube_list(MOST_BOXES + 1)), 0.0, 'torso')
+    assert f'points: {MOST_BOXES + 1}, expected 1 to {MOST_BOXES}' in sentence
+
+
+def test_a_long_namespace_is_refused_and_a_long_text_cut_short():
+    sentence = refusal(read_edits, array(box('n' * (LONGEST_NAMESPACE + 1))), 0.0, 'torso')
+    assert f'ns of {LONGEST_NAMESPACE + 1} characters, expected at most' in sentence
+    gone = command(Marker.DELETE, 'n' * 10**6)
+    assert 'ns of 1000000 characters' in refusal(read_edits, array(gone), 0.0, 'torso')
+    hat = box('n' * LONGEST_NAMESPACE, text='hat\n' * 10**5)
+    (edit,) = read_edits(array(hat), 0.0, 'torso')
+    name = edit.part.boxes[0].name
+    assert len(name) == LONGEST_NAME
+    assert name.isprintable()
+
+
+def test_a_long_frame_is_named_in_short():
+    sentence = refusal(read_edits, array(box(frame='f' * 10**6)), 0.0, 'torso')
+    assert sentence.startswith('marker 0 ("torso/0"): frame "fff')
+    assert refusal(goal_from_msg, target(frame='a\nb\x1b'), 'torso').startswith('frame "a b?", ')
+
+
+def test_many_joints_of_others_are_passed_over_and_named_in_short():
+    names = [f'wheel_{k}' for k in range(20_000)]
+    zeros = [0.0] * len(names)
+    reading = joint_reading(joints([*zeros, *FOLDED], [*names, *JOINTS]), JOINTS, 1.0, None)
+    assert reading.positions.tolist() == FOLDED
+    bad = joints([*zeros, *FOLDED[:3]], [*names, *JOINTS[:3]])
+    assert "no ['joint_4'] in" in refusal(joint_reading, bad, JOINTS, 1.0, None)
+    more = JointState(name=[f'wheel_{k}' for k in range(50_000)])
+    assert 'expected a JointState of at most' in refusal(
+        decoded, serialize_message(more), JointState
+    )
+
+
+def _motion(n):
+    msg = JointTrajectory(joint_names=JOINTS)
+    for k in range(n):
+        point = JointTrajectoryPoint(
+            positions=FOLDED, velocities=[0.0] * 4, accelerations=[0.0] * 4
+        )
+        point.time_from_start.sec, point.time_from_start.nanosec = k // 100, k % 100 * 10**7
+        msg.points.append(point)
+    return msg
+
+
+def test_a_motion_of_too_many_points_is_refused():
+    longest = decoded(
+        serialize_message(_motion(MOST_POINTS)), JointTrajectory, MOST_BYTES_OF_MOTION
+    )
+    assert len(joint_trajectory_from_msg(longest, JOINTS).times) == MOST_POINTS
+    more = _motion(MOST_POINTS + 1)
+    sentence = refusal(joint_trajectory_from_msg, more, JOINTS)
+    assert sentence == f'points: {MOST_POINTS + 1}, expected at most {MOST_POINTS}'
+    data = serialize_message(more)
+    head, point = data[:-136], data[-136:]
+    data = head + 90_000 * point
+    begin = time.process_time()
+    assert 'bytes, expected a JointTrajectory of at most' in refusal(
+        decoded, data, JointTrajectory, MOST_BYTES_OF_MOTION
+    )
+    assert time.process_time() - begin < 0.1
+
+
+def test_long_names_of_a_motion_are_named_in_short():
+    msg = _motion(1)
+    msg.joint_names = ['j' * 10**6]
+    assert refusal(joint_trajectory_from_msg, msg, JOINTS).startswith('joint_names: ')
+
+
+def test_the_history_keeps_to_a_number_of_boxes(monkeypatch):
+    monkeypatch.setattr(body_history, 'REMEMBERED_BOXES', 25)
+    history, body = BodyHistory(), WearerBody()
+    for k in range(10):
+        edits = read_edits(array(cube_list(10)), 0.0, 'torso')
+        body = history.apply(body, edits, 100 + k, 0.0)
+    assert len(history._heard) == 2
+    # One that is larger than all that is remembered is remembered alone.
+    body = history.apply(body, read_edits(array(cube_list(40)), 0.0, 'torso'), 200, 0.0)
+    assert len(history._heard) == 1
+    old = read_edits(array(command(Marker.DELETEALL), box('pack')), 0.0, 'torso')
+    assert history.apply(body, old, 50, 0.0).n_boxes == 41
+
+
+def test_what_has_expired_is_kept_by_its_first_box_only():
+    hats = cube_list(1000)
+    hats.lifetime.nanosec = 1
+    body = WearerBody().apply(array(hats), 0.0, 'torso').at(1.0)
+    assert [b.name for _, part in body.expired for b in part.boxes] == ['torso/0[0]']
+
+
+def test_a_box_of_next_to_no_size_is_an_obstacle_and_huge_numbers_are_refused():
+    tiny = WearerBody().apply(array(box(size=(5e-324, 1e-310, 1e-300))), 0.0, 'torso')
+    assert scene_of(tiny).boxes[0].size[0] == 5e-324
+    assert 'expected' in refusal(read_edits, array(box(center=(1.7e308,) * 3)), 0.0, 'torso')
+    assert 'expected' in refusal(goal_from_msg, target(1.7e308, 1.7e308), 'torso')
+
+
+def test_answers_are_one_line_whatever_they_quote():
+    said = answer(ErrorCode.FAILURE, 'a\nb\r\x1b[31m\u2028' + 'x' * 10**6)
+    assert said.startswith('FAILURE (99999): a b ?[31m ')
+    assert said.isprintable()
+    assert len(said) == LONGEST_SENTENCE
+    assert one_line('Ω 🦾') == 'Ω 🦾'
+
+
+def test_an_age_is_unknown_once_the_clock_was_set_back():
+    heard = Input('target', None)
+    assert heard.age(5.0) == float('inf')
+    heard.accept(lambda: None, 100.0)
+    assert heard.age(100.5) == 0.5
+    assert heard.age(99.99) == 0.0
+    assert heard.age(50.0) == float('inf')
+    heard.accept(lambda: None, 50.0)
+    assert heard.age(50.25) == 0.25
+
+
+def test_a_clock_that_was_set_back_makes_no_speed():
+    first = joint_reading(joints(velocity=[]), JOINTS, 100.0, None)
+    moved = joints([0.5, *FOLDED[1:]], velocity=[])
+    again = joint_reading(moved, JOINTS, 10.0, first)
+    assert not again.velocities.any()
+    assert again.velocities_expire == 10.0
+
+
+def test_stamps_of_any_time_do_not_date_a_reading():
+    for sec in (-(2**31), -1, 0, 2**31 - 1):
+        msg = joints()
+        msg.header.stamp.sec = sec
+        assert joint_reading(msg, JOINTS, 1000.0, None).taken == 1000.0

@@ -1,0 +1,107 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The SROS 2 policy allows what the nodes do, and nothing else."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from rclpy.expand_topic_name import expand_topic_name  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rrth_planner.resources import resource_path  # noqa: E402
+from rrth_planner.ros.frames import tf2_ros  # noqa: E402
+from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+NODES = {'/rrth_planner': PlannerNode, '/arm_playback': PlaybackNode}
+# What is done with topics and services, and how a node tells its own.
+DEEDS = {
+    ('topics', 'publish'): 'publisher',
+    ('topics', 'subscribe'): 'subscriber',
+    ('services', 'reply'): 'service',
+    ('services', 'request'): 'client',
+}
+TF = {'/tf', '/tf_static'} if tf2_ros is None else set()
+# These decide whether the arm is safe: nobody but their owner may say them.
+ONE_SPEAKER = {
+    '/body_boxes': '/wearer',
+    '/target': '/operator',
+    '/joint_states': '/arm_playback',
+    '/joint_trajectory': '/rrth_planner',
+}
+
+
+@pytest.fixture(scope='module')
+def policy():
+    """Return by enclave and deed the resolved names that are allowed."""
+    root = ElementTree.parse(resource_path('config/sros2_policy.xml')).getroot()
+    assert (root.tag, root.attrib) == ('policy', {'version': '0.2.0'})
+    found = {}
+    for enclave in root.findall('enclaves/enclave'):
+        (profile,) = enclave.findall('profiles/profile')
+        assert enclave.get('path') == f'/{profile.get("node")}'
+        allowed = found[enclave.get('path')] = {deed: set() for deed in DEEDS}
+        for group in profile:
+            ((deed, word),) = group.attrib.items()
+            assert word == 'ALLOW'
+            for entry in group:
+                assert entry.tag == group.tag[:-1]
+                name = expand_topic_name(entry.text, profile.get('node'), profile.get('ns'))
+                assert name not in allowed[group.tag, deed], 'named twice'
+                allowed[group.tag, deed].add(name)
+    return found
+
+
+@pytest.mark.parametrize('path', NODES)
+def test_a_node_may_do_what_it_does_and_nothing_else(path, policy, wait_until):
+    simulated = Parameter('use_sim_time', value=True)
+    node = NODES[path](parameter_overrides=[simulated])
+    watcher = Node('watcher')
+
+    def done():
+        return {
+            deed: {
+                name
+                for name, _ in getattr(watcher, f'get_{what}_names_and_types_by_node')(
+                    node.get_name(), node.get_namespace()
+                )
+            }
+            for deed, what in DEEDS.items()
+        }
+
+    allowed = {deed: set(names) for deed, names in policy[path].items()}
+    if path == '/rrth_planner':
+        assert allowed['topics', 'subscribe'] >= TF
+        allowed['topics', 'subscribe'] -= TF
+    try:
+        wait_until(lambda: path[1:] in watcher.get_node_names())
+        wait_until(lambda: sum(map(len, done().values())) >= sum(map(len, allowed.values())))
+        assert done() == allowed
+    finally:
+        watcher.destroy_node()
+        if isinstance(node, PlannerNode):
+            node.close()
+        node.destroy_node()
+
+
+def test_what_decides_safety_has_one_speaker(policy):
+    for topic, owner in ONE_SPEAKER.items():
+        speakers = [path for path, deeds in policy.items() if topic in deeds['topics', 'publish']]
+        assert speakers == [owner]
+
+
+def test_nobody_may_set_parameters_or_use_wildcards(policy):
+    for deeds in policy.values():
+        assert not [name for name in deeds['services', 'request'] if 'set_parameters' in name]
+        assert not [name for names in deeds.values() for name in names if '*' in name]
+
+
+def test_what_the_operator_calls_is_served(policy):
+    served = policy['/rrth_planner']['services', 'reply']
+    served = served | policy['/arm_playback']['services', 'reply']
+    assert policy['/operator']['services', 'request'] <= served

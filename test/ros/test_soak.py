@@ -1,0 +1,227 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The judges of the soak catch what is planted for them."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('tqdm')
+pytest.importorskip('psutil')
+pytest.importorskip('matplotlib')
+
+from benchmarks import soak, soak_contacts as contacts, soak_judge as judge  # noqa: E402
+from benchmarks.soak_body import (  # noqa: E402
+    BodyAt,
+    BodyStream,
+    NO_HAND,
+    scene_of_body,
+    SPEED,
+)
+from benchmarks.soak_guard import GuardRecord  # noqa: E402
+from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
+from benchmarks.soak_report import draw_memory, guard_targets, plan_targets, report  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner import oracle  # noqa: E402
+from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
+from rrth_planner.trajectory import Trajectory  # noqa: E402
+import worlds  # noqa: E402
+
+ARM = worlds.table_1_arm()
+BODY = BodyAt(0, -1, 0.0)
+FLAT = [(0.1 * k, 290.0 + 0.001 * k) for k in range(1000)]
+
+
+def swing(q_from, q_to):
+    """Return a motion from rest to rest."""
+    still = np.zeros((2, ARM.dof))
+    return Trajectory(
+        times=[0.0, 1.0], positions=[q_from, q_to], velocities=still, accelerations=still
+    )
+
+
+@pytest.fixture(scope='module')
+def motion():
+    """Return a short motion that is free of the body."""
+    q = free_starts(np.random.default_rng(0), 1)[1][0]
+    return swing(q, q + 0.01)
+
+
+def hand_at(motion, time_share, side=0.05):
+    """Return a hand at the tool of a motion."""
+    q = motion.positions[0] + time_share * (motion.positions[-1] - motion.positions[0])
+    tool = oracle.frames(ARM, q[None])[0, -1, :3, 3]
+    return replace(BODY, hand=(*tool.tolist(), side))
+
+
+def plans(**changes):
+    """Return a record of plans without a fault."""
+    record = PlansRecord(
+        n_asked=2,
+        codes=Counter(SUCCESS=2),
+        calls=[0.01, 0.02],
+        memory=FLAT,
+        ages=[0.01],
+        gaps=[0.01],
+        figures={'good messages, body': '7', 'refused messages, body': '0'},
+        n_sent=7,
+        verdicts=Counter({(judge.FREE, False): 2}),
+        n_motions=2,
+        elapsed=100.0,
+    )
+    return replace(record, **changes)
+
+
+def test_a_motion_that_touches_is_caught(motion):
+    free, touched = scene_of_body(BODY), scene_of_body(hand_at(motion, 0.5))
+    assert judge.verdict_on(ARM, [free, free], motion) == judge.FREE
+    assert judge.verdict_on(ARM, [touched, touched, touched], motion) == judge.TOUCHES
+    # Only the body before it may have been on its way.
+    assert judge.verdict_on(ARM, [touched, free], motion) == judge.FREE
+    assert judge.verdict_on(ARM, [touched, touched, free], motion) == judge.OLDER
+
+
+def test_a_motion_within_the_margin_is_caught(motion):
+    away = scene_of_body(BODY)
+    clearance = oracle.least_clearance(ARM, away, judge.states_of(motion, 1e-3), judge.RAY)
+    margin = clearance + 0.005
+    assert judge.verdict_on(ARM, [away, away], motion, margin=margin) == judge.NEAR
+    assert judge.verdict_on(ARM, [away, away], motion, margin=0.5 * clearance) == judge.FREE
+
+
+def test_a_motion_is_judged_by_its_bytes(motion):
+    data = serialize_message(joint_trajectory_to_msg(motion, ARM.joint_names, 'torso', 5.0))
+    hand = hand_at(motion, 0.5)
+    for is_fine in (False, True):
+        assert judge.judge_bytes((data, (BODY,), is_fine)) == (judge.FREE, True)
+        assert judge.judge_bytes((data, (hand, hand), is_fine)) == (judge.TOUCHES, True)
+
+
+def test_the_bodies_before_a_motion_are_found():
+    assert judge.newest_before([10, 20, 30, 40], 35, 2) == [2, 1]
+    assert judge.newest_before([10, 20, 30, 40], 15, 3) == [0]
+    assert judge.newest_before([10, 20], 5, 3) == []
+
+
+def test_memory_that_grows_is_caught():
+    # What is taken at first does not count.
+    warm = [100.0 + 10.0 * min(k, 5) for k in range(100)]
+    assert judge.growth_of(warm).growth == 0.0
+    leaking = [290.0 + 0.01 * k for k in range(1000)]
+    assert judge.growth_of(leaking).growth == pytest.approx(9.0)
+    peak = [290.0] * 500 + [300.0] + [290.0] * 499
+    assert judge.growth_of(peak).growth == pytest.approx(10.0)
+
+
+def unmet(lines):
+    """Return the targets that are not met."""
+    return [line[0] for line in lines if line[-1] != 'yes']
+
+
+def test_each_fault_misses_its_target():
+    assert unmet(plan_targets(plans())) == []
+    leaking = [(time, 290.0 + time) for time, _ in FLAT]
+    for changes, word in (
+        ({'n_unanswered': 1}, 'answer'),
+        ({'verdicts': Counter({(judge.FREE, False): 1, (judge.TOUCHES, False): 1})}, 'free'),
+        ({'verdicts': Counter({(judge.FREE, False): 1})}, 'free'),
+        ({'n_sent': 8}, 'heard'),
+        ({'figures': {'good messages, body': '7', 'refused messages, body': '1'}}, 'heard'),
+        ({'ages': [0.01, 0.06]}, 'age'),
+        ({'ages': []}, 'age'),
+        ({'memory': leaking}, 'memory'),
+    ):
+        (missed,) = unmet(plan_targets(plans(**changes)))
+        assert word in missed
+
+
+def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
+    text = report(plans(is_interrupted=True), GuardRecord(), 'some command')
+    assert 'some command' in text
+    assert 'Interrupted' in text
+    assert 'Interrupted' not in report(plans(), None, '')
+    draw_memory(FLAT, tmp_path)
+    assert (tmp_path / 'memory.png').stat().st_size > 1000
+
+
+def test_figures_of_the_guard_are_held_to_its_targets():
+    figures = {
+        'motions held against a new body': '9, last 1 ms, p50 0.200 ms, p99 1 ms, at most 2 ms',
+        'brakes': '3, last 1.000 ms, p50 2.000 ms, p99 4.000 ms, at most 4.000 ms',
+    }
+    assert unmet(guard_targets(GuardRecord(figures=figures))) == []
+    slow = {key: value.replace('p99 4', 'p99 6') for key, value in figures.items()}
+    assert unmet(guard_targets(GuardRecord(figures=slow))) == [
+        'body to braking trajectory in the node, p99'
+    ]
+    touched = GuardRecord(figures=figures, outcomes=Counter({contacts.TOUCHED: 1}))
+    assert len(unmet(guard_targets(touched))) == 1
+
+
+def episode(motion, body, **changes):
+    """Return an episode of an arm that follows a motion in spite of a hand."""
+    q = judge.states_of(motion, 0.01)
+    fields = {
+        'body': body,
+        'motion': motion,
+        'phase': 0.0,
+        'published': (),
+        'followed': (),
+        'times': np.arange(len(q)) * 10_000_000 - 1,
+        'positions': q,
+        'guard': 'no motion',
+    }
+    return contacts.Episode(**(fields | changes))
+
+
+def test_contacts_are_told_apart():
+    q = free_starts(np.random.default_rng(0), 1)[1][0]
+    long = swing(q, q + [0.0, 0.0, 0.0, 1.0])
+    there, here = hand_at(long, 1.0), hand_at(long, 0.0)
+    # The tool is turned on the spot: a hand there is put right onto it.
+    assert contacts.PUT_ON in contacts.judge_episode(ARM, episode(long, here))
+    far = swing(q, q + [0.8, 0.0, 0.0, 0.0])
+    there = hand_at(far, 1.0)
+    words = contacts.judge_episode(ARM, episode(far, there))
+    assert words == (contacts.MISSED, contacts.TOUCHED)
+    # A brake that touches itself came too late; one that does not was not followed.
+    for brake, word in ((far, contacts.TOO_LATE), (swing(q, q), contacts.TOUCHED)):
+        found = episode(far, there, published=((1, 2),), followed=(brake,))
+        assert contacts.judge_episode(ARM, found)[-1] == word
+    free = episode(far, BODY)
+    assert contacts.judge_episode(ARM, free) == (contacts.WENT_ON,)
+
+
+def test_no_box_is_faster_than_it_may_be():
+    times = np.linspace(0.0, 30.0, 3001)
+    centers = np.array(
+        [[b.center for b in scene_of_body(BodyAt(0, 1, t)).boxes] for t in times.tolist()]
+    )
+    speed = np.linalg.norm(np.diff(centers, axis=0), axis=2) / np.diff(times)[:, None]
+    assert 0.9 * SPEED < speed.max() <= 1.001 * SPEED
+
+
+def test_what_is_published_is_what_is_judged():
+    sent = []
+    stream = BodyStream(
+        lambda msg: sent.append(
+            [(m.text, m.action, m.pose.position.x, m.scale.x) for m in msg.markers]
+        ),
+        2,
+    )
+    body = stream.put((1.0, 2.0, 3.0, 0.1))
+    scene = scene_of_body(body)
+    assert sent[0] == [(b.name, 0, b.center[0], b.size[0]) for b in scene.boxes]
+    gone = stream.put(NO_HAND)
+    assert len(scene_of_body(gone).boxes) == len(scene.boxes) - 1
+    assert sent[1][-1][:2] == ('hand', 2)
+
+
+def test_the_command_says_what_is_missing(capsys):
+    assert soak.main([], find=lambda name: None) == 2
+    assert 'rclpy' in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        soak.main(['--plans', '-1'])

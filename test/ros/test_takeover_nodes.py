@@ -1,0 +1,99 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planner and playback as processes: new targets in mid-motion, without a stop or a jump."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from geometry_msgs.msg import PointStamped  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner import oracle  # noqa: E402
+from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
+import samples  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+import worlds  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+TARGETS = ((2.0, 0.3, 0.4), (1.0, 1.5, 0.8), (1.5, -0.8, 1.2), (2.5, 0.8, 0.2), (0.8, 0.4, 2.0))
+ROUNDS = 2
+
+
+class Client(Node):
+    """Tells the planner where to point, and writes down how the arm moves."""
+
+    def __init__(self):
+        """Connect to both nodes."""
+        super().__init__('takeover')
+        self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
+        self.target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self.states = []
+        self.create_subscription(JointState, 'joint_states', self.states.append, 500)
+        self.plan = self.create_client(Trigger, 'rrth_planner/plan')
+
+    def speed(self):
+        """Return how fast the arm moved last [rad/s]."""
+        return float(np.abs(self.states[-1].velocity).max()) if self.states else 0.0
+
+
+def _body():
+    boxes = []
+    for box in worlds.wearer().boxes:
+        marker = samples.box(box.name, center=box.center.tolist(), size=box.size.tolist())
+        o = marker.pose.orientation
+        o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
+        boxes.append(marker)
+    return samples.array(*boxes)
+
+
+def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, spinning):
+    client, said, answers = Client(), [], []
+    planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
+    ros = ['--ros-args', '-p', 'seed:=7']
+    with (
+        ChildProcess(planner, ros, lambda _: None) as one,
+        ChildProcess(playback, [], said.append) as other,
+        spinning(client),
+    ):
+        wait_until(client.plan.service_is_ready, 120.0)
+        wait_until(lambda: client.states)
+        client.body.publish(_body())
+        for target in TARGETS * ROUNDS:
+            client.target.publish(samples.target(*target))
+            for publisher in (client.body, client.target):
+                assert publisher.wait_for_all_acked()
+            was_moving = client.speed() > 0.05
+            future = client.plan.call_async(Trigger.Request())
+            wait_until(future.done)
+            answers.append((was_moving, future.result()))
+            n = len(client.states)
+            wait_until(lambda n=n: len(client.states) > n + 30)
+            one.check()
+            other.check()
+        wait_until(lambda: client.speed() == 0.0)
+    assert not [line for line in said if 'refused' in line]
+    moving = [answer for was_moving, answer in answers if was_moving]
+    assert len(moving) >= 3
+    assert all(answer.success for answer in moving), [a.message for a in moving]
+    stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in client.states])
+    q, v = (
+        np.array([getattr(s, name) for s in client.states]) for name in ('position', 'velocity')
+    )
+    step = np.diff(stamps)[:, None]
+    limits = worlds.limits()
+    # A hundredth more than the limits, and what the stamps are off by.
+    assert (np.abs(v) <= 1.01 * limits.velocity).all()
+    assert (np.abs(np.diff(v, axis=0)) <= 1.01 * limits.acceleration * step + 5e-3).all()
+    jump = np.diff(q, axis=0) - 0.5 * step * (v[1:] + v[:-1])
+    assert np.abs(jump).max() < 2e-3
+    last = [t for t, (_, answer) in zip(TARGETS * ROUNDS, answers, strict=True) if answer.success]
+    tool = oracle.frames(worlds.table_1_arm(), q[-1:])[0, -1]
+    past = last[-1] - tool[:3, 3]
+    assert np.linalg.norm(past - (past @ tool[:3, 2]) * tool[:3, 2]) < 1e-3

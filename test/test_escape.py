@@ -1,0 +1,369 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A wearer who leaned into the arm: it comes out by a short way, and never goes in deeper."""
+
+from dataclasses import replace
+import re
+
+from hypothesis import given, strategies
+import numpy as np
+import pytest
+from rrth_planner.goal import PointingGoal
+from rrth_planner.leaving import box_depths, leads_out, relaxed
+from rrth_planner.options import RRTHOptions
+from rrth_planner.oracle import bar_box_touch, first_contact
+from rrth_planner.path import Path
+from rrth_planner.reach import bar_ends
+from rrth_planner.scene import Box, Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import MotionState, Takeover
+from rrth_planner.timing import parameterize
+from rrth_planner.trajectory import positions_at, sample
+from rrth_planner.underway import is_still_free, RunningMotion
+from rrth_planner.world import arm_world
+from worlds import (
+    examples,
+    FOLDED,
+    free_configuration,
+    limits,
+    MARGIN,
+    oracle_bars,
+    RAY,
+    table_1_arm,
+    varied_body,
+    wearer,
+    wearer_world,
+)
+
+pytest.importorskip('fcl')
+from rrth_planner import fcl_check, pipeline  # noqa: E402
+
+ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
+OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
+SEEDS = strategies.integers(0, 2**31)
+FREE = 1.0
+BODIES = [wearer(), *(varied_body(np.random.default_rng(k)) for k in range(5))]
+
+
+def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more):
+    return pipeline.plan_motion(
+        arm,
+        scene,
+        q_start,
+        PointingGoal(target),
+        limits(),
+        OPTIONS,
+        margin=MARGIN,
+        ray_guard_length=RAY,
+        seed=1,
+        escape_depth=escape_depth,
+        **more,
+    )
+
+
+def is_touched(arm, box, q, growth):
+    """Return at which of the instants q, (n, dof), the oracle sees the arm touch a grown box."""
+    ends = oracle_bars(arm, q, RAY)
+    radii = [arm.radii[row] for row, _ in bar_ends(arm)]
+    hits = [
+        bar_box_touch(ends[:, k], box.center, box.rotation, 0.5 * box.size + growth + radius)
+        for k, radius in enumerate(radii)
+    ]
+    return np.any(hits, axis=0)
+
+
+def oracle_depth(arm, box, q):
+    """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
+    low, high = -0.5 * box.size.min(), FREE
+    if not is_touched(arm, box, q[None], high)[0]:
+        return MARGIN - FREE
+    for _ in range(48):
+        middle = 0.5 * (low + high)
+        if is_touched(arm, box, q[None], middle)[0]:
+            high = middle
+        else:
+            low = middle
+    return MARGIN - high
+
+
+def leaned(arm, scene, q, rng, depth):
+    """Return the scene with one box pushed into the arm so deep, or None."""
+    index = int(rng.integers(len(scene.boxes)))
+    box = scene.boxes[index]
+    bar = oracle_bars(arm, q[None], RAY)[0, rng.choice([0, -1])]
+    towards = bar[0] + rng.uniform(0.2, 1.0) * (bar[1] - bar[0]) - box.center
+    low, high = 0.0, 1.0
+
+    def is_deeper(share):
+        pushed = replace(box, center=box.center + share * towards)
+        return is_touched(arm, pushed, q[None], MARGIN - depth)[0]
+
+    if is_deeper(low) or not is_deeper(high):
+        return None
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_deeper(middle) else (middle, high)
+    boxes = list(scene.boxes)
+    boxes[index] = replace(box, center=box.center + low * towards)
+    return Scene(tuple(boxes))
+
+
+def is_shoulder_covered(arm, scene):
+    """Return whether a box covers the beginning of the first bar, which no joint moves."""
+    shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, :1]
+    return any(
+        bar_box_touch(
+            np.repeat(shoulder, 2, axis=0),
+            box.center,
+            box.rotation,
+            0.5 * box.size + MARGIN + 0.01 + arm.radii[0],
+        )
+        for box in scene.boxes
+    )
+
+
+def leaned_case(seed, low, high):
+    """Return arm, wearer, start and oracle depths of the boxes, the deepest from low to high."""
+    rng = np.random.default_rng(seed)
+    while True:
+        arm = table_1_arm(rng.choice([0.0, 0.02]))
+        scene = BODIES[int(rng.integers(len(BODIES)))]
+        world = arm_world(arm, scene, MARGIN, RAY)
+        q = free_configuration(rng, world)
+        found = leaned(arm, scene, q, rng, rng.uniform(low, high))
+        if found is None or is_shoulder_covered(arm, found):
+            continue
+        depths = np.array([oracle_depth(arm, box, q) for box in found.boxes])
+        if depths.max() < high:
+            return arm, found, q, depths
+
+
+@examples(40)
+@given(SEEDS)
+def test_depths_are_those_of_the_oracle(seed):
+    rng = np.random.default_rng(seed)
+    arm = table_1_arm(rng.choice([0.0, 0.02]))
+    scene = BODIES[int(rng.integers(len(BODIES)))]
+    world = arm_world(arm, scene, MARGIN, RAY)
+    q = rng.uniform(*world.bounds)
+    depths = box_depths(world, q).max(axis=0)
+    for box, depth in zip(scene.boxes, depths, strict=True):
+        expected = oracle_depth(arm, box, q)
+        if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
+            assert depth == pytest.approx(expected, abs=1e-7)
+    assert world.is_valid(q) == (depths.max() < 0.0)
+    if (smaller := relaxed(world, np.maximum(depths, 0.0) + 1e-7)) is not None:
+        assert smaller.is_valid(q)
+        assert not relaxed(world, np.maximum(depths - 1e-7, -FREE)).is_valid(q)
+
+
+@examples(50)
+@given(SEEDS)
+def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
+    arm, scene, q_start, depths = leaned_case(seed, 1e-4, ESCAPE_DEPTH)
+    plan = ask(arm, scene, q_start)
+    is_in = depths > 0.0
+    if plan.status is not PlanStatus.SOLVED:
+        assert plan.trajectory is None
+        if plan.status is PlanStatus.START_IN_COLLISION:
+            assert 'no straight way out of it is proven free' in plan.sentence
+        return
+    n_solved.append(seed)
+    trajectory, out = plan.trajectory, plan.escape_time
+    assert np.array_equal(trajectory.positions[0], q_start)
+    assert np.array_equal(plan.path.waypoints[0], q_start)
+    assert out in trajectory.times
+    deepest = scene.boxes[int(np.argmax(depths))].name
+    said = re.search(r'first leaves box "(\w+)", (\d\.\d+) m deep at ([\w ]+)', plan.sentence)
+    assert said[1] == deepest
+    assert float(said[2]) == pytest.approx(depths.max(), abs=1e-3)
+    assert plan.sentence.count(' m deep at ') == np.count_nonzero(depths > -1e-5)
+    assert plan.clearance >= MARGIN - 1e-6
+    times = np.union1d(np.arange(0.0, trajectory.duration, 1e-3), [out, trajectory.duration])
+    q, v, _ = sample(trajectory, times)
+    assert (np.abs(v) <= limits().velocity * 1.001).all()
+    looks = np.linspace(0.0, out, 9)
+    for box, is_entered in zip(scene.boxes, is_in, strict=True):
+        touched = is_touched(arm, box, q, MARGIN)
+        assert not touched[times >= out].any()
+        if not is_entered:
+            assert not touched.any()
+            continue
+        # In, then out for good; and from each look on no deeper than there.
+        assert not (np.diff(touched.astype(int)) > 0).any()
+        for time in looks:
+            depth = max(0.0, oracle_depth(arm, box, positions_at(trajectory, [time])[0]))
+            later = q[times >= time]
+            assert not is_touched(arm, box, later, MARGIN - depth - 2e-6).any()
+
+
+n_solved: list[int] = []
+
+
+def test_most_arms_come_out():
+    assert len(n_solved) >= 45
+
+
+def test_an_arm_whose_shoulder_is_covered_has_no_way_out():
+    arm = table_1_arm()
+    shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
+    center = shoulder - [0.0, 0.05, 0.0]
+    hand = Box('hand', center, [0.1, 0.1 - 2 * MARGIN + 0.02, 0.1], np.eye(3))
+    plan = ask(arm, Scene((hand,)), FOLDED)
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert 'no straight way out of it is proven free' in plan.sentence
+
+
+@examples(15)
+@given(SEEDS)
+def test_deeper_is_refused_with_part_box_and_depth(seed):
+    arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06)
+    plan = ask(arm, scene, q_start)
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    world = arm_world(arm, scene, MARGIN, RAY)
+    bar = next(name for name in world.bar_names if plan.sentence.startswith(name))
+    box = scene.boxes[int(np.argmax(depths))]
+    assert f'm inside box "{box.name}": ' in plan.sentence
+    assert 'expected less than 0.05 m (escape_depth)' in plan.sentence
+    depth = float(re.search(r'(\d\.\d+) m deep in it with its margin', plan.sentence)[1])
+    assert depth == pytest.approx(depths.max(), abs=1e-3)
+    inside = float(re.search(r'is (\d\.\d+) m inside', plan.sentence)[1])
+    assert inside == pytest.approx(depths.max() - MARGIN, abs=1e-3)
+    # Of that bar, the box so much smaller is just clear.
+    k = world.bar_names.index(bar)
+    ends = oracle_bars(arm, q_start[None], RAY)[0, k]
+    for more, is_hit in ((1e-4, False), (-1e-4, True)):
+        half = 0.5 * box.size + MARGIN - depths.max() - more + arm.radii[0]
+        assert bar_box_touch(ends, box.center, box.rotation, half) == is_hit
+    # One that may be that deep gets out, or is told that there is no way.
+    plan = ask(arm, scene, q_start, escape_depth=0.1)
+    assert 'escape_depth' not in plan.sentence
+
+
+def pressed(depth=0.03):
+    """Return the wearer with a plate pressed against the folded arm's tool from below."""
+    arm = table_1_arm()
+    tip = oracle_bars(arm, FOLDED[None], RAY)[0, -1]
+    along = tip[1] - tip[0]
+    side = np.cross(along, [1.0, 0.0, 0.0])
+    side /= np.linalg.norm(side)
+    rotation = np.stack([np.cross(side, along), side, along], axis=1)
+    size = np.array([0.1, 0.1, 0.1])
+    center = tip.mean(axis=0) - (0.5 * size[1] + MARGIN - depth) * side
+    return arm, Scene((*wearer().boxes, Box('hand', center, size, rotation)))
+
+
+def test_an_arm_that_moves_is_not_led_out():
+    arm, scene = pressed()
+    assert ask(arm, scene, FOLDED).status is PlanStatus.SOLVED
+    still = np.zeros(4)
+    state = MotionState(positions=FOLDED, velocities=still + 0.1, accelerations=still)
+    plan = ask(arm, scene, FOLDED, moving=Takeover(state=state))
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert 'pointing ray is 0.0100 m inside box "hand": 0.0300 m deep' in plan.sentence
+    assert 'at rest' in plan.sentence
+
+
+def test_an_arm_beyond_its_limits_is_not_led_out():
+    arm, scene = pressed()
+    q = np.array([0.0, 0.1, FOLDED[2], FOLDED[3]])
+    assert ask(arm, scene, q).status is PlanStatus.START_OUT_OF_BOUNDS
+
+
+def test_a_hand_that_is_closed_round_the_arm_is_refused():
+    arm, scene = pressed()
+    hand = scene.boxes[-1]
+    others = [
+        replace(hand, name=f'finger_{i}', center=tip)
+        for i, tip in enumerate(
+            hand.center + offset @ hand.rotation.T
+            for offset in np.array([[0.0, 0.14, 0.0], [0.08, 0.07, 0.0], [-0.08, 0.07, 0.0]])
+        )
+    ]
+    plan = ask(arm, Scene((*scene.boxes, *others)), FOLDED)
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert 'no straight way out of it is proven free' in plan.sentence
+    assert '"hand"' in plan.sentence or '"finger_' in plan.sentence
+
+
+def test_the_same_seed_leads_out_the_same_way():
+    arm, scene = pressed()
+    one, other = ask(arm, scene, FOLDED), ask(arm, scene, FOLDED)
+    assert one.trajectory.positions.tobytes() == other.trajectory.positions.tobytes()
+    assert one.trajectory.times.tobytes() == other.trajectory.times.tobytes()
+
+
+def test_a_cancelled_request_leads_nowhere():
+    arm, scene = pressed()
+    plan = ask(arm, scene, FOLDED, should_stop=lambda: True)
+    assert plan.status is PlanStatus.CANCELLED
+
+
+def test_a_target_in_the_wearer_is_refused_wherever_the_arm_is():
+    arm, scene = pressed()
+    plan = ask(arm, scene, FOLDED, target=[0.0, 0.0, 0.0])
+    assert plan.status is PlanStatus.GOAL_IN_COLLISION
+
+
+def second_opinion(arm, scene, world, trajectory):
+    depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+    return fcl_check.touch_on_way_out(
+        arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
+    )
+
+
+def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
+    arm, scene = pressed()
+    world = arm_world(arm, scene, MARGIN, RAY)
+    plan = ask(arm, scene, FOLDED)
+    way = plan.path.waypoints[1] - FOLDED
+    judged = {}
+    for share in (1.0, -0.2, 0.5):
+        q = FOLDED + share * way
+        trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
+        end = trajectory.duration
+        touch = second_opinion(arm, scene, world, trajectory)
+        judged[share] = leads_out(trajectory, world, end), touch
+    assert judged[1.0] == (True, None)
+    is_out, touch = judged[-0.2]
+    assert not is_out
+    assert (touch.bar, touch.box) == ('pointing ray', 'hand')
+    # Half way it is no deeper but not out.
+    assert judged[0.5] == (False, None)
+    # A plate in the way, which the arm does not touch yet.
+    middle = oracle_bars(arm, (FOLDED + 0.8 * way)[None], RAY)[0, -1]
+    plate = Box('plate', middle[0] + 0.9 * (middle[1] - middle[0]), [1e-3] * 3, np.eye(3))
+    blocked = Scene((*scene.boxes, plate))
+    q = FOLDED + way
+    trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
+    if first_contact(arm, Scene((plate,)), FOLDED[None], RAY, MARGIN) is None:
+        world = arm_world(arm, blocked, MARGIN, RAY)
+        assert not leads_out(trajectory, world, trajectory.duration)
+        touch = second_opinion(arm, blocked, world, trajectory)
+        assert touch.box == 'plate'
+
+
+def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
+    arm, scene = pressed()
+    plan = ask(arm, scene, FOLDED)
+    running = RunningMotion(
+        trajectory=plan.trajectory,
+        start_time=0.0,
+        reach=plan.reach,
+        escape_time=plan.escape_time,
+    )
+    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    for phase in np.linspace(0.0, plan.trajectory.duration, 12):
+        assert is_still_free(running, phase, arm, scene, **kept)
+    assert not is_still_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
+    # The hand follows the arm further than it goes.
+    hand = scene.boxes[-1]
+    near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
+    followed = Scene((*scene.boxes[:-1], near))
+    assert not is_still_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+
+
+def test_an_empty_world_has_no_depth():
+    world = arm_world(table_1_arm(), Scene(()), MARGIN, RAY)
+    assert box_depths(world, FOLDED).shape == (3, 0)
+    assert box_depths(wearer_world(), FOLDED).shape == (3, 8)

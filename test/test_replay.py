@@ -1,0 +1,277 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Incidents are played back: what happens again, what does not, and which judge says what."""
+
+from dataclasses import replace
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rrth_planner.goal import PointingGoal
+from rrth_planner.incident import disagreement_incident, error_incident, IncidentKind
+from rrth_planner.incident_files import write_incident
+from rrth_planner.options import RRTHOptions
+from rrth_planner.question import PlanQuestion
+from rrth_planner.scene import Box, Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import takeover
+from rrth_planner.touch import Touch
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.world import arm_world
+from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
+
+pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+from rrth_planner import opinions, replay
+
+ROOT = Path(__file__).parent.parent
+TOUCH = Touch(0.25, 0.0123, 'ray', 'head')
+QUESTION = PlanQuestion(
+    arm=table_1_arm(),
+    scene=wearer(),
+    q_start=FOLDED,
+    goal=PointingGoal([1.5, 0.1, 0.3]),
+    limits=limits(),
+    options=RRTHOptions(time_limit=1000.0, improve_time=1000.0),
+    margin=MARGIN,
+    ray_guard_length=RAY,
+    seed=5,
+)
+
+
+def disagree(monkeypatch):
+    """Have python-fcl see a touch in every motion."""
+    for module in (pipeline, opinions):
+        monkeypatch.setattr(module, 'first_touch', lambda *_: TOUCH)
+
+
+def disagreement(monkeypatch, question=QUESTION):
+    """Return the record of a plan that python-fcl, patched, had something against."""
+    with monkeypatch.context() as patch:
+        disagree(patch)
+        plan = pipeline.plan_motion(**question.arguments)
+    assert plan.status is PlanStatus.NOT_CERTIFIED
+    assert plan.trajectory is None
+    when = plan.disagreement.escape_time + TOUCH.time
+    assert plan.sentence.startswith(
+        f'the two collision checks disagree: ray is 0.0123 m from box "head" at {when:.3f} s, '
+        'expected at least 0.02 m, seed '
+    )
+    return disagreement_incident(question, plan.disagreement)
+
+
+def play(path):
+    """Run the command in a process of its own; return exit code, output and errors."""
+    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    found = subprocess.run(
+        [sys.executable, '-m', 'rrth_planner.replay', str(path)],
+        env={**os.environ, 'PYTHONPATH': paths},
+        capture_output=True,
+        text=True,
+        timeout=300.0,
+        check=False,
+    )
+    return found.returncode, found.stdout, found.stderr
+
+
+def test_judges_that_agree_now_are_told_apart_from_a_reproduction(monkeypatch, tmp_path):
+    code, out, err = play(write_incident(disagreement(monkeypatch), tmp_path))
+    assert (code, err) == (1, '')
+    assert 'recorded: disagreement, ' in out
+    assert 'the same motion to the bit: yes' in out
+    assert out.splitlines()[-1] == (
+        'not reproduced: the judges agree now that the recorded motion is free'
+    )
+
+
+def test_a_disagreement_that_happens_again_is_reproduced(monkeypatch, capsys):
+    incident = disagreement(monkeypatch)
+    disagree(monkeypatch)
+    assert replay.replay(incident) == 0
+    out = capsys.readouterr().out
+    assert 'python-fcl: ray at 0.0123000 m from "head" at 0.2500 s' in out
+    assert out.splitlines()[-1].startswith('reproduced: ')
+
+
+def test_another_motion_is_no_reproduction(monkeypatch, capsys):
+    incident = disagreement(monkeypatch)
+    moved = incident.trajectory.positions.copy()
+    moved[-1, 0] = np.nextafter(moved[-1, 0], 1.0)
+    given = incident.trajectory
+    other = Trajectory(
+        times=given.times,
+        positions=moved,
+        velocities=given.velocities,
+        accelerations=given.accelerations,
+    )
+    disagree(monkeypatch)
+    assert replay.replay(replace(incident, trajectory=other)) == 1
+    out = capsys.readouterr().out
+    assert 'the same motion to the bit: no' in out
+    assert 'planning again does not lead to the same motion' in out.splitlines()[-1]
+
+
+def test_a_motion_of_an_arm_that_moves_is_planned_again_to_the_bit(monkeypatch, capsys, tmp_path):
+    running = pipeline.plan_motion(**QUESTION.arguments).trajectory
+    moving = takeover(running.positions[0], running.velocities[0], None, 0.0)
+    state = replace(moving.state, velocities=np.array([0.2, 0.0, 0.1, 0.0]))
+    moving = replace(moving, state=state, running=running, time=0.0)
+    question = replace(QUESTION, moving=moving, seed=6)
+    path = write_incident(disagreement(monkeypatch, question), tmp_path)
+    disagree(monkeypatch)
+    assert replay.main([str(path)]) == 0
+    assert ' moving; ' in capsys.readouterr().out
+
+
+def test_the_wearer_that_a_motion_was_judged_for_is_the_one_asked_about(monkeypatch, capsys):
+    incident = disagreement(monkeypatch)
+    # All of the wearer's surroundings.
+    wall = Box('wall', np.zeros(3), np.full(3, 5.0), np.eye(3))
+    assert replay.replay(replace(incident, present=Scene((wall,)))) == 1
+    out = capsys.readouterr().out
+    assert '8 boxes, 1 when judged' in out
+    assert 'certificate: not proven' in out
+    assert out.splitlines()[-1].endswith('the recorded motion is not proven free')
+
+
+def test_a_motion_that_first_leaves_a_box_is_judged_as_one(monkeypatch, capsys):
+    rng, world = np.random.default_rng(4), arm_world(table_1_arm(), wearer(), MARGIN, RAY)
+    for _ in range(100):
+        question = replace(QUESTION, q_start=rng.uniform(*world.bounds))
+        if world.is_valid(question.q_start):
+            continue
+        plan = pipeline.plan_motion(**question.arguments)
+        if plan.escape_time > 0.0:
+            break
+    incident = disagreement(monkeypatch, question)
+    assert incident.escape_time == plan.escape_time
+    assert incident.touch.time == plan.escape_time + TOUCH.time
+    assert replay.replay(incident) == 1
+    out = capsys.readouterr().out
+    assert 'certificate: proven free' in out
+    assert out.splitlines()[-1].endswith('the recorded motion is free')
+    disagree(monkeypatch)
+    assert replay.replay(incident) == 0
+
+
+def test_every_judge_has_an_opinion_on_every_piece(monkeypatch):
+    trajectory = disagreement(monkeypatch).trajectory
+    arguments = (table_1_arm(), wearer(), QUESTION.goal, trajectory, MARGIN, RAY)
+    verdict = opinions.verdict_of(*arguments)
+    assert verdict.is_proven
+    assert verdict.touch is None
+    assert not verdict.is_disagreement
+    assert len(verdict.opinions) == len(trajectory.times)
+    for i, opinion in enumerate(verdict.opinions[:-1]):
+        assert (opinion.begin, opinion.end) == tuple(trajectory.times[i : i + 2])
+    for opinion in verdict.opinions:
+        assert opinion.certificate == 'proven'
+        assert opinion.begin <= opinion.fcl.time <= opinion.end + 1e-12
+        # They look at nearly the same instants.
+        assert opinion.fcl.distance == pytest.approx(opinion.oracle, abs=1e-4)
+    assert verdict.clearance >= MARGIN
+
+
+def test_a_motion_without_pieces_and_a_wearer_without_boxes_have_a_verdict():
+    still = Trajectory(
+        times=np.zeros(1),
+        positions=FOLDED[None],
+        velocities=np.zeros((1, 4)),
+        accelerations=np.zeros((1, 4)),
+    )
+    verdict = opinions.verdict_of(table_1_arm(), Scene(()), QUESTION.goal, still, MARGIN, RAY)
+    assert verdict.is_proven
+    assert verdict.clearance == np.inf
+    assert len(verdict.opinions) == 1
+
+
+def fail(*_, **__):
+    raise ZeroDivisionError('of a test')
+
+
+def test_an_error_is_reproduced_by_an_error_of_the_same_kind(monkeypatch, capsys, tmp_path):
+    incident = error_incident(QUESTION, ZeroDivisionError('of a test'), 'Traceback ...', None)
+    assert incident.kind is IncidentKind.ERROR
+    path = write_incident(incident, tmp_path)
+    assert replay.main([str(path)]) == 1
+    assert (
+        'not reproduced: recorded was ZeroDivisionError, now: solved: ' in capsys.readouterr().out
+    )
+    monkeypatch.setattr(replay, 'plan_motion', fail)
+    assert replay.main([str(path)]) == 0
+    assert 'reproduced: ZeroDivisionError, as recorded' in capsys.readouterr().out
+
+
+def test_an_error_after_the_plan_says_so(capsys):
+    trajectory = pipeline.plan_motion(**QUESTION.arguments).trajectory
+    incident = error_incident(QUESTION, OSError('no publisher'), 'Traceback ...', trajectory)
+    assert replay.replay(incident) == 1
+    out = capsys.readouterr().out
+    assert 'the same motion to the bit: yes' in out
+    assert 'not reproduced: the OSError came after the motion had been planned' in out
+
+
+def test_versions_that_differ_are_named(monkeypatch, capsys):
+    incident = disagreement(monkeypatch)
+    versions = {**incident.versions, 'numpy': '0.1', 'moon': 'full'}
+    replay.replay(replace(incident, versions=versions))
+    out = capsys.readouterr().out
+    assert f'numpy: 0.1 then, {np.__version__} now' in out
+    assert 'moon: full then, none now' in out
+    assert 'numba: ' not in out
+
+
+@pytest.mark.parametrize(
+    ('content', 'sentence'),
+    [
+        (None, 'No such file'),
+        ('a: [', 'expected a readable YAML file'),
+        ('', 'incident: None, expected a mapping'),
+        ('format: 9', 'format: 9, expected 1'),
+        ('\x00', 'expected a readable YAML file'),
+        ('[' * 5000, 'nested too deeply'),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_sentence(capsys, tmp_path, content, sentence):
+    path = tmp_path / 'incident.yaml'
+    if content is not None:
+        path.write_text(content)
+    assert replay.main([str(path)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ''
+    assert len(err.splitlines()) == 1
+    assert err.startswith(f'replay: file {path}: ')
+    assert sentence in err
+
+
+def test_the_help_teaches(capsys):
+    with pytest.raises(SystemExit) as end:
+        replay.main(['--help'])
+    assert end.value.code == 0
+    out = capsys.readouterr().out
+    for word in ('FILE', 'exit codes:', 'needs no ROS', './run exec replay'):
+        assert word in out
+
+
+BLOCKED = """
+import sys
+for name in ('rclpy', 'ament_index_python', 'tf2_ros', 'matplotlib'):
+    sys.modules[name] = None
+from rrth_planner.replay import main
+sys.exit(main(['/no/such/file']))
+"""
+
+
+def test_it_needs_no_ros():
+    paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
+    found = subprocess.run(
+        [sys.executable, '-c', BLOCKED],
+        env={**os.environ, 'PYTHONPATH': paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (found.returncode, found.stdout) == (2, '')
+    assert found.stderr.startswith('replay: file /no/such/file: ')

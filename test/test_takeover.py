@@ -1,0 +1,176 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Motions that begin while the arm moves: no jump, within limits, on free ground."""
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+from rrth_planner.arm import tool_pose
+from rrth_planner.braking import brake
+from rrth_planner.certificate import certify
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import RRTHOptions
+from rrth_planner.oracle import quintic_states
+from rrth_planner.path import Path
+from rrth_planner.pipeline import plan_motion
+from rrth_planner.scene import Box, Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import (
+    joined,
+    lead_in,
+    MotionState,
+    reserved,
+    Takeover,
+    takeover,
+)
+from rrth_planner.timing import limit_ratio, parameterize
+from rrth_planner.trajectory import piece_coefficients, sample
+from worlds import (
+    dense_touch,
+    examples,
+    free_configuration,
+    limits,
+    MARGIN,
+    RAY,
+    table_1_arm,
+    wearer,
+    wearer_world,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_state(rng, bounds):
+    """Return a state whose velocity stays within the limits while its acceleration fades."""
+    a = bounds.acceleration * rng.uniform(-1.0, 1.0, len(bounds.velocity)) * rng.integers(0, 2)
+    fading = 0.52 * a**2 / bounds.jerk + 2e-3
+    v = (bounds.velocity - fading) * rng.uniform(-1.0, 1.0, len(a))
+    return MotionState(positions=rng.uniform(-1.0, 1.0, len(a)), velocities=v, accelerations=a)
+
+
+@examples(200)
+@given(seed=SEEDS)
+def test_a_lead_in_begins_with_the_state_and_ends_straight_ahead(seed):
+    rng = np.random.default_rng(seed)
+    bounds = limits(int(rng.integers(1, 7)))
+    state = random_state(rng, bounds)
+    lead = lead_in(state, bounds)
+    first = lead.trajectory
+    assert np.array_equal(first.positions[0], state.positions)
+    assert np.array_equal(first.velocities[0], state.velocities)
+    assert np.abs(first.accelerations[0] - state.accelerations).max() < 1e-12
+    assert not first.accelerations[-1].any()
+    rest = parameterize(Path([first.positions[-1], lead.q_stop]), (), reserved(bounds), lead.speed)
+    whole = joined(first, rest)
+    assert limit_ratio(whole, bounds) <= 1.002
+    # The oracle's quintics through the points: velocity and acceleration have no jumps.
+    grid, q, v, a = quintic_states(
+        whole.times, whole.positions, whole.velocities, whole.accelerations, 0.001
+    )
+    step = np.diff(grid)[:, None]
+    assert (np.abs(np.diff(a, axis=0)) <= 1.01 * bounds.jerk * step + 1e-4).all()
+    assert (np.abs(np.diff(v, axis=0)) <= 1.01 * bounds.acceleration * step + 1e-6).all()
+    assert not whole.velocities[-1].any()
+    assert np.array_equal(whole.positions[-1], lead.q_stop)
+
+
+def motion(scene, q_start, target, seed, moving=None):
+    return plan_motion(
+        table_1_arm(),
+        scene,
+        q_start,
+        PointingGoal(target),
+        limits(),
+        RRTHOptions(),
+        margin=MARGIN,
+        ray_guard_length=RAY,
+        seed=seed,
+        moving=moving,
+    )
+
+
+@examples(60)
+@given(seed=SEEDS)
+def test_a_running_motion_is_taken_over_at_any_instant(seed):
+    rng = np.random.default_rng(seed)
+    scene, world = wearer(), wearer_world()
+    before = motion(scene, free_configuration(rng, world), rng.uniform(-2.0, 2.0, 3), 1)
+    if before.trajectory is None:
+        return
+    time = rng.uniform(0.0, before.trajectory.duration)
+    q, v, a = (values[0] for values in sample(before.trajectory, [time]))
+    state = MotionState(positions=q, velocities=v, accelerations=a)
+    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, Takeover(state=state))
+    if plan.trajectory is None:
+        assert plan.status is not PlanStatus.NOT_CERTIFIED
+        return
+    first = plan.trajectory
+    assert np.array_equal(first.positions[0], q)
+    assert np.abs(first.velocities[0] - v).max() < 1e-12
+    assert np.abs(first.accelerations[0] - a).max() < 1e-12
+    assert not first.velocities[-1].any()
+    assert limit_ratio(first, limits()) <= 1.003
+    for curve, width in zip(piece_coefficients(first), np.diff(first.times), strict=True):
+        n = 2 + int(width / 2e-4)
+        assert dense_touch(table_1_arm(), scene, MARGIN, RAY, curve, n) < 0
+
+
+def test_an_arm_with_no_room_ahead_is_told_so():
+    q = np.array([0.0, -0.8, 0.0, 0.0])
+    # The tool would be inside of a box before the arm could stop.
+    arm = table_1_arm()
+    state = MotionState(
+        positions=q, velocities=np.array([1.4, 0.0, 0.0, 0.0]), accelerations=np.zeros(4)
+    )
+    ahead = tool_pose(arm, lead_in(state, limits()).q_stop)[:3, 3]
+    box = Box('wall', ahead, np.full(3, 0.02), np.eye(3))
+    plan = motion(Scene((box,)), q, [0.0, 0.0, 2.0], 3, Takeover(state=state))
+    assert plan.status is PlanStatus.START_MOVES
+    assert 'straight ahead' in plan.sentence
+
+
+@pytest.mark.parametrize('rate', [0.1, 0.5, 1.0])
+@examples(40)
+@given(seed=SEEDS)
+def test_an_arm_that_follows_a_motion_is_foreseen_to_go_on(rate, seed):
+    rng = np.random.default_rng(seed)
+    running = parameterize(Path(rng.standard_normal((2, 4))), (), limits())
+    time, lead = rng.uniform(0.1, 0.7) * running.duration, 0.05
+    q, v, _ = (values[0] for values in sample(running, [time]))
+    found = takeover(q, rate * v, running, lead).state
+    q, v, a = (values[0] for values in sample(running, [time + rate * lead]))
+    assert np.abs(found.positions - q).max() < 1e-6
+    # In the time of the motion: what comes next is followed at the same rate.
+    assert np.abs(found.velocities - v).max() < 1e-5
+    assert np.abs(found.accelerations - a).max() < 1e-3
+
+
+@examples(30)
+@given(seed=SEEDS)
+def test_an_arm_with_no_room_ahead_stops_along_its_motion_first(seed):
+    rng = np.random.default_rng(seed)
+    scene, world = wearer(), wearer_world()
+    before = motion(scene, free_configuration(rng, world), rng.uniform(-2.0, 2.0, 3), 1)
+    if before.trajectory is None:
+        return
+    time = rng.uniform(0.0, before.trajectory.duration)
+    q, v, a = (values[0] for values in sample(before.trajectory, [time]))
+    state = MotionState(positions=q, velocities=v, accelerations=a)
+    moving = Takeover(state=state, running=before.trajectory, time=time)
+    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving)
+    # Along a motion that is proven free it can stop; it may just fail to be proven, since the
+    # curve through the points of the stop is off the path by a little.
+    if plan.status is PlanStatus.START_MOVES:
+        assert not certify(brake(before.trajectory, time, limits()), world).is_proven
+    if plan.trajectory is not None:
+        assert np.array_equal(plan.trajectory.positions[0], q)
+        assert np.abs(plan.trajectory.velocities[0] - v).max() < 1e-12
+
+
+def test_an_arm_on_another_way_goes_on_at_its_velocity():
+    running = parameterize(Path([np.zeros(4), np.ones(4)]), (), limits())
+    q, v = np.full(4, 0.5) + [0.1, 0.0, 0.0, 0.0], np.array([0.3, 0.0, 0.0, 0.0])
+    found = takeover(q, v, running, 0.1).state
+    assert np.allclose(found.positions, q + 0.1 * v)
+    assert np.array_equal(found.velocities, v)
+    assert not found.accelerations.any()

@@ -1,0 +1,161 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A running motion: what is left of it, held against a new body, and how it stops."""
+
+from hypothesis import given, strategies as st
+import numpy as np
+from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import RRTHOptions
+from rrth_planner.oracle import frames, quintic_states
+from rrth_planner.pipeline import plan_motion
+from rrth_planner.scene import Box, Scene
+from rrth_planner.timing import limit_ratio
+from rrth_planner.trajectory import piece_coefficients, sample
+from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
+from worlds import (
+    dense_touch,
+    examples,
+    free_configuration,
+    limits,
+    MARGIN,
+    RAY,
+    table_1_arm,
+    wearer,
+    wearer_world,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_motion(rng):
+    """Return a motion round the wearer, or None."""
+    plan = plan_motion(
+        table_1_arm(),
+        wearer(),
+        free_configuration(rng, wearer_world()),
+        PointingGoal(rng.uniform(-2.0, 2.0, 3)),
+        limits(),
+        RRTHOptions(),
+        margin=MARGIN,
+        ray_guard_length=RAY,
+        seed=1,
+    )
+    return plan.trajectory
+
+
+def off_the_path(trajectory, q):
+    """Return how far points are from the positions of a motion [rad]."""
+    path, _, _ = sample(trajectory, np.arange(0.0, trajectory.duration + 2e-4, 2e-4))
+    a, b = path[:-1], path[1:]
+    step = b - a
+    share = np.einsum('nk,mnk->mn', step, q[:, None] - a[None])
+    share = np.clip(share / ((step * step).sum(axis=1) + 1e-300), 0.0, 1.0)
+    nearest = a[None] + share[:, :, None] * step[None]
+    return np.linalg.norm(q[:, None] - nearest, axis=2).min(axis=1)
+
+
+@examples(25)
+@given(seed=SEEDS)
+def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    if motion is None:
+        return
+    time = rng.uniform(0.0, motion.duration)
+    stop = emergency_stop(motion, time, limits())
+    q, v, a = (values[0] for values in sample(motion, [time]))
+    assert np.allclose(stop.positions[0], q, atol=1e-12)
+    if len(stop.times) == 1:
+        return
+    assert np.allclose(stop.velocities[0], v, atol=1e-9)
+    assert np.allclose(stop.accelerations[0], a, atol=1e-7)
+    assert not stop.velocities[-1].any()
+    assert not stop.accelerations[-1].any()
+    assert stop.duration <= motion.duration - time + 1e-6
+    assert limit_ratio(stop, limits()) <= 1.0026
+    # A controller that gets it late finds itself on it.
+    late = min(0.9 * ON_ITS_WAY, stop.duration)
+    for mine, its in zip(sample(stop, [late]), sample(motion, [time + late]), strict=True):
+        assert np.allclose(mine, its, atol=1e-6)
+    grid, q, _, _ = quintic_states(
+        stop.times, stop.positions, stop.velocities, stop.accelerations, 0.01
+    )
+    assert off_the_path(motion, q[::3]).max() < 1e-4
+
+
+@examples(40)
+@given(seed=SEEDS)
+def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    if motion is None:
+        return
+    arm, phase = table_1_arm(), rng.uniform(0.0, 0.9 * motion.duration)
+    q, _, _ = sample(motion, [rng.uniform(phase, motion.duration)])
+    tool = frames(arm, q)[0, -1]
+    where = tool[:3, 3] + rng.uniform(0.0, 0.5) * tool[:3, 2] + rng.normal(0.0, 0.1, 3)
+    hand = Box('hand', where, rng.uniform(0.05, 0.2, 3), np.eye(3))
+    scene = Scene((*wearer().boxes, hand))
+    is_free = is_still_free(
+        RunningMotion(trajectory=motion, start_time=0.0),
+        phase,
+        arm,
+        scene,
+        margin=MARGIN,
+        ray_guard_length=RAY,
+    )
+    rest = between(motion, phase, motion.duration)
+    touches = any(
+        dense_touch(arm, scene, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
+        for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
+    )
+    # Free by a hair may be left unproven; what touches must never be called free.
+    assert not (is_free and touches)
+    if not touches and not is_free:
+        larger = Scene((*wearer().boxes, Box('hand', where, hand.size + 2e-3, np.eye(3))))
+        assert any(
+            dense_touch(arm, larger, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
+            for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
+        )
+
+
+def test_boxes_that_may_move_on_are_larger_the_later_the_arm_comes():
+    rng = np.random.default_rng(3)
+    motion = None
+    while motion is None or motion.duration < 1.0:
+        motion = random_motion(rng)
+    running = RunningMotion(trajectory=motion, start_time=0.0)
+    keep = {'margin': MARGIN, 'ray_guard_length': RAY}
+    n = len(wearer().boxes)
+    assert is_still_free(running, 0.0, table_1_arm(), wearer(), **keep)
+    slow = is_still_free(running, 0.0, table_1_arm(), wearer(), speeds=np.full(n, 1e-4), **keep)
+    fast = is_still_free(running, 0.0, table_1_arm(), wearer(), speeds=np.full(n, 5.0), **keep)
+    assert slow
+    assert not fast
+
+
+def test_the_speed_of_a_box_is_that_of_its_fastest_corner():
+    still = Box('torso', np.zeros(3), np.ones(3), np.eye(3))
+    moved = Box('torso', np.array([0.0, 0.1, 0.0]), np.ones(3), np.eye(3))
+    new = Box('hand', np.ones(3), np.ones(3), np.eye(3))
+    found = box_speeds(Scene((still,)), Scene((moved, new)), 0.1, 2.0)
+    assert np.allclose(found, [1.0, 2.0])
+    assert np.allclose(box_speeds(Scene((still,)), Scene((still,)), 0.1, 2.0), [0.0])
+
+
+@examples(25)
+@given(seed=SEEDS)
+def test_a_reading_tells_how_far_the_motion_is(seed):
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    if motion is None:
+        return
+    running = RunningMotion(trajectory=motion, start_time=100.0)
+    time = rng.uniform(0.05, 0.95) * motion.duration
+    q, v, _ = (values[0] for values in sample(motion, [time]))
+    # By the clock where it fits; else by where the arm is, as when it is played slowly.
+    for rate, taken in ((1.0, 100.0 + time), (0.5, 100.0 + 2.0 * time)):
+        found = running.phase(q, rate * v, taken, taken + 0.01)
+        if np.linalg.norm(v) > 0.2:
+            assert abs(found - (time + rate * 0.01)) < 0.012
