@@ -28,8 +28,9 @@ from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
-# Between two times of a running motion from which the soonest stop is found ahead [s].
-FORESEEN = 0.04
+# Between two times of a running motion from which the soonest stop is found, and how long before
+# such a time is due [s].
+FORESEEN, AHEAD = 0.06, 0.12
 # An arm that is not on its stop after this time is told again [s].
 PATIENCE = 0.05
 # An arm that stands still so long after the begin of a motion does not follow it [s].
@@ -110,8 +111,11 @@ class Guard:
 
     def _foresee(self, running: RunningMotion, stops: list[tuple[float, Trajectory]]) -> None:
         """Find the soonest stop from every so many times on, which takes milliseconds each."""
-        limits = self._parameters.limits
+        limits, start = self._parameters.limits, time.monotonic()
         for begin in np.arange(FORESEEN, running.trajectory.duration, FORESEEN).tolist():
+            # No sooner than it may be needed: the other threads have to hear and to plan.
+            while self.running is running and time.monotonic() < start + begin - AHEAD:
+                time.sleep(0.01)
             if self.running is not running:
                 return
             stops.append((begin, brake(running.trajectory, begin, limits)))
