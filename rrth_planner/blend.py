@@ -56,6 +56,22 @@ class Blend:
         speed = 2 * d * np.maximum(np.abs(self.u_in), np.abs(self.u_out))
         return speed, 3 * d * np.abs(self.u_out - self.u_in)
 
+    def top_speed(self, limits: MotionLimits) -> float:
+        """Return the greatest constant speed that holds all limits within the blend [rad/s]."""
+        if self.half_length == 0.0:
+            return 0.0
+        turn = np.abs(self.u_out - self.u_in) + 1e-300
+        width = 2 * self.half_length
+        along = np.maximum(np.abs(self.u_in), np.abs(self.u_out)) + 1e-300
+        # q'' peaks at 3/2 and q''' at 6 times the turn, over width and width^2.
+        return float(
+            min(
+                (limits.velocity / along).min(),
+                np.sqrt((limits.acceleration * width / (1.5 * turn)).min()),
+                np.cbrt((limits.jerk * width**2 / (6.0 * turn)).min()),
+            )
+        )
+
 
 def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend, ...]:
     """

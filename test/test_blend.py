@@ -75,6 +75,24 @@ def test_its_derivative_bounds_hold_and_its_curve_stays_at_the_corner(seed):
     assert (away <= blend.half_length * (1 + 1e-12)).all()
 
 
+@examples(200)
+@given(seed=SEEDS)
+def test_its_top_speed_holds_the_limits_and_reaches_one(seed):
+    blend, bounds = random_blend(np.random.default_rng(seed)), limits()
+    rate = blend.top_speed(bounds) / (2 * blend.half_length)
+    _, first, second, third = states(blend, np.linspace(0.0, 1.0, 401))
+    ratios = [
+        (np.abs(value) * rate**order / allowed).max()
+        for order, value, allowed in (
+            (1, first, bounds.velocity),
+            (2, second, bounds.acceleration),
+            (3, third, bounds.jerk),
+        )
+    ]
+    assert max(ratios) <= 1 + 1e-9
+    assert max(ratios) >= 0.999
+
+
 def test_a_corner_that_cannot_be_rounded_is_stopped_at():
     u = np.array([1.0, 0.0])
     blend = Blend(corner=np.zeros(2), u_in=u, u_out=u[::-1], half_length=0.0)
