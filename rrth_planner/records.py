@@ -46,7 +46,7 @@ def plain(value: Any) -> Any:
 
 
 def _fields_of(value: Any) -> dict[str, Any]:
-    return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.init}
 
 
 def question_from_mapping(data: Any) -> PlanQuestion:
@@ -111,7 +111,7 @@ def entries(data: Any, kind: Any, name: str, more: tuple[str, ...] = ()) -> dict
     """Return the entries of a mapping that has those of a dataclass, and more, and no others."""
     if not isinstance(data, Mapping):
         raise RecordError(f'{name}: {_short(data)}, expected a mapping')
-    wanted = [*(field.name for field in fields(kind)), *more]
+    wanted = [*(field.name for field in fields(kind) if field.init), *more]
     missing = [key for key in wanted if key not in data]
     if missing:
         raise RecordError(f'{name}: no {", ".join(missing)}, expected {", ".join(wanted)}')

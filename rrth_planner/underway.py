@@ -4,15 +4,17 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+import math
 
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
+from rrth_planner.kernels.following import time_on
 from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import follows, phase_of
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.takeover import phase_of, SAME_POSITION
+from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.world import arm_world
 
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
@@ -57,17 +59,14 @@ class RunningMotion:
             When it was read, and now [s].
 
         """
-        guess = taken - self.start_time
-        if follows(self.trajectory, guess, q):
-            # The arm began when it heard of the motion: a little late, which at 4 rad/s^2 is more
-            # than a controller lets a motion that takes over be off in velocity.
-            at = guess
-            for _ in range(2):
-                p, w, _ = (values[0] for values in sample(self.trajectory, [at]))
-                if np.abs(w).max() > SLOW:
-                    at += float((q - p) @ w / (w @ w))
-                at = min(max(at, guess - LATEST), guess + LATEST)
-            return at + now - taken
+        # The arm began when it heard of the motion: a little late, which at 4 rad/s^2 is more than
+        # a controller lets a motion that takes over be off in velocity.
+        motion, guess = self.trajectory, taken - self.start_time
+        if len(motion.times) > 1:
+            curves = piece_coefficients(motion)
+            at = time_on(curves, motion.times, guess, q, SAME_POSITION, SLOW, LATEST)
+            if math.isfinite(at):
+                return float(at) + now - taken
         found = phase_of(q, v, self.trajectory)
         return None if found is None else found[0] + found[1] * (now - taken)
 

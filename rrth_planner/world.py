@@ -13,6 +13,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
 from rrth_planner.kernels import arm_clearance, arm_validity, chain, contacts, jit
+from rrth_planner.kernels.boxes import rows_of
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -196,18 +197,7 @@ def _mount_inverse(arm: ArmModel) -> Array:
 
 
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
-    """Return the numbers of each box, (15, m): rotation, the base's position, half extents."""
-    m = len(scene.boxes)
-    rows = np.empty((jit.BOX_ROWS, m))
-    if m == 0:
-        return rows
-    T_mount_base = _mount_inverse(arm)
-    rotations = np.array([box.rotation for box in scene.boxes])
-    centers = np.array([box.center for box in scene.boxes])
-    axes = (T_mount_base[:3, :3] @ rotations).transpose(0, 2, 1)
-    centers = centers @ T_mount_base[:3, :3].T + T_mount_base[:3, 3]
-    rows[: jit.BOX_OFFSET] = axes.reshape(m, 9).T
-    rows[jit.BOX_OFFSET : jit.BOX_HALF] = -(axes @ centers[:, :, None])[:, :, 0].T
-    sizes = np.array([box.size for box in scene.boxes])
-    rows[jit.BOX_HALF :] = 0.5 * sizes.T + margin + SLACK
+    """Return the rows of the boxes, grown by the margin, (15, m), as `kernels.boxes.rows_of`."""
+    rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
+    rows_of(scene.numbers, _mount_inverse(arm), margin + SLACK, rows)
     return rows

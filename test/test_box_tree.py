@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tree of boxes: every box in one lane, every bound round its boxes, and none of them lost."""
 
+import itertools
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.box_tree import CORNERS, grown_groups, pack_boxes
+from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import SceneError
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.oracle import bar_box_touch, bars
@@ -21,6 +23,7 @@ from worlds import (
     table_1_arm,
 )
 
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 SEEDS = st.integers(0, 2**32 - 1)
 
 

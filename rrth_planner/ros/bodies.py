@@ -2,65 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wearer as visualization markers: which boxes there are, and until when."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, one_line, SceneError
-from rrth_planner.ros.fields import numbers, position_of, rotation_of, seconds_of
-from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
-from rrth_planner.scene import Box, Scene
+from rrth_planner.errors import MessageError
+from rrth_planner.ros.edits import BodyPart, Edit, Key, MOST_BOXES, read_edits
+from rrth_planner.ros.frames import Lookup
+from rrth_planner.scene import Scene
 from visualization_msgs.msg import Marker, MarkerArray
 
-# More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.
-MOST_BOXES = 10000
 # So many markers whose lifetime has passed are remembered, to be named.
 MOST_EXPIRED = 100
-# A body is kept, and so are its names [characters]; longer texts are cut short.
-LONGEST_NAMESPACE, LONGEST_NAME = 256, 100
-
-Key = tuple[str, int]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BodyPart:
-    """
-    What one marker put into the world.
-
-    Parameters
-    ----------
-    boxes : tuple of Box
-        One for a CUBE, any number for a CUBE_LIST, in the base frame.
-    expires : float
-        When they vanish [s, the clock of `now`]; inf: never.
-
-    """
-
-    boxes: tuple[Box, ...]
-    expires: float = float('inf')
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Edit:
-    """
-    What one marker does to the wearer.
-
-    Parameters
-    ----------
-    action : int
-        Marker.ADD, DELETE or DELETEALL.
-    key : (str, int)
-        Its ns and id.
-    part : BodyPart or None
-        What is added; None unless it adds.
-
-    """
-
-    action: int
-    key: Key
-    part: BodyPart | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -160,78 +112,6 @@ class WearerBody:
         return self.edited(missing, now)
 
 
-def read_edits(
-    msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
-) -> tuple[Edit, ...]:
-    """Return what an array does, in its order; arguments and errors are those of `apply`."""
-    return tuple(
-        _edit(f'marker {index} ("{marker_name(marker)}")', marker, now, base_frame, lookup)
-        for index, marker in enumerate(msg.markers)
-    )
-
-
 def scene_of(body: WearerBody) -> Scene:
     """Return the boxes of a body as a scene; take `body.at(now)` first where time matters."""
     return Scene(tuple(box for _, part in body.parts for box in part.boxes))
-
-
-def marker_name(marker: Any) -> str:
-    """Return what sentences call a marker: its text, or `ns/id` where it has none."""
-    name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
-    return one_line(name, LONGEST_NAME)
-
-
-def _edit(label: str, marker: Any, now: float, base_frame: str, lookup: Lookup | None) -> Edit:
-    key = (marker.ns, marker.id)
-    if len(marker.ns) > LONGEST_NAMESPACE:
-        raise MessageError(
-            f'{label}: ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
-        )
-    if marker.action in (Marker.DELETE, Marker.DELETEALL):
-        return Edit(marker.action, key)
-    if marker.action != Marker.ADD:
-        raise MessageError(
-            f'{label}: action {marker.action}, expected 0 (ADD), 2 (DELETE) or 3 (DELETEALL)'
-        )
-    try:
-        return Edit(Marker.ADD, key, _body_part(marker, now, base_frame, lookup))
-    except FrameError as problem:
-        raise FrameError(f'{label}: {problem}') from problem
-    except (MessageError, SceneError) as problem:
-        raise MessageError(f'{label}: {problem}') from problem
-
-
-def _body_part(marker: Any, now: float, base_frame: str, lookup: Lookup | None) -> BodyPart:
-    if marker.type not in (Marker.CUBE, Marker.CUBE_LIST):
-        raise MessageError(f'type {marker.type}, expected 1 (CUBE) or 6 (CUBE_LIST)')
-    size = numbers((marker.scale.x, marker.scale.y, marker.scale.z), 'scale', 'm')
-    if not (size > 0.0).all():
-        raise MessageError(f'scale: {size.tolist()}, expected three lengths > 0 [m]')
-    center = position_of(marker.pose.position, 'pose.position')
-    rotation = rotation_of(marker.pose.orientation, 'pose.orientation')
-    lifetime = seconds_of(marker.lifetime)
-    if lifetime < 0.0:
-        raise MessageError(f'lifetime: {lifetime}, expected 0 (for ever) or more [s]')
-    T = pose_in_base(marker.header.frame_id, base_frame, lookup)
-    rotation_base = T[:3, :3] @ rotation
-    # What overflows is infinite, which a box refuses.
-    with np.errstate(over='ignore', invalid='ignore'):
-        boxes = tuple(
-            Box(name, T[:3, :3] @ (center + rotation @ offset) + T[:3, 3], size, rotation_base)
-            for name, offset in _boxes_of(marker)
-        )
-    return BodyPart(boxes, now + lifetime if lifetime > 0.0 else float('inf'))
-
-
-def _boxes_of(marker: Any) -> Iterator[tuple[str, Array]]:
-    """Yield the name and the offset in the marker's own axes of each of its boxes [m]."""
-    name = marker_name(marker)
-    if marker.type == Marker.CUBE:
-        yield name, np.zeros(3)
-        return
-    if not 0 < len(marker.points) <= MOST_BOXES:
-        raise MessageError(
-            f'points: {len(marker.points)}, expected 1 to {MOST_BOXES} in a CUBE_LIST'
-        )
-    for k, point in enumerate(marker.points):
-        yield f'{name}[{k}]', position_of(point, f'points[{k}]')

@@ -134,12 +134,18 @@ class DemoClient(Node):
         """Begin to write down what the arm is told and where it is."""
         self._told, self._seen = [], []
 
-    def raise_arm(self, body: MarkerArray, after: float) -> Array:
+    def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
         """
         Publish another body so long after the arm set off [s]; return where the arm was from then.
 
-        Waits until the arm has been stopped, has been told how to go on, and has arrived there.
+        Waits until the arm has left where it starts, (dof,) [rad], and then until it has been
+        stopped, has been told how to go on, and has arrived there.
         """
+        self.wait_for(
+            lambda: np.abs(self.positions() - q_start).max() > ARRIVED,
+            'the arm on its way',
+            self._timeout,
+        )
         end = time.monotonic() + after
         while time.monotonic() < end:
             self._spinner.spin_once(timeout_sec=0.005)

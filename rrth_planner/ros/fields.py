@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError
-from rrth_planner.rotation import rotation_matrix
 
 # A quaternion this far from unit length is no rounding but a mistake.
 QUATERNION_TOLERANCE = 1e-2
@@ -28,16 +27,27 @@ def position_of(point: Any, name: str) -> Array:
     return numbers((point.x, point.y, point.z), name, 'm')
 
 
-def rotation_of(quaternion: Any, name: str) -> Array:
-    """Return the rotation of a geometry_msgs/Quaternion, shape (3, 3), or raise MessageError."""
-    q = numbers((quaternion.x, quaternion.y, quaternion.z, quaternion.w), name, '-')
-    norm = math.hypot(*q)
+def triple_of(vector: Any, name: str) -> tuple[float, float, float]:
+    """Return a geometry_msgs/Point or Vector3 [m], or raise MessageError."""
+    x, y, z = vector.x, vector.y, vector.z
+    # Finite where all three are, but for a sum that overflows.
+    if not math.isfinite(x + y + z):
+        numbers((x, y, z), name, 'm')
+    return x, y, z
+
+
+def unit_quaternion_of(quaternion: Any, name: str) -> tuple[float, float, float, float]:
+    """Return a geometry_msgs/Quaternion of length 1, as it came, or raise MessageError."""
+    q = x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    if not math.isfinite(x + y + z + w):
+        numbers(q, name, '-')
+    norm = math.hypot(x, y, z, w)
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
         raise MessageError(
-            f'{name}: {q.tolist()} of length {norm:.6g}, expected a quaternion (x, y, z, w) of '
+            f'{name}: {list(q)} of length {norm:.6g}, expected a quaternion (x, y, z, w) of '
             'length 1 [-]'
         )
-    return rotation_matrix(q)
+    return q
 
 
 def seconds_of(time: Any) -> float:

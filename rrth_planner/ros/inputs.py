@@ -111,9 +111,16 @@ class PlanInputs:
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
-        # Speeds that overflow belong to no motion, and are refused as too fast.
+        # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
-            return takeover(joints.positions, joints.velocities, running, time - joints.taken)
+            found = takeover(joints.positions, joints.velocities, running, time - joints.taken)
+        if not np.isfinite(found.state.positions).all():
+            raise RequestError(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected a speed at which it is somewhere '
+                f'{time - joints.taken:.3f} s later',
+            )
+        return found
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)

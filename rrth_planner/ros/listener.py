@@ -10,8 +10,8 @@ from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rrth_planner.errors import MessageError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.bodies import read_edits
 from rrth_planner.ros.body_history import BodyHistory
+from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.frames import Frames
 from rrth_planner.ros.inputs import Input, Inputs
 from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody

@@ -5,24 +5,26 @@
 import time
 
 from geometry_msgs.msg import Point
+import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
 
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
+from rrth_planner.goal import PointingGoal  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import body_history  # noqa: E402
-from rrth_planner.ros.bodies import (  # noqa: E402
+from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
+from rrth_planner.ros.edits import (  # noqa: E402
     LONGEST_NAME,
     LONGEST_NAMESPACE,
     MOST_BOXES,
     read_edits,
-    scene_of,
-    WearerBody,
 )
-from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
 from rrth_planner.ros.error_codes import answer, ErrorCode  # noqa: E402
-from rrth_planner.ros.inputs import Input  # noqa: E402
+from rrth_planner.ros.inputs import Input, PlanInputs, RequestError  # noqa: E402
 from rrth_planner.ros.messages import (  # noqa: E402
     goal_from_msg,
     joint_reading,
@@ -31,6 +33,7 @@ from rrth_planner.ros.messages import (  # noqa: E402
 from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  # noqa: E402
 from rrth_planner.ros.subscriptions import decoded, MOST_BYTES  # noqa: E402
 from rrth_planner.ros.trajectories import MOST_POINTS  # noqa: E402
+from rrth_planner.scene import Scene  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
@@ -208,3 +211,11 @@ def test_stamps_of_any_time_do_not_date_a_reading():
         msg = joints()
         msg.header.stamp.sec = sec
         assert joint_reading(msg, JOINTS, 1000.0, None).taken == 1000.0
+
+
+def test_an_arm_that_is_nowhere_soon_is_refused():
+    reading = joint_reading(joints(velocity=[0.0, -1.5e308, 0.0, 0.0]), JOINTS, 0.0, None)
+    inputs = PlanInputs(Scene(()), PointingGoal([1.0, 0.0, 0.0]), reading)
+    assert np.isfinite(inputs.ahead(None, 1.0, load_arm()).state.positions).all()
+    with pytest.raises(RequestError, match=r'joint_2 moves at .*somewhere 2\.000 s later'):
+        inputs.ahead(None, 2.0, load_arm())

@@ -14,7 +14,7 @@ from geometry_msgs.msg import Point  # noqa: E402
 from rrth_planner.arm import tool_pose  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import bodies  # noqa: E402
+from rrth_planner.ros import bodies, edits  # noqa: E402
 from rrth_planner.ros.error_codes import answer, CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import (  # noqa: E402
     configuration_from_msg,
@@ -165,7 +165,8 @@ def test_an_unknown_frame_is_an_error_of_its_own():
 
 
 def test_more_boxes_than_the_limit_are_refused(monkeypatch):
-    monkeypatch.setattr(bodies, 'MOST_BOXES', 3)
+    for module in (bodies, edits):
+        monkeypatch.setattr(module, 'MOST_BOXES', 3)
     body = body_of(*(box(index=i) for i in range(3)))
     with pytest.raises(MessageError, match='4 boxes, expected at most 3 in all'):
         body.apply(array(box(index=3)), 0.0, 'torso')

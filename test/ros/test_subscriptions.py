@@ -11,8 +11,9 @@ from hypothesis import given, strategies as st  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.ros import body_history  # noqa: E402
-from rrth_planner.ros.bodies import read_edits, scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
+from rrth_planner.ros.edits import read_edits  # noqa: E402
 from rrth_planner.ros.messages import joint_reading  # noqa: E402
 from rrth_planner.ros.subscriptions import DuplicateFilter, OpenSubscription  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, target  # noqa: E402
