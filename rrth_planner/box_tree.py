@@ -34,11 +34,16 @@ def pack_boxes(rows: Array) -> tuple[Array, Indices]:
 
     """
     m = rows.shape[1]
-    depth = max(1, math.ceil(math.log(max(m, 1), LANES) - 1e-9))
+    depth = tree_depth(m)
     n_groups = (LANES**depth - 1) // (LANES - 1)
     groups, lanes = np.empty((n_groups, BOX_ROWS * LANES)), np.empty(m, dtype=np.int64)
     pack(rows, depth, groups, lanes)
     return groups, lanes
+
+
+def tree_depth(n: int) -> int:
+    """Return how many levels of groups n boxes need."""
+    return max(1, math.ceil(math.log(max(n, 1), LANES) - 1e-9))
 
 
 def grown_groups(groups: Array, by: float) -> Array:

@@ -14,6 +14,8 @@ from rrth_planner.world import World
 
 # Instants at which the least clearance is looked for; a figure for people, not the proof [s].
 CLEARANCE_PERIOD = 0.01
+# Share of the resolution of edges that the proof of a curve goes down to.
+FINENESS = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
         is_free = world.is_valid(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
     coefficients = piece_coefficients(trajectory)
-    speed, bend = _bounds_of(trajectory)
+    speed, bend = bounds_of(trajectory)
     first, share = 0, 0.0
     if begin > 0.0:
         times = trajectory.times
@@ -96,7 +98,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
         bend,
         first,
         share,
-        0.2 * world.resolution,
+        FINENESS * world.resolution,
         world.chain,
         world.robot,
         world.obstacles,
@@ -107,8 +109,8 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
 
 
 @functools.lru_cache(maxsize=8)
-def _bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
-    """Return the derivative bounds of a trajectory's pieces; a running motion is asked often."""
+def bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Return `derivative_bounds` of a trajectory's pieces; a running motion is asked often."""
     return derivative_bounds(piece_coefficients(trajectory))
 
 

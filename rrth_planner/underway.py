@@ -9,13 +9,15 @@ import math
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.certificate import certify
+from rrth_planner.box_tree import tree_depth
+from rrth_planner.certificate import bounds_of, certify, FINENESS
 from rrth_planner.kernels.following import time_on
+from rrth_planner.kernels.pieces import is_rest_free
 from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import phase_of, SAME_POSITION
 from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
-from rrth_planner.world import arm_world
+from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
 SLOW, LATEST = 0.05, 0.05
@@ -137,9 +139,7 @@ def is_still_free(
             return False
         checked = running.escape_time
     if speeds is None or not speeds.any():
-        world = arm_world(arm, scene, margin, ray_guard_length)
-        is_free = certify(trajectory, world, checked).is_proven
-        return is_free and world.is_valid(q_end, running.reach)
+        return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
     # Within a stretch of time the boxes are as large as they get at its end.
     now = min(max(checked, 0.0), trajectory.duration)
     for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
@@ -147,6 +147,38 @@ def is_still_free(
         if not certify(between(trajectory, begin, end), world).is_proven:
             return False
     return world.is_valid(q_end, running.reach)
+
+
+def _is_rest_free(
+    running: RunningMotion,
+    begin: float,
+    arm: ArmModel,
+    scene: Scene,
+    margin: float,
+    ray_guard_length: float,
+) -> bool:
+    """Return what `certify` says of the rest, and of the end with the ray it needs, in one go."""
+    trajectory = running.trajectory
+    if len(trajectory.times) == 1:
+        world = arm_world(arm, scene, margin, ray_guard_length)
+        return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
+    robot, chain = arm_rows(arm, ray_guard_length)
+    return bool(
+        is_rest_free(
+            piece_coefficients(trajectory),
+            trajectory.times,
+            *bounds_of(trajectory),
+            begin,
+            running.reach,
+            FINENESS * RESOLUTION,
+            chain,
+            robot,
+            scene.numbers,
+            mount_inverse(arm),
+            margin + SLACK,
+            tree_depth(len(scene.boxes)),
+        )
+    )
 
 
 def _swollen(scene: Scene, by: Array) -> Scene:

@@ -140,7 +140,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):
         if not 0.0 <= value < np.inf:
             raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
-    robot, compiled_chain = _arm_rows(arm, ray_guard_length)
+    robot, compiled_chain = arm_rows(arm, ray_guard_length)
     obstacles, lanes = pack_boxes(_box_rows(arm, scene, margin))
     return World(
         bounds=arm.bounds,
@@ -163,7 +163,7 @@ def grown(world: World, by: float) -> World:
 
 
 @functools.lru_cache(maxsize=16)
-def _arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
+def arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
     """Return the rows of an arm, and its compiled chain."""
     rows = robot_rows(arm, ray_length)
     rows.setflags(write=False)
@@ -191,7 +191,8 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
 
 
 @functools.lru_cache(maxsize=16)
-def _mount_inverse(arm: ArmModel) -> Array:
+def mount_inverse(arm: ArmModel) -> Array:
+    """Return the pose of the base frame in that of the arm, (4, 4) [m]."""
     inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
     return inverse
 
@@ -199,5 +200,5 @@ def _mount_inverse(arm: ArmModel) -> Array:
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
     """Return the rows of the boxes, grown by the margin, (15, m), as `kernels.boxes.rows_of`."""
     rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
-    rows_of(scene.numbers, _mount_inverse(arm), margin + SLACK, rows)
+    rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
     return rows

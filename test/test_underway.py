@@ -4,6 +4,7 @@
 
 from hypothesis import given, strategies as st
 import numpy as np
+from rrth_planner.certificate import certify
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import RRTHOptions
@@ -13,12 +14,14 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample
 from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
+from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
     examples,
     free_configuration,
     limits,
     MARGIN,
+    random_boxes,
     RAY,
     table_1_arm,
     wearer,
@@ -82,6 +85,22 @@ def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
         stop.times, stop.positions, stop.velocities, stop.accelerations, 0.01
     )
     assert off_the_path(motion, q[::3]).max() < 1e-4
+
+
+@examples(60)
+@given(seed=SEEDS, n_more=st.sampled_from([0, 1, 3, 60]), reach=st.sampled_from([0.0, 2.0]))
+def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach):
+    rng = np.random.default_rng(seed)
+    motion = random_motion(rng)
+    if motion is None:
+        return
+    arm, phase = table_1_arm(), rng.uniform(-0.1, 1.1) * motion.duration
+    scene = Scene((*wearer().boxes, *random_boxes(rng, n_more, spread=3.0, largest=0.2).boxes))
+    world = arm_world(arm, scene, MARGIN, RAY)
+    is_proven = certify(motion, world, max(phase, 0.0)).is_proven
+    running = RunningMotion(trajectory=motion, start_time=0.0, reach=reach)
+    is_free = is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+    assert is_free == (is_proven and world.is_valid(motion.positions[-1], max(reach, RAY)))
 
 
 @examples(40)

@@ -28,7 +28,7 @@ QUATERNION, SCALE, POINT, POSED = 3, 7, 10, 13
 ORTHOGONAL, SPARE = 1e-6, 1e-9
 
 
-@kernel(void(MAT, READ_INTS, CUBE, OUT_MAT))
+@kernel(void(MAT, READ_INTS, CUBE, OUT_MAT), is_short=True)
 def place(markers, which, frames, boxes):
     """
     Write the boxes of markers into the base frame.
@@ -61,7 +61,7 @@ def place(markers, which, frames, boxes):
                 box[ROTATION + 3 * r + c] = turned
 
 
-@kernel(int64(MAT, float64))
+@kernel(int64(MAT, float64), is_short=True)
 def first_bad(boxes, farthest):
     """
     Return which of (n, 15) numbers are the first that are no box; -1: all are boxes.
@@ -84,7 +84,7 @@ def first_bad(boxes, farthest):
     return -1
 
 
-@kernel(void(MAT, MAT, float64, OUT_MAT))
+@kernel(void(MAT, MAT, float64, OUT_MAT), is_short=True)
 def rows_of(boxes, T_arm_base, growth, rows):
     """
     Write the rows of boxes, (15, n), each grown by that much on every side [m].

@@ -34,7 +34,7 @@ def state_at(curves, times, time, position, velocity):
         velocity[k] = 0.0 if is_outside else along / width
 
 
-@kernel(float64(CUBE, VEC, float64, VEC, float64, float64, float64))
+@kernel(float64(CUBE, VEC, float64, VEC, float64, float64, float64), is_short=True)
 def time_on(curves, times, guess, q, same, slow, latest):
     """
     Return the time within a motion that an arm at q, (dof,), is at; NaN where it is elsewhere.

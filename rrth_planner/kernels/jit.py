@@ -162,16 +162,19 @@ def mark_compiled() -> None:
             stamp.touch()
 
 
-def kernel(signature: Any, inline: str = 'never') -> Callable[[Callable[..., Any]], Any]:
+def kernel(
+    signature: Any, inline: str = 'never', is_short: bool = False
+) -> Callable[[Callable[..., Any]], Any]:
     """
     Return a decorator that compiles a kernel for one signature, and keeps the result.
 
     inline: 'always' writes the kernel out where it is called, for the few whose call costs as much
-    as what they do; the compiler itself takes only the smallest.
+    as what they do; the compiler itself takes only the smallest. is_short: other threads wait
+    while it runs, which takes less time than to get hold of the interpreter once more after it.
     """
     # No `nnan`: a NaN must fail every comparison, and so never be certified.
     options = {
-        'nogil': True,
+        'nogil': not is_short,
         'error_model': 'numpy',
         'inline': inline,
         'fastmath': {'contract', 'arcp', 'nsz'},

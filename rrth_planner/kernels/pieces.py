@@ -2,10 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pieces of a timed motion, one after the other: what is left of it is proven in one go."""
 
-from numba.core.types import float64, int64, void
+from numba.core.types import boolean, float64, int64, void
 import numpy as np
-from rrth_planner.kernels.arm_validity import prove_curve
-from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT
+from rrth_planner.kernels.arm_validity import is_configuration_free, prove_curve
+from rrth_planner.kernels.boxes import pack, rows_of
+from rrth_planner.kernels.jit import (
+    BOX_ROWS,
+    CHAIN,
+    CUBE,
+    D,
+    kernel,
+    LANES,
+    MAT,
+    OUT_MAT,
+    VEC,
+)
 
 
 @kernel(void(MAT, float64, OUT_MAT))
@@ -49,3 +60,53 @@ def prove_pieces(curves, speeds, bends, first, begin, resolution, chain, robot, 
         if proof != 1:
             return 2 * i + (1 if proof == 0 else 0)
     return -1
+
+
+@kernel(
+    boolean(CUBE, VEC, MAT, MAT, float64, float64, float64, CHAIN, MAT, MAT, MAT, float64, int64),
+    is_short=True,
+)
+def is_rest_free(
+    curves,
+    times,
+    speeds,
+    bends,
+    begin,
+    reach,
+    resolution,
+    chain,
+    robot,
+    boxes,
+    T_arm_base,
+    growth,
+    depth,
+):
+    """
+    Return whether what is left of a motion is proven free of boxes that were just seen.
+
+    In one go, since a moving arm waits for it. At the end a ray of length `reach` has to be free
+    too [m]. curves (n, 6, dof), times (n + 1,), speeds and bends (n, dof): pieces of the motion as
+    for `prove_pieces`, of which only what comes after `begin` counts [s]; boxes (m, 15),
+    T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`.
+    """
+    n, n_pieces = boxes.shape[0], curves.shape[0]
+    rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
+    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
+    rows_of(boxes, T_arm_base, growth, rows)
+    pack(rows, depth, groups, lanes)
+    q_end = np.empty(curves.shape[2])
+    for k in range(curves.shape[2]):
+        q_end[k] = 0.0
+        for power in range(curves.shape[1]):
+            q_end[k] += curves[n_pieces - 1, power, k]
+    ray = robot[robot.shape[0] - 1, D]
+    if not is_configuration_free(q_end, max(ray, reach), chain, groups):
+        return False
+    if begin >= times[n_pieces]:
+        return True
+    first = 0
+    while first < n_pieces - 1 and times[first + 1] <= begin:
+        first += 1
+    share = max(0.0, (begin - times[first]) / (times[first + 1] - times[first]))
+    found = prove_pieces(curves, speeds, bends, first, share, resolution, chain, robot, groups)
+    return found == -1

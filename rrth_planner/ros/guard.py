@@ -102,7 +102,7 @@ class Guard:
         self._foreseer.submit(self._foresee, running, self._stops)
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
-        self.on_body()
+        self.on_body(time.time_ns())
 
     def close(self) -> None:
         """Foresee nothing any more."""
@@ -133,8 +133,8 @@ class Guard:
                 break
         return stop
 
-    def on_body(self) -> None:
-        """Hold the body as it is now against what is left of the motion."""
+    def on_body(self, arrived: int) -> None:
+        """Hold the body, which came at a time [ns], against what is left of the motion."""
         begin = time.perf_counter()
         with self._lock:
             now, parameters = self._now(), self._parameters
@@ -151,7 +151,7 @@ class Guard:
                 return
             assert self.running is not None
             if not scene.boxes:
-                self._stop(phase, now, scene, 'the body is empty', begin)
+                self._stop(phase, now, scene, 'the body is empty', arrived)
             elif not is_still_free(
                 self.running,
                 phase,
@@ -161,7 +161,7 @@ class Guard:
                 ray_guard_length=parameters.ray_guard_length,
                 speeds=speeds,
             ):
-                self._stop(phase, now, scene, 'the wearer moved into the way', begin)
+                self._stop(phase, now, scene, 'the wearer moved into the way', arrived)
             else:
                 self._reporter.recertified(time.perf_counter() - begin)
 
@@ -177,7 +177,7 @@ class Guard:
                 return
             scene = scene_of(self._heard.body.value.at(now))
             why = f'the body is {age:.3f} s old, expected at most {timeout:g} s (body_timeout)'
-            self._stop(phase, now, scene, why, time.perf_counter())
+            self._stop(phase, now, scene, why, time.time_ns())
 
     def _insist(self, now: float) -> None:
         """Stop the arm again where it is seen to go on with the motion it was to stop."""
@@ -216,7 +216,7 @@ class Guard:
         reading = self._heard.joints.value
         return bool(reading is not None and abs(reading.velocities).max() > 0.0)
 
-    def _stop(self, phase: float, now: float, scene: Scene, why: str, begin: float) -> None:
+    def _stop(self, phase: float, now: float, scene: Scene, why: str, arrived: int) -> None:
         """Publish the braking trajectory from where the arm is; the lock is held."""
         running, parameters, goal = self.running, self._parameters, self._goal
         assert running is not None
@@ -239,7 +239,7 @@ class Guard:
                 self._say(Watch.WATCHING, f'{why}{warning}')
                 return
         self._publishers.publish_motion(stopped.trajectory, parameters, now)
-        took = time.perf_counter() - begin
+        took = 1e-9 * (time.time_ns() - arrived)
         self._stopped_from = running
         self.running, self.n_brakes = stopped, self.n_brakes + 1
         sentence = (

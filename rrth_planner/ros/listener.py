@@ -56,8 +56,8 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
-        # Called after each good body; set once there is somebody to tell.
-        self.on_body: Callable[[], None] = lambda: None
+        # Called after each good body with when it came [ns]; set once there is somebody to tell.
+        self.on_body: Callable[[int], None] = lambda arrived: None
         self._history = BodyHistory()
         self._subscriptions = [
             self._subscribe(
@@ -72,8 +72,8 @@ class Listener:
         kind: type,
         topic: str,
         heard: Input[Any],
-        on_message: Callable[[Any, int], None],
-        on_late: Callable[[Any, int], None] | None = None,
+        on_message: Callable[[Any, int, int], None],
+        on_late: Callable[[Any, int, int], None] | None = None,
     ) -> OpenSubscription:
         def refuse(problem: MessageError) -> None:
             def read() -> Any:
@@ -87,7 +87,7 @@ class Listener:
         """Return the goal of a request's own target, or raise MessageError."""
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
-    def _on_body(self, msg: MarkerArray, sent: int) -> None:
+    def _on_body(self, msg: MarkerArray, sent: int, arrived: int) -> None:
         now, body = self._now(), self._inputs.body
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(body)
@@ -97,14 +97,14 @@ class Listener:
             return self._history.apply(body.value, edits, sent, now)
 
         if self._take(body, read, now):
-            self.on_body()
+            self.on_body(arrived)
 
-    def _on_target(self, msg: PointStamped, _: int) -> None:
+    def _on_target(self, msg: PointStamped, *_: int) -> None:
         if not msg.header.frame_id:
             self._warn_of_empty_frame(self._inputs.target)
         self._take(self._inputs.target, lambda: self.goal(msg), self._now())
 
-    def _on_joints(self, msg: JointState, _: int) -> None:
+    def _on_joints(self, msg: JointState, *_: int) -> None:
         # Other machines share this topic; a message without any joint of ours is none of ours.
         if not has_joint_of(msg, self._joint_names):
             return

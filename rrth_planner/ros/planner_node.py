@@ -159,7 +159,10 @@ def main(args: list[str] | None = None) -> int:
         pass
     except (RrthError, ParameterException, RuntimeError) as problem:
         if node is not None:
-            raise
+            if rclpy.ok():
+                raise
+            # The executor was about to wait when a signal ended the context.
+            return 0
         get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
         return 1
     finally:

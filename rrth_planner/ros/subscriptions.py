@@ -3,6 +3,7 @@
 """A subscription that hears every publisher: best effort, reliable, or latched before it began."""
 
 from collections.abc import Callable
+import time
 import traceback
 from typing import Any
 
@@ -96,10 +97,10 @@ class OpenSubscription:
     msg_type : type
     topic : str
     on_message : callable
-        Gets each message, and when it was sent [ns]: these times never fall.
+        Gets each message, when it was sent and when it came [ns]: the first of these never fall.
     on_late : callable, optional
-        Gets each message that is older than one before, and when it was sent [ns]; without,
-        these are dropped, since the last one wins.
+        Gets each message that is older than one before, when it was sent and when it came [ns];
+        without, these are dropped, since the last one wins.
     on_refusal : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
 
@@ -110,8 +111,8 @@ class OpenSubscription:
         node: Node,
         msg_type: type,
         topic: str,
-        on_message: Callable[[Any, int], None],
-        on_late: Callable[[Any, int], None] | None = None,
+        on_message: Callable[[Any, int, int], None],
+        on_late: Callable[[Any, int, int], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
     ) -> None:
         """Begin to listen."""
@@ -164,7 +165,7 @@ class OpenSubscription:
 
     def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
         if self._filter.counts_live(_stamp_of(info)):
-            self._hand_on(data, self._on_message, self._filter.newest)
+            self._hand_on(data, self._on_message, self._filter.newest, info)
 
     def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
         stamp = _stamp_of(info)
@@ -172,11 +173,17 @@ class OpenSubscription:
         if not self._filter.counts_reliable(stamp):
             return
         if not is_late:
-            self._hand_on(data, self._on_message, self._filter.newest)
+            self._hand_on(data, self._on_message, self._filter.newest, info)
         elif self._on_late is not None:
-            self._hand_on(data, self._on_late, stamp[0])
+            self._hand_on(data, self._on_late, stamp[0], info)
 
-    def _hand_on(self, data: bytes, hearer: Callable[[Any, int], None], sent: int) -> None:
+    def _hand_on(
+        self,
+        data: bytes,
+        hearer: Callable[[Any, int, int], None],
+        sent: int,
+        info: dict[str, Any],
+    ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
         try:
             msg = decoded(data, self._msg_type)
@@ -184,7 +191,8 @@ class OpenSubscription:
             self._on_refusal(problem)
             return
         try:
-            hearer(msg, sent)
+            # Not every middleware says when it came.
+            hearer(msg, sent, info.get('received_timestamp') or time.time_ns())
         except Exception:
             self._node.get_logger().error(
                 f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'

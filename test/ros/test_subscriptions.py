@@ -88,13 +88,13 @@ def test_the_last_message_is_the_last_that_counts_and_none_is_missed(case):
 def test_a_late_latched_target_does_not_override_a_newer_one():
     node, heard, late = Node('hearer'), [], []
     subscriptions = [
-        OpenSubscription(node, PointStamped, 'target', lambda msg, _: heard.append(msg)),
+        OpenSubscription(node, PointStamped, 'target', lambda msg, *_: heard.append(msg)),
         OpenSubscription(
             node,
             PointStamped,
             'target',
-            lambda msg, _: heard.append(msg),
-            lambda msg, sent: late.append((msg.point.x, sent)),
+            lambda msg, *_: heard.append(msg),
+            lambda msg, sent, _: late.append((msg.point.x, sent)),
         ),
     ]
     new, old = (serialize_message(target(x)) for x in (2.0, 1.0))
