@@ -3,17 +3,14 @@
 """While the arm moves the wearer may move too: each new body is held against what is left."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
 from threading import RLock
 import time
 
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.braking import brake
 from rrth_planner.certificate import least_clearance
-from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
+from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
@@ -21,16 +18,13 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import follows, joined
+from rrth_planner.takeover import follows
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
+from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
-# Between two times of a running motion from which the soonest stop is found, and how long before
-# such a time is due [s].
-FORESEEN, AHEAD = 0.06, 0.12
 # An arm that is not on its stop after this time is told again [s].
 PATIENCE = 0.05
 # An arm that stands still so long after the begin of a motion does not follow it [s].
@@ -82,9 +76,6 @@ class Guard:
         self._stopped_from: RunningMotion | None = None
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
-        # Stops from some times of the running motion on, found while it runs.
-        self._stops: list[tuple[float, Trajectory]] = []
-        self._foreseer = ThreadPoolExecutor(max_workers=1, thread_name_prefix='stops')
         self._before: tuple[Scene, float] | None = None
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
@@ -98,40 +89,17 @@ class Guard:
         """Watch a motion from now on by the parameters of its plan; the lock is held."""
         self._parameters = parameters
         self.running, self._goal, self._stopped_from = running, goal, None
-        self._stops = []
-        self._foreseer.submit(self._foresee, running, self._stops)
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body(time.time_ns())
 
     def close(self) -> None:
-        """Foresee nothing any more."""
+        """Watch nothing any more."""
         self.running = None
-        self._foreseer.shutdown(wait=True, cancel_futures=True)
-
-    def _foresee(self, running: RunningMotion, stops: list[tuple[float, Trajectory]]) -> None:
-        """Find the soonest stop from every so many times on, which takes milliseconds each."""
-        limits, start = self._parameters.limits, time.monotonic()
-        for begin in np.arange(FORESEEN, running.trajectory.duration, FORESEEN).tolist():
-            # No sooner than it may be needed: the other threads have to hear and to plan.
-            while self.running is running and time.monotonic() < start + begin - AHEAD:
-                time.sleep(0.01)
-            if self.running is not running:
-                return
-            stops.append((begin, brake(running.trajectory, begin, limits)))
 
     def _stop_of(self, running: RunningMotion, phase: float) -> Trajectory:
-        """Return the soonest stop that is known, from where the arm is."""
-        motion = running.trajectory
-        phase = min(max(phase, 0.0), motion.duration)
-        stop = emergency_stop(motion, phase, self._parameters.limits)
-        for begin, foreseen in self._stops:
-            # What has to reach the controller takes its time.
-            if begin >= phase + ON_ITS_WAY:
-                if begin - phase + foreseen.duration < stop.duration:
-                    stop = joined(between(motion, phase, begin), foreseen)
-                break
-        return stop
+        """Return the soonest stop that is found at once, from where the arm is."""
+        return emergency_stop(running.trajectory, phase, self._parameters.limits)
 
     def on_body(self, arrived: int) -> None:
         """Hold the body, which came at a time [ns], against what is left of the motion."""

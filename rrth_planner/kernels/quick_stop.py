@@ -1,0 +1,138 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A quick search for a stop along a motion, for when there is no time for a proof."""
+
+import math
+
+from numba.core.types import float64, int64
+import numpy as np
+from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, VEC
+from rrth_planner.kernels.stop_points import (
+    CLOSEST,
+    CLOSEST_FIRST,
+    is_within,
+    stop_states,
+    stop_times,
+    TICK,
+)
+from rrth_planner.kernels.stop_search import soonest_stop
+from rrth_planner.kernels.stops import stop_way
+from rrth_planner.kernels.way_ahead import derivatives_on, look_ahead, MOST, TIME, WAY
+
+# How far is looked ahead at first, in times that a stop on a line takes; then so many times
+# further. Cells are no longer than this [s], but for their number.
+AHEAD, FURTHER, CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
+# The shares of the limits that may be used: at first a little more, since the motion itself may be
+# at one when it begins to stop; less where the points of the stop turn out to take too much.
+RESERVES = (1.003, 0.985, 0.95, 0.85)
+
+
+@kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE))
+def rest_of_motion(curves, times, now, last, points, states):
+    """Write the points of a motion from now up to one at which it rests; return their number."""
+    state, n, dof = np.empty((4, curves.shape[2])), 0, curves.shape[2]
+    for i in range(last + 1):
+        if i < last and times[i + 1] - now < CLOSEST_FIRST:
+            continue
+        # The first point is now.
+        points[n] = 0.0 if n == 0 else math.ceil((times[i] - now) / TICK) * TICK
+        time = times[i] if i == last else now + points[n]
+        derivatives_on(curves, times, min(i, last - 1), time, state)
+        for order in range(3):
+            for k in range(dof):
+                states[order, n, k] = 0.0 if i == last and order > 0 else state[order, k]
+        n += 1
+    return n
+
+
+@kernel(int64(CUBE, VEC, float64))
+def first_rest(curves, times, now):
+    """Return the first point of a motion after some time [s] at which it stands still."""
+    n = curves.shape[0]
+    for i in range(1, n):
+        if times[i] > now and not curves[i, 1:3].any():
+            return i
+    return n
+
+
+@kernel(float64(VEC, float64))
+def off_points(times, begin):
+    """Return the next time that is at a point of a motion, or not close to any [s]."""
+    for i in range(times.shape[0]):
+        if abs(times[i] - begin) < CLOSEST:
+            begin = times[i] if times[i] >= begin else times[i] + CLOSEST
+    return begin
+
+
+@kernel(float64(CUBE, VEC, float64, MAT))
+def first_look(curves, times, time, limits):
+    """Return how far to look ahead from a time for a stop, as if the arm moved on a line [s]."""
+    state, window, piece = np.empty((4, curves.shape[2])), 0.0, 0
+    while times[piece + 1] < time:
+        piece += 1
+    derivatives_on(curves, times, piece, time, state)
+    for k in range(curves.shape[2]):
+        ramp = (limits[1, k] + abs(state[2, k])) / limits[2, k]
+        window = max(window, AHEAD * (abs(state[1, k]) / limits[1, k] + ramp))
+    return window
+
+
+@kernel(int64(VEC, float64, float64))
+def points_between(times, begin, end):
+    """Return how many points of a motion lie between two times [s]."""
+    n = 0
+    for i in range(times.shape[0]):
+        if begin < times[i] < end:
+            n += 1
+    return n
+
+
+@kernel(int64(CUBE, VEC, float64, float64, MAT, OUT_VEC, OUT_CUBE))
+def quick_stop(curves, times, now, lead, limits, points, states):
+    """
+    Write the points of the soonest stop that is found; return their number.
+
+    Parameters
+    ----------
+    curves : array, shape (n, 6, dof)
+        Pieces of the motion, as from `trajectory.piece_coefficients`.
+    times : array, shape (n + 1,)
+        [s].
+    now, lead : float
+        When the stop is asked for, within the motion, and how long it goes on as it is [s].
+    limits : array, shape (3, dof)
+        Velocity, acceleration, jerk.
+    points : array, shape (m,)
+        Written [s].
+    states : array, shape (3, m, dof)
+        Written: positions, velocities, accelerations.
+
+    """
+    dof, phases = curves.shape[2], np.empty((3, 5))
+    rest = first_rest(curves, times, now)
+    end, begin = times[rest], off_points(times, now + lead)
+    window = 0.0
+    while begin + window < end:
+        window = FURTHER * window if window > 0.0 else first_look(curves, times, begin, limits)
+        until = min(begin + window, end)
+        step = max(CELL, (until - now) / MOST_CELLS)
+        # A piece of the motion may end with a shorter cell, and so may the lead.
+        most = int((until - now) / step) + points_between(times, now, until) + 3
+        rows, pieces = np.empty((most + 1, 4)), np.empty(most, np.int64)
+        geometry = np.empty((most, 3, 3, dof))
+        n = look_ahead(curves, times, now, begin, until, step, limits, rows, pieces, geometry)
+        rows, pieces, first = rows[: n + 1], pieces[:n], 0
+        while rows[first, TIME] < begin:
+            first += 1
+        for reserve in RESERVES:
+            row = soonest_stop(rows, geometry, pieces, first, n, limits, end, reserve, phases)
+            if row < 0:
+                break
+            m = stop_times(rows, pieces, phases, row, points)
+            stop_states(curves, times, rows, pieces, phases, row, limits, points[:m], states)
+            last, reached = row, stop_way(phases)
+            while rows[last + 1, WAY] < reached:
+                last += 1
+            if is_within(points[:m], states, rows[row, TIME] - now, geometry[last, MOST]):
+                return m
+    return rest_of_motion(curves, times, now, rest, points, states)

@@ -1,0 +1,167 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A stop along a motion as points of a trajectory, and whether that keeps limits."""
+
+import math
+
+from numba.core.types import boolean, float64, int64, void
+import numpy as np
+from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_INTS, VEC
+from rrth_planner.kernels.stops import A, J, LASTS, stop_way, V, X
+from rrth_planner.kernels.way_ahead import derivatives_on, TIME, time_after, WAY
+
+# Points of a stop are no further apart, and no closer [s]: the closer, the more of the jerk
+# between them is rounding, and the further from its place a jump of the jerk that gets no point.
+SPACING, CLOSEST, CLOSEST_FIRST = 0.025, 5e-5, 1e-5
+# Messages carry whole nanoseconds [s].
+TICK = 1e-9
+# Halvings of a phase to find when a stop has come so far.
+HALVINGS = 45
+# Instants of a piece at which limits are looked at, what may be missed between them, and by which
+# factor it may be too fast: less than 1 % of its acceleration and jerk.
+INSTANTS, ALLOWED, WITHIN = 17, 1.002, 1.0025
+# Of a jerk times the cube of the time between two points, in shares of a position.
+ROUNDING = 300 * 2.3e-16
+
+
+@kernel(float64(MAT, float64))
+def passing_time(phases, way):
+    """Return how long after its begin a stop has come so far [s]; it does."""
+    before = 0.0
+    for p in range(3):
+        x, v, a, j = phases[p, X], phases[p, V], phases[p, A], phases[p, J]
+        low, high = 0.0, phases[p, LASTS]
+        if p == 2 or x + high * (v + high * (0.5 * a + high * j / 6.0)) >= way:
+            for _ in range(HALVINGS):
+                t = 0.5 * (low + high)
+                if x + t * (v + t * (0.5 * a + t * j / 6.0)) < way:
+                    low = t
+                else:
+                    high = t
+            return before + high
+        before += high
+    return before
+
+
+@kernel(int64(MAT, READ_INTS, MAT, int64, OUT_VEC))
+def stop_times(rows, pieces, phases, begin, points):
+    """Write when a stop that begins with a row has its points, from the first row on [s]."""
+    marks, m, now = np.empty(rows.shape[0] + 5), 1, rows[0, TIME]
+    marks[0] = 0.0
+    start, end = rows[begin, TIME] - now, stop_way(phases)
+    after = start
+    for p in range(3):
+        marks[m], m = after, m + 1
+        after += phases[p, LASTS]
+    row = 1
+    # Where the motion passes from one piece to the next its jerk jumps.
+    while row < pieces.shape[0] and (row <= begin or rows[row, WAY] < end):
+        if pieces[row] != pieces[row - 1]:
+            if row <= begin:
+                marks[m] = rows[row, TIME] - now
+            else:
+                marks[m] = start + passing_time(phases, rows[row, WAY])
+            m += 1
+        row += 1
+    marks[:m].sort()
+    points[0], n, kept = 0.0, 1, 0.0
+    for i in range(1, m + 1):
+        mark = marks[i] if i < m else after
+        is_close = mark - kept < (CLOSEST_FIRST if kept == 0.0 else CLOSEST)
+        if i < m and (is_close or after - mark < CLOSEST):
+            continue
+        parts = 1 if mark <= start else max(1, math.ceil((mark - kept) / SPACING))
+        for part in range(1, parts + 1):
+            points[n] = math.ceil((kept + (mark - kept) * part / parts) / TICK) * TICK
+            n += 1
+        kept = mark
+    return n
+
+
+@kernel(void(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, OUT_CUBE))
+def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out):
+    """Write position, velocity and acceleration at all points of a stop, (3, n, dof)."""
+    n, dof = points.shape[0], curves.shape[2]
+    states, cell, phase = np.empty((4, dof)), 0, 0
+    start, now = rows[begin, TIME] - rows[0, TIME], rows[0, TIME]
+    phase_begin = start
+    # From a piece that ends at once there is no point but this.
+    while rows[cell + 1, TIME] - now < CLOSEST_FIRST:
+        cell += 1
+    for i in range(n):
+        rate, slope = 1.0, 0.0
+        if points[i] <= start:
+            time = now + points[i]
+            while cell < begin and rows[cell + 1, TIME] <= time:
+                cell += 1
+            derivatives_on(curves, times, pieces[cell], time, states)
+        else:
+            while phase < 2 and points[i] >= phase_begin + phases[phase, LASTS]:
+                phase_begin += phases[phase, LASTS]
+                phase += 1
+            t = min(points[i] - phase_begin, phases[phase, LASTS])
+            v0, a0, j = phases[phase, V], phases[phase, A], phases[phase, J]
+            x = phases[phase, X] + t * (v0 + t * (0.5 * a0 + t * j / 6.0))
+            while cell < pieces.shape[0] - 1 and (cell < begin or rows[cell + 1, WAY] <= x):
+                cell += 1
+            time = time_after(
+                curves,
+                times,
+                pieces[cell],
+                rows[cell, TIME],
+                rows[cell + 1, TIME],
+                x - rows[cell, WAY],
+                limits,
+            )
+            derivatives_on(curves, times, pieces[cell], time, states)
+            vv, va = 0.0, 0.0
+            for k in range(dof):
+                vv += (states[1, k] / limits[1, k]) ** 2
+                va += states[1, k] * states[2, k] / limits[1, k] ** 2
+            w = math.sqrt(vv)
+            rate = (v0 + t * (a0 + 0.5 * t * j)) / w
+            slope = (a0 + t * j - va / w * rate * rate) / w
+        if i == n - 1:
+            rate, slope = 0.0, 0.0
+        for k in range(dof):
+            out[0, i, k], out[1, i, k] = states[0, k], states[1, k] * rate
+            out[2, i, k] = states[2, k] * rate * rate + states[1, k] * slope
+
+
+@kernel(boolean(VEC, CUBE, float64, MAT))
+def is_within(points, states, begin, most):
+    """
+    Return whether the quintics through the points that come after `begin` keep limits, (3, dof).
+
+    As `timing.limit_ratio`: between two of the instants, h apart, a function f is no greater than
+    there by more than h^2 / 8 max|f''|.
+    """
+    between = 0.125 / (INSTANTS - 1) ** 2
+    for i in range(points.shape[0] - 1):
+        if points[i + 1] <= begin + TICK:
+            continue
+        T = points[i + 1] - points[i]
+        for k in range(most.shape[1]):
+            c1, c2 = states[1, i, k] * T, 0.5 * states[2, i, k] * T * T
+            p = states[0, i + 1, k] - states[0, i, k] - c1 - c2
+            v = states[1, i + 1, k] * T - c1 - 2.0 * c2
+            a = states[2, i + 1, k] * T * T - 2.0 * c2
+            c3, c4, c5 = 10 * p - 4 * v + 0.5 * a, -15 * p + 7 * v - a, 6 * p - 3 * v + 0.5 * a
+            # What positions of so many digits leave of a piece so short.
+            noise = ROUNDING * abs(states[0, i, k])
+            top = most[0, k] * ALLOWED * WITHIN * T - between * (
+                6 * abs(c3) + 24 * abs(c4) + 60 * abs(c5)
+            )
+            grip = most[1, k] * ALLOWED * WITHIN**2 * T**2 - between * (
+                24 * abs(c4) + 120 * abs(c5)
+            )
+            snap = most[2, k] * ALLOWED * WITHIN**3 * T**3 + noise - between * 120 * abs(c5)
+            for instant in range(INSTANTS):
+                u = instant / (INSTANTS - 1)
+                if not abs((((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1) <= top:
+                    return False
+                if not abs(((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + 2 * c2) <= grip:
+                    return False
+                if not abs((60 * c5 * u + 24 * c4) * u + 6 * c3) <= snap:
+                    return False
+    return True

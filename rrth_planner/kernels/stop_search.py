@@ -1,0 +1,105 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The soonest of many stops along the way ahead: first on a grid, then near the best of that."""
+
+import math
+
+from numba.core.types import boolean, float64, int64
+import numpy as np
+from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
+from rrth_planner.kernels.stops import line_stop, seems_to_hold
+from rrth_planner.kernels.way_ahead import BEGIN, CUBES, SLOPE, SPEED, TIME, WAY
+
+# What is tried, as shares of what the limits leave along the way: decelerations, jerks; and how
+# long after another delay the next one is tried, or one that ends at a point of the motion [s].
+DECELERATIONS = (1.0, 0.9, 0.8, 0.7, 0.55, 0.4, 0.25, 0.12)
+JERKS = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
+DELAY, DELAY_TO_POINT = 0.025, 0.01
+# Then what is near the best, twice: by how many cells its delay changes, by which factors its
+# shares: both, one of them, or one up and the other down.
+ROUNDS, CELLS_NEAR, FACTORS = 2, (4, -4, 2, -2, 1, -1), (1.15, 1.07, 1.03, 1.01)
+POWERS = ((1, 1), (0, 1), (1, 0), (-1, 1), (1, -1))
+# Entries of `best`: when it ends [s], the row that it begins with, shares of deceleration, jerk.
+ENDS, ROW, DECELERATION, JERK = range(4)
+
+
+@kernel(
+    boolean(
+        int64,
+        float64,
+        float64,
+        MAT,
+        CUBES,
+        READ_INTS,
+        int64,
+        MAT,
+        float64,
+        OUT_VEC,
+        OUT_MAT,
+        OUT_MAT,
+    )
+)
+def try_stop(
+    row, deceleration, jerk, rows, geometry, pieces, n, limits, reserve, best, phases, tried
+):
+    """Write a stop to `best` and `phases` if it ends sooner and keeps limits; return whether."""
+    grip, snap = math.inf, math.inf
+    for k in range(limits.shape[1]):
+        t = abs(geometry[row, BEGIN, 0, k]) + 1e-300
+        grip, snap = min(grip, limits[1, k] / t), min(snap, limits[2, k] / t)
+    grip, snap = grip * deceleration, snap * jerk
+    way, speed, slope = rows[row, WAY], rows[row, SPEED], rows[row, SLOPE]
+    end = rows[row, TIME] + line_stop(way, speed, slope, grip, snap, tried)
+    if not end < best[ENDS] or not seems_to_hold(tried, rows, geometry, pieces, row, n, reserve):
+        return False
+    best[ENDS], best[ROW], best[DECELERATION], best[JERK] = end, row, deceleration, jerk
+    phases[:] = tried
+    return True
+
+
+@kernel(int64(MAT, CUBES, READ_INTS, int64, int64, MAT, float64, float64, OUT_MAT))
+def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phases):
+    """
+    Write the soonest stop found; return the row that it begins with, or -1.
+
+    Parameters
+    ----------
+    rows, geometry, pieces : array
+        The cells ahead, as from `look_ahead`.
+    first, n : int
+        The first row that it may begin with; number of cells.
+    limits : array, shape (3, dof)
+        Velocity, acceleration, jerk.
+    before : float
+        When it has to have ended: a time within the motion, if that went on as it is [s].
+    reserve : float
+        The share of the limits that it may use.
+    phases : array, shape (3, 5)
+        Written.
+
+    """
+    best, tried = np.array([before, -1.0, 0.0, 0.0]), np.empty((3, 5))
+    ahead = (rows, geometry, pieces, n, limits, reserve, best, phases, tried)
+    delayed = first
+    for row in range(first, n):
+        if rows[row, TIME] >= best[ENDS]:
+            break
+        is_point = row > 0 and pieces[row] != pieces[row - 1]
+        pause = rows[row, TIME] - rows[delayed, TIME]
+        if row == first or pause >= (DELAY_TO_POINT if is_point else DELAY) - 1e-9:
+            delayed = row
+            for jerk in JERKS:
+                for deceleration in DECELERATIONS:
+                    try_stop(row, deceleration, jerk, *ahead)
+    if best[ROW] < 0.0:
+        return -1
+    for _ in range(ROUNDS):
+        for cells in CELLS_NEAR:
+            row = int(best[ROW]) + cells
+            if first <= row < n:
+                try_stop(row, best[DECELERATION], best[JERK], *ahead)
+        for factor in FACTORS:
+            for by_d, by_j in POWERS:
+                deceleration = best[DECELERATION] * factor**by_d
+                try_stop(int(best[ROW]), deceleration, best[JERK] * factor**by_j, *ahead)
+    return int(best[ROW])
