@@ -79,6 +79,8 @@ class Guard:
         self._before: tuple[Scene, float] | None = None
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
+        # Has a stop that was published as free judged once more; set by the owner.
+        self.judge: Callable[[Trajectory, Scene, PointingGoal], None] = lambda *_: None
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
@@ -220,6 +222,8 @@ class Guard:
             self._node.get_logger().error(sentence)
         else:
             self._node.get_logger().warning(sentence)
+        if not warning and goal is not None and len(scene.boxes):
+            self.judge(stopped.trajectory, scene, goal)
         if self._reporter.parameters.replan and goal is not None:
             self.plan_again(goal, stopped.trajectory.duration)
         else:

@@ -23,7 +23,9 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
+from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED
+from rrth_planner.trajectory import Trajectory
 from rrth_planner.underway import RunningMotion
 
 
@@ -91,6 +93,7 @@ class PlanQueue:
         self._lock = RLock()
         self.guard = Guard(node, heard, reporter, self._publishers, self._lock)
         self.guard.plan_again = self._plan_again
+        self.guard.judge = self._judge
         self._open: set[_Ticket] = set()
         self._is_closed = False
 
@@ -250,6 +253,22 @@ class PlanQueue:
 
         with self._lock:
             self._open.add(ticket)
+        self.prepare(work)
+
+    def _judge(self, stop: Trajectory, scene: Scene, goal: PointingGoal) -> None:
+        """Have the second judge look at a stop that was published."""
+        # Loaded late, as what plans is.
+        from rrth_planner.ros.second_opinion import incident_of_stop
+
+        parameters = self._reporter.parameters
+
+        def work() -> None:
+            incident = incident_of_stop(stop, scene, goal, parameters)
+            if incident is not None:
+                noted, file = keep(incident, parameters.incident_folder)
+                self._reporter.incident(file)
+                self._node.get_logger().error(f'the arm brakes, but {incident.sentence}{noted}')
+
         self.prepare(work)
 
     def _wait_for_rest(self, ticket: _Ticket, wait: float) -> None:

@@ -16,11 +16,13 @@ pytest.importorskip('fcl')
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner import pipeline  # noqa: E402
+from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.options import RRTStarOptions  # noqa: E402
-from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros import requests, second_opinion  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.ros.messages import scene_of  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
@@ -108,6 +110,33 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     stranger.wait_until(lambda: not inputs_of(planner).joints.value.velocities.any())
     assert stranger.answer().success
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
+    start, monkeypatch, tmp_path
+):
+    planner, stranger = start(incident_folder=str(tmp_path), seed=5)
+    say_all(planner, stranger)
+    assert stranger.answer().success
+    guard = planner._queue.guard
+    stop = emergency_stop(guard.running.trajectory, 0.3, planner._reporter.parameters.limits)
+    scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
+    guard.judge(stop, scene, goal)
+    guard.judge(stop, scene, goal)
+    with monkeypatch.context() as patch:
+        # What agrees leaves nothing behind.
+        planner._queue._worker.submit(lambda: None).result(30.0)
+        assert not list(tmp_path.iterdir())
+        patch.setattr(second_opinion, 'first_touch', lambda *_: TOUCH)
+        guard.judge(stop, scene, goal)
+        planner._queue._worker.submit(lambda: None).result(30.0)
+    (file,) = tmp_path.iterdir()
+    stranger.wait_until(lambda: stranger.value('last incident') == str(file))
+    assert stranger.value('incidents') == '1'
+    incident = read_incident(file)
+    assert incident.touch == TOUCH
+    np.testing.assert_array_equal(incident.trajectory.positions, stop.positions)
+    assert replayed(file)[0] == 1
 
 
 def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkeypatch, tmp_path):
