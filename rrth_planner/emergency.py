@@ -44,10 +44,19 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
             velocities=still,
             accelerations=still,
         )
-    table = np.stack([limits.velocity, limits.acceleration, limits.jerk])
     most = len(trajectory.times) + 8 + int(trajectory.duration / SPACING)
     times, states = np.empty(most), np.empty((3, most, dof))
-    n = quick_stop(curves, trajectory.times, time, ON_ITS_WAY, table, times, states)
+    n = quick_stop(
+        curves,
+        trajectory.times,
+        time,
+        ON_ITS_WAY,
+        limits.velocity,
+        limits.acceleration,
+        limits.jerk,
+        times,
+        states,
+    )
     return Trajectory(
         times=times[:n],
         positions=states[0, :n],

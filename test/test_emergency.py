@@ -157,6 +157,18 @@ def test_a_motion_that_rests_on_its_way_is_followed_no_further():
     np.testing.assert_allclose(stop.positions[-1], q[1], atol=1e-9)
 
 
+def test_points_a_nanosecond_apart_do_no_harm():
+    motion = parameterize(Path([[0.0] * 4, [1.0, -0.5, 0.3, 0.8]]), (), LIMITS)
+    inner = np.linspace(0.0, motion.duration, 9)[1:-1]
+    times = np.sort(np.concatenate([motion.times, inner, inner + 1e-9, inner + 2e-9]))
+    q, v, a = sample(motion, times)
+    dense = Trajectory(times=times, positions=q, velocities=v, accelerations=a)
+    for time in np.concatenate([inner - 1e-9, inner - 0.01, inner + 1e-9, [0.98 * times[-1]]]):
+        stop = emergency_stop(dense, time, LIMITS)
+        assert path_distance(stop.positions, motion, 0.0, motion.duration).max() < 1e-6
+        assert not stop.velocities[-1].any()
+
+
 @examples(100)
 @given(seed=SEEDS)
 def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):

@@ -30,10 +30,15 @@ RESERVES = (1.003, 0.985, 0.95, 0.85)
 @kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE))
 def rest_of_motion(curves, times, now, last, points, states):
     """Write the points of a motion from now up to one at which it rests; return their number."""
-    state, n, dof = np.empty((4, curves.shape[2])), 0, curves.shape[2]
+    state, n, dof, kept = np.empty((4, curves.shape[2])), 0, curves.shape[2], now
     for i in range(last + 1):
         if i < last and times[i + 1] - now < CLOSEST_FIRST:
             continue
+        # Points that are closer than whole nanoseconds can tell are none.
+        is_close = times[i] - kept < CLOSEST_FIRST or times[last] - times[i] < CLOSEST_FIRST
+        if n > 0 and i < last and is_close:
+            continue
+        kept = times[i]
         # The first point is now.
         points[n] = 0.0 if n == 0 else math.ceil((times[i] - now) / TICK) * TICK
         time = times[i] if i == last else now + points[n]
@@ -87,8 +92,8 @@ def points_between(times, begin, end):
     return n
 
 
-@kernel(int64(CUBE, VEC, float64, float64, MAT, OUT_VEC, OUT_CUBE))
-def quick_stop(curves, times, now, lead, limits, points, states):
+@kernel(int64(CUBE, VEC, float64, float64, VEC, VEC, VEC, OUT_VEC, OUT_CUBE))
+def quick_stop(curves, times, now, lead, velocity, acceleration, jerk, points, states):
     """
     Write the points of the soonest stop that is found; return their number.
 
@@ -100,8 +105,8 @@ def quick_stop(curves, times, now, lead, limits, points, states):
         [s].
     now, lead : float
         When the stop is asked for, within the motion, and how long it goes on as it is [s].
-    limits : array, shape (3, dof)
-        Velocity, acceleration, jerk.
+    velocity, acceleration, jerk : array, shape (dof,)
+        Limits.
     points : array, shape (m,)
         Written [s].
     states : array, shape (3, m, dof)
@@ -109,6 +114,8 @@ def quick_stop(curves, times, now, lead, limits, points, states):
 
     """
     dof, phases = curves.shape[2], np.empty((3, 5))
+    limits = np.empty((3, dof))
+    limits[0], limits[1], limits[2] = velocity, acceleration, jerk
     rest = first_rest(curves, times, now)
     end, begin = times[rest], off_points(times, now + lead)
     window = 0.0

@@ -19,8 +19,9 @@ DELAY, DELAY_TO_POINT = 0.025, 0.01
 # shares: both, one of them, or one up and the other down.
 ROUNDS, CELLS_NEAR, FACTORS = 2, (4, -4, 2, -2, 1, -1), (1.15, 1.07, 1.03, 1.01)
 POWERS = ((1, 1), (0, 1), (1, 0), (-1, 1), (1, -1))
-# Entries of `best`: when it ends [s], the row that it begins with, shares of deceleration, jerk.
-ENDS, ROW, DECELERATION, JERK = range(4)
+# Entries of `best`: when it ends [s], the row that it begins with, shares of deceleration, jerk;
+# and when the one ends that was tried last.
+ENDS, ROW, DECELERATION, JERK, TRIED = range(5)
 
 
 @kernel(
@@ -50,7 +51,12 @@ def try_stop(
     grip, snap = grip * deceleration, snap * jerk
     way, speed, slope = rows[row, WAY], rows[row, SPEED], rows[row, SLOPE]
     end = rows[row, TIME] + line_stop(way, speed, slope, grip, snap, tried)
-    if not end < best[ENDS] or not seems_to_hold(tried, rows, geometry, pieces, row, n, reserve):
+    # Stops that do not get to their decelerations are the same one.
+    is_twin = end == best[TRIED]
+    best[TRIED] = end
+    if is_twin or not end < best[ENDS]:
+        return False
+    if not seems_to_hold(tried, rows, geometry, pieces, row, n, reserve):
         return False
     best[ENDS], best[ROW], best[DECELERATION], best[JERK] = end, row, deceleration, jerk
     phases[:] = tried
@@ -78,7 +84,7 @@ def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phas
         Written.
 
     """
-    best, tried = np.array([before, -1.0, 0.0, 0.0]), np.empty((3, 5))
+    best, tried = np.array([before, -1.0, 0.0, 0.0, 0.0]), np.empty((3, 5))
     ahead = (rows, geometry, pieces, n, limits, reserve, best, phases, tried)
     delayed = first
     for row in range(first, n):
@@ -91,9 +97,15 @@ def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phas
             for jerk in JERKS:
                 for deceleration in DECELERATIONS:
                     try_stop(row, deceleration, jerk, *ahead)
+                    # Smaller shares end later still, of the jerk too.
+                    if not best[TRIED] < best[ENDS]:
+                        break
+                if not best[TRIED] < best[ENDS] and deceleration == DECELERATIONS[0]:
+                    break
     if best[ROW] < 0.0:
         return -1
     for _ in range(ROUNDS):
+        ended = best[ENDS]
         for cells in CELLS_NEAR:
             row = int(best[ROW]) + cells
             if first <= row < n:
@@ -102,4 +114,6 @@ def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phas
             for by_d, by_j in POWERS:
                 deceleration = best[DECELERATION] * factor**by_d
                 try_stop(int(best[ROW]), deceleration, best[JERK] * factor**by_j, *ahead)
+        if best[ENDS] == ended:
+            break
     return int(best[ROW])

@@ -28,9 +28,13 @@ TINY = 1e-9
 
 @kernel(void(CUBE, VEC, int64, float64, OUT_MAT))
 def derivatives_on(curves, times, piece, time, states):
-    """Write position, velocity, acceleration and jerk of one piece at a time, (4, dof)."""
+    """
+    Write position, velocity, acceleration and jerk of one piece at a time, (4, dof).
+
+    A little before and after it the piece goes on, but by no more than half of itself.
+    """
     width = times[piece + 1] - times[piece]
-    u, scale = (time - times[piece]) / width, 1.0 / width
+    u, scale = min(max((time - times[piece]) / width, -0.5), 1.5), 1.0 / width
     for k in range(curves.shape[2]):
         c0, c1, c2 = curves[piece, 0, k], curves[piece, 1, k], curves[piece, 2, k]
         c3, c4, c5 = curves[piece, 3, k], curves[piece, 4, k], curves[piece, 5, k]
