@@ -18,6 +18,8 @@ setup(
         (f'{share}/launch', sorted(glob('launch/*.py'))),
         (f'{share}/config', sorted(glob('config/*.yaml') + glob('config/*.xml'))),
         (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
+        (f'{share}/urdf', sorted(glob('urdf/*.urdf'))),
+        (f'{share}/rviz', sorted(glob('rviz/*.rviz'))),
         (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
     ],
     python_requires='>=3.10',
@@ -26,6 +28,7 @@ setup(
     extras_require={
         'node': ['python-fcl', 'matplotlib'],
         'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
+        'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },
     # The kernels' compiled cache is kept by source file, so these must be real files.
@@ -39,8 +42,15 @@ setup(
             'planner_node = rrth_planner.ros.planner_node:main',
             'playback_node = rrth_planner.ros.playback_node:main',
             'demo = rrth_planner.ros.demo:main',
+            'plan = rrth_planner.plan_files:main',
+            'plot = rrth_planner.viewers.plot:main',
+            'point_at = rrth_planner.ros.point_at:main',
+            'read_urdf = rrth_planner.read_urdf:main',
+            'record = rrth_planner.ros.record:main',
             'replay = rrth_planner.replay:main',
             'reproduce = rrth_planner.reproduce:main',
+            'viewer = rrth_planner.viewers.viewer:main',
+            'write_urdf = rrth_planner.write_urdf:main',
         ],
     },
 )

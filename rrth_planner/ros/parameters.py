@@ -6,26 +6,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError, RrthError
 from rrth_planner.options import ALGORITHMS, TreeOptions
 from rrth_planner.resources import load_arm
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
+from rrth_planner.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
 from rrth_planner.trajectory import MotionLimits
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 LONGEST_TIMEOUT = 86400.0
-LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
-LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 
 
-def settings(dof: int) -> tuple[Setting, ...]:
+def declared(dof: int) -> tuple[Setting, ...]:
     """Return all parameters but `arm`, for an arm of so many joints."""
     each = f'of each of the {dof} joints, or one value for all'
     limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
@@ -135,32 +132,18 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         The first value that is refused: its name, what was given, what is expected, the unit.
 
     """
-    if values['algorithm'] not in ALGORITHMS:
-        raise OptionsError(
-            f'algorithm: "{values["algorithm"]}", expected one that is available: '
-            f'{", ".join(ALGORITHMS)}'
-        )
-    algorithm = ALGORITHMS[values['algorithm']]
+    settings = settings_from_values(values, arm.dof)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
     return PlannerParameters(
         arm=arm,
         base_frame=values['base_frame'],
-        seed=values['seed'],
-        margin=values['margin'],
-        ray_guard_length=values['ray_guard_length'],
-        escape_depth=values['escape_depth'],
         body_timeout=values['body_timeout'],
         joint_timeout=values['joint_timeout'],
         max_body_speed=values['max_body_speed'],
         replan=values['replan'],
         incident_folder=values['incident_folder'],
-        limits=MotionLimits(
-            velocity=_of_each_joint('max_velocity', values, arm.dof),
-            acceleration=_of_each_joint('max_acceleration', values, arm.dof),
-            jerk=_of_each_joint('max_jerk', values, arm.dof),
-        ),
-        options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
+        **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
 
 
@@ -176,8 +159,8 @@ def declare_parameters(node: Node) -> PlannerParameters:
     """
     declare(node, (ARM,))
     arm = load_arm(node.get_parameter(ARM.name).value)
-    refuse_unknown(node, (ARM, *settings(arm.dof)))
-    declare(node, settings(arm.dof))
+    refuse_unknown(node, (ARM, *declared(arm.dof)))
+    declare(node, declared(arm.dof))
 
     def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
         values = _values(node, arm) | {change.name: change.value for change in changes}
@@ -197,14 +180,4 @@ def current_parameters(node: Node, arm: ArmModel) -> PlannerParameters:
 
 
 def _values(node: Node, arm: ArmModel) -> dict[str, Any]:
-    return {setting.name: node.get_parameter(setting.name).value for setting in settings(arm.dof)}
-
-
-def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
-    given = list(values[name])
-    if len(given) not in (1, dof) or not all(LOWEST_LIMIT <= v <= HIGHEST_LIMIT for v in given):
-        raise OptionsError(
-            f'{name}: {given}, expected {dof} values, or one for all joints, from '
-            f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{LIMIT_UNITS[name]}]'
-        )
-    return np.array(given if len(given) == dof else given * dof)
+    return {setting.name: node.get_parameter(setting.name).value for setting in declared(arm.dof)}

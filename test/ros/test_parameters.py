@@ -17,7 +17,7 @@ from rrth_planner.ros.declaring import ARM  # noqa: E402
 from rrth_planner.ros.parameters import (  # noqa: E402
     current_parameters,
     declare_parameters,
-    settings,
+    declared,
 )
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -50,12 +50,12 @@ def test_the_defaults_are_those_of_the_core(started):
 
 def test_the_packaged_file_holds_every_parameter_with_its_default():
     file = load_yaml(resource_path('config/planner.yaml'))['/**']['ros__parameters']
-    assert file == {s.name: s.default for s in (ARM, *settings(4))}
+    assert file == {s.name: s.default for s in (ARM, *declared(4))}
 
 
 def test_every_parameter_says_its_unit_and_range(started):
     node, _ = started()
-    for setting in (ARM, *settings(4)):
+    for setting in (ARM, *declared(4)):
         descriptor = node.describe_parameter(setting.name)
         assert descriptor.description.endswith(f'[{setting.unit}]')
         (numeric,) = [
@@ -142,7 +142,7 @@ def test_a_bad_override_is_refused_at_the_start(started, name, value, error):
 
 
 def test_every_option_of_the_core_is_a_parameter():
-    assert {f.name for f in fields(RRTHOptions)} <= {s.name for s in settings(4)}
+    assert {f.name for f in fields(RRTHOptions)} <= {s.name for s in declared(4)}
 
 
 def test_an_arm_of_ones_own_is_loaded(started, tmp_path):

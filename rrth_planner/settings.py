@@ -1,0 +1,123 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""How to plan, as a file says it: the parameters of the node that decide about a plan."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.errors import OptionsError
+from rrth_planner.options import ALGORITHMS, TreeOptions
+from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.trajectory import MotionLimits
+
+LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
+LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlanSettings:
+    """
+    How to plan.
+
+    Parameters
+    ----------
+    seed : int
+        -1: fresh each time.
+    margin, ray_guard_length, escape_depth : float
+        [m].
+    limits : MotionLimits
+    options : TreeOptions
+        Their class is the algorithm.
+
+    """
+
+    seed: int
+    margin: float
+    ray_guard_length: float
+    escape_depth: float
+    limits: MotionLimits
+    options: TreeOptions
+
+
+def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
+    """
+    Return the settings that values by name describe, as in `config/planner.yaml`.
+
+    Raises
+    ------
+    OptionsError
+        The first value that is refused: its name, what was given, what is expected, the unit.
+
+    """
+    if values['algorithm'] not in ALGORITHMS:
+        raise OptionsError(
+            f'algorithm: "{values["algorithm"]}", expected one that is available: '
+            f'{", ".join(ALGORITHMS)}'
+        )
+    algorithm = ALGORITHMS[values['algorithm']]
+    return PlanSettings(
+        seed=values['seed'],
+        margin=values['margin'],
+        ray_guard_length=values['ray_guard_length'],
+        escape_depth=values['escape_depth'],
+        limits=MotionLimits(
+            velocity=_of_each_joint('max_velocity', values, dof),
+            acceleration=_of_each_joint('max_acceleration', values, dof),
+            jerk=_of_each_joint('max_jerk', values, dof),
+        ),
+        options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
+    )
+
+
+def load_settings(dof: int, path: str | Path | None = None, **changes: Any) -> PlanSettings:
+    """
+    Return the settings of a parameter file of the node, for an arm of so many joints.
+
+    Parameters
+    ----------
+    dof : int
+    path : str or Path, optional
+        What it does not say is taken from `config/planner.yaml`.
+    **changes
+        Values that count instead of those of the files.
+
+    Raises
+    ------
+    OptionsError
+        A value that is refused, or a name that is none.
+
+    """
+    packaged = _parameters(resource_path('config/planner.yaml'))
+    given = {} if path is None else _parameters(path)
+    for name in (*given, *changes):
+        if name not in packaged:
+            raise OptionsError(f'{name}: no parameter, expected one of {", ".join(packaged)}')
+    # A value a joint of the packaged arm is the same for each.
+    limits = {name: packaged[name][:1] for name in LIMIT_UNITS}
+    return settings_from_values({**packaged, **limits, **given, **changes}, dof)
+
+
+def _parameters(path: str | Path) -> dict[str, Any]:
+    data = load_yaml(path)
+    try:
+        (node,) = data.values()
+        return dict(node['ros__parameters'])
+    except (AttributeError, KeyError, TypeError, ValueError) as problem:
+        raise OptionsError(
+            f'file {path}: expected a parameter file, /**: {{ros__parameters: {{name: value}}}}'
+        ) from problem
+
+
+def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
+    """Return a limit for each joint, (dof,)."""
+    given = list(values[name])
+    if len(given) not in (1, dof) or not all(LOWEST_LIMIT <= v <= HIGHEST_LIMIT for v in given):
+        raise OptionsError(
+            f'{name}: {given}, expected {dof} values, or one for all joints, from '
+            f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{LIMIT_UNITS[name]}]'
+        )
+    return np.array(given if len(given) == dof else given * dof)
