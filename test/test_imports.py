@@ -29,7 +29,12 @@ OWN = {
 # The node says that it compiles before it imports what has to be compiled.
 # The report says which requirements it misses before it imports what has them.
 REPORTER = 'rrth_planner.reproduce'
+# The viewer says what it misses before it imports what needs it, and follows the nodes on demand.
+VIEWER, FEED = 'rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'
 LATE = {
+    (VIEWER, FEED),
+    (VIEWER, 'rrth_planner.viewers.viewer_live'),
+    (VIEWER, 'rrth_planner.viewers.viewer_page'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
 }
@@ -61,7 +66,7 @@ def allowed(module, name):
         if target == 'viewers':
             is_demo = layer == 'ros' and 'demo' in module
             return layer == 'viewers' or is_demo or module == REPORTER
-        return target != 'ros' or layer == 'ros'
+        return target != 'ros' or layer == 'ros' or (module, name) == (VIEWER, FEED)
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
     return (
@@ -69,7 +74,7 @@ def allowed(module, name):
         in {
             'kernels': {'numba'},
             'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
-            'viewers': {'matplotlib', 'mpl_toolkits'},
+            'viewers': {'matplotlib', 'mpl_toolkits', 'playwright', 'viser'},
             'core': OWN.get(module.split('.')[-1], set()),
         }[layer]
     )

@@ -3,9 +3,11 @@
 """The viewer in the browser: plan by dragging the target, or follow the nodes that run."""
 
 import argparse
+from ast import literal_eval
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
+from io import StringIO
 import os
 from pathlib import Path
 import signal
@@ -66,6 +68,13 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         '--target', type=float, nargs=3, metavar=('X', 'Y', 'Z'), help='at first [m] (1.5 0.1 0.3)'
     )
+    parser.add_argument(
+        '--set',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='a parameter of config/planner.yaml, as seed=3; any number of times',
+    )
     parser.add_argument('--host', default='127.0.0.1', help='to listen on (%(default)s)')
     parser.add_argument(
         '--port', type=int, default=PORT, help='to listen on; 0: any that is free (%(default)s)'
@@ -124,8 +133,11 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
     """Serve the page that follows the nodes."""
     if find_spec('rclpy') is None:
         raise OptionsError('rclpy: not installed, expected for --live (source ROS 2 Jazzy)')
-    if options.screenshot is not None or options.body is not None or options.target is not None:
-        raise OptionsError('--live: given with --screenshot, --body or --target, expected without')
+    if options.screenshot or options.body or options.target or options.set:
+        raise OptionsError(
+            '--live: given with --screenshot, --body, --target or --set, expected without: the '
+            'nodes say what is shown'
+        )
     from rrth_planner.ros.viewer_feed import following
     from rrth_planner.viewers.viewer_live import LivePage
 
@@ -136,7 +148,7 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
 
 def _question(options: argparse.Namespace) -> PlanQuestion:
     arm = load_arm(options.arm)
-    settings = load_settings(arm.dof, options.settings)
+    settings = load_settings(arm.dof, options.settings, **_changes(options.set))
     target = example_target('front') if options.target is None else options.target
     return PlanQuestion(
         arm=arm,
@@ -152,13 +164,30 @@ def _question(options: argparse.Namespace) -> PlanQuestion:
     )
 
 
+def _changes(given: Sequence[str]) -> dict[str, Any]:
+    """Return the values that are given as NAME=VALUE, or raise OptionsError."""
+    changes = {}
+    for text in given:
+        name, sign, value = text.partition('=')
+        if not sign:
+            raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
+        try:
+            changes[name] = literal_eval(value)
+        except (SyntaxError, ValueError):
+            # Words are names, of an algorithm say.
+            changes[name] = value
+    return changes
+
+
 @contextmanager
 def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
     """Serve an empty page while the block runs; give the server and the page's address."""
     import viser
 
     port = _free_port(options.host, options.port)
-    server = viser.ViserServer(host=options.host, port=port, verbose=False)
+    # It draws a box round its address, whether verbose or not.
+    with redirect_stdout(StringIO()):
+        server = viser.ViserServer(host=options.host, port=port, verbose=False)
     host = 'localhost' if options.host in ('0.0.0.0', '::') else options.host
     url = f'http://{host}:{server.get_port()}'
     print(f'The viewer is at {url} (Ctrl-C ends it).', flush=True)
@@ -169,7 +198,8 @@ def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
             webbrowser.open(url)
         yield server, url
     finally:
-        server.stop()
+        with redirect_stdout(StringIO()):
+            server.stop()
 
 
 def _free_port(host: str, port: int) -> int:

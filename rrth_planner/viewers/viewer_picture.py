@@ -27,7 +27,7 @@ def find_browser() -> str | None:
 
 
 @contextmanager
-def opened(url: str) -> Iterator[Any]:
+def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
     """
     Open a page in a browser without a window, and give playwright's Page once it has a canvas.
 
@@ -54,7 +54,7 @@ def opened(url: str) -> Iterator[Any]:
             browser = playwright.chromium.launch(
                 executable_path=browser_path, args=list(ARGUMENTS), timeout=1e3 * PATIENCE
             )
-            page = browser.new_page(viewport={'width': WIDTH, 'height': HEIGHT})
+            page = browser.new_page(viewport={'width': width, 'height': height})
             page.set_default_timeout(1e3 * PATIENCE)
             page.goto(url)
             page.wait_for_selector('canvas')
@@ -80,5 +80,8 @@ def save_picture(url: str, file: Path) -> None:
         raise OptionsError(f'--screenshot {file}: its folder does not exist')
     with opened(url) as page:
         page.get_by_text('planning time').first.wait_for()
+        # The page warns of a browser without a graphics card.
+        for button in page.locator('.mantine-Notification-closeButton').all():
+            button.click()
         file.write_bytes(settled(page))
     print(f'Picture: {file}')

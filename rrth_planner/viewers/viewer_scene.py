@@ -26,7 +26,7 @@ BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
 # A ray that passes so near to the target points at it [m].
 AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
-CAMERA, LOOK_AT = (-2.05, -1.75, 1.35), (0.25, -0.05, 0.12)
+CAMERA, LOOK_AT = (-1.35, -1.3, 1.05), (0.22, 0.0, 0.22)
 LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
 
 
@@ -77,6 +77,9 @@ class SceneView:
         self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
         server.scene.set_up_direction('+z')
         server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
+        server.scene.configure_default_lights(cast_shadow=False)
+        # From behind too the wearer is seen in the light.
+        server.scene.add_light_ambient('/light', intensity=0.9)
         server.scene.add_grid(
             '/floor', 6.0, 6.0, position=(0.0, 0.0, -0.87), cell_size=0.25, section_size=1.0
         )

@@ -1,0 +1,202 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer's model without a browser: what is asked last is answered, and refusals are said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip('fcl')
+pytest.importorskip('viser')
+
+from rrth_planner.arm import pointing_error, tool_pose
+from rrth_planner.body_file import load_body
+from rrth_planner.errors import OptionsError, SceneError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.question import PlanQuestion
+from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.result import Tree
+from rrth_planner.settings import load_settings
+from rrth_planner.viewers.viewer import main
+from rrth_planner.viewers.viewer_examples import (
+    BODIES,
+    example_body,
+    example_target,
+    load_wearer,
+    start_of,
+    TARGETS,
+)
+from rrth_planner.viewers.viewer_geometry import along_z, path_curve, tree_segments
+from rrth_planner.viewers.viewer_model import ViewerModel
+from rrth_planner.viewers.viewer_panel import answer_html
+from rrth_planner.viewers.viewer_player import Player
+
+WAIT = 120.0
+ARM = load_arm()
+SETTINGS = load_settings(ARM.dof)
+FRONT = example_target('front')
+
+
+def question(body='body', target=FRONT, seed=0):
+    """Return what the page begins with."""
+    return PlanQuestion(
+        arm=ARM,
+        scene=example_body(body),
+        q_start=start_of(ARM),
+        goal=PointingGoal(target),
+        limits=SETTINGS.limits,
+        options=SETTINGS.options,
+        margin=0.02,
+        ray_guard_length=1.0,
+        seed=seed,
+    )
+
+
+@pytest.fixture
+def model():
+    """Give a model, and end its thread."""
+    model = ViewerModel(question('body_arm_raised'))
+    yield model
+    model.close()
+
+
+def test_a_dragged_target_is_planned_for_anew(model):
+    first = model.wait(model.ask(), WAIT)
+    left = example_target('left')
+    second = model.wait(model.ask(target=left), WAIT)
+    for answer, target in ((first, FRONT), (second, left)):
+        assert answer.is_solved, answer.sentence
+        assert pointing_error(ARM, answer.plan.trajectory.positions[-1], target) < 1e-6
+        assert 'planning time' in answer_html(answer)
+
+
+def test_the_newest_drag_wins(model):
+    targets = [FRONT + [0.0, 0.01 * k, 0.0] for k in range(40)]
+    numbers = [model.ask(target=target) for target in targets]
+    answer = model.wait(numbers[-1], WAIT)
+    assert answer.number == numbers[-1]
+    assert answer.question.goal.target.tolist() == targets[-1].tolist()
+
+
+def test_a_refusal_is_said_and_the_next_target_is_planned_for(model):
+    answer = model.wait(model.ask(target=np.zeros(3)), WAIT)
+    assert not answer.is_solved
+    assert 'inside box "torso"' in answer.sentence
+    assert 'inside box &quot;torso&quot;' in answer_html(answer)
+    assert model.wait(model.ask(target=FRONT), WAIT).is_solved
+
+
+def test_what_is_no_target_is_said_and_changes_nothing(model):
+    answer = model.wait(model.ask(target=np.array([np.nan, 0.0, 0.0])), WAIT)
+    assert answer.plan is None
+    assert 'target' in answer.sentence
+    assert 'no motion' in answer_html(answer)
+    assert model.question.goal.target.tolist() == FRONT.tolist()
+
+
+def test_margin_and_seed_count(model):
+    near = model.wait(model.ask(margin=0.0), WAIT)
+    far = model.wait(model.ask(margin=0.03, seed=5), WAIT)
+    assert far.question.margin == 0.03
+    assert far.plan.seed == 5
+    assert far.plan.clearance >= 0.03 > near.question.margin == 0.0
+    again = model.wait(model.ask(), WAIT)
+    assert np.array_equal(again.plan.trajectory.positions, far.plan.trajectory.positions)
+
+
+def test_a_plan_keeps_its_first_path_and_its_trees(model):
+    plan = model.wait(model.ask(seed=0, step_size=0.2), WAIT).plan
+    raw = plan.search.raw_path
+    assert raw.length > plan.path.length
+    assert np.allclose(raw.waypoints[0], plan.path.waypoints[0])
+    assert sum(len(tree.nodes) for tree in plan.search.trees) >= len(raw.waypoints) - 1
+
+
+@pytest.mark.parametrize('name', BODIES)
+def test_an_example_body_is_read_without_ros(name):
+    scene = example_body(name)
+    assert {box.name for box in scene.boxes} >= {'torso', 'head'}
+    if name == 'body':
+        np.testing.assert_allclose(scene.numbers, load_body().numbers, atol=1e-12)
+
+
+def test_an_example_body_is_that_of_the_messages():
+    pytest.importorskip('rclpy')
+    from rrth_planner.ros.message_files import message_from_file
+    from rrth_planner.ros.messages import scene_of, WearerBody
+    from visualization_msgs.msg import MarkerArray
+
+    for name in BODIES:
+        file = resource_path(f'msg_examples/{name}.yaml')
+        body = WearerBody().apply(message_from_file(file, MarkerArray), 0.0, 'torso')
+        numbers = example_body(name).numbers
+        np.testing.assert_allclose(numbers, scene_of(body).numbers, atol=1e-12)
+
+
+def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
+    with pytest.raises(SceneError, match='body_bad.yaml'):
+        load_wearer(resource_path('msg_examples/body_bad.yaml'))
+    file = tmp_path / 'body.yaml'
+    file.write_text('markers: 5\n')
+    with pytest.raises(SceneError, match='expected markers'):
+        load_wearer(file)
+    for arguments, words in (
+        (['--ros-args', '-r', '__ns:=/a'], 'expected only with --live'),
+        (['--set', 'speed=3'], 'speed: no parameter'),
+        (['--set', 'speed'], 'expected NAME=VALUE'),
+        (['--target', 'nan', '0', '0'], 'target'),
+        (['--body', str(file)], 'expected markers'),
+    ):
+        assert main([*arguments, '--no-open']) == 1
+        said = capsys.readouterr().err
+        assert words in said
+        assert said.count('\n') == 1
+
+
+def test_another_arm_starts_in_the_middle_of_its_range():
+    other = replace(ARM, joint_names=tuple('abcd'))
+    np.testing.assert_array_equal(start_of(other), ARM.bounds.mean(axis=0))
+    assert np.array([example_target(name) for name in TARGETS]).shape == (5, 3)
+
+
+def test_curves_of_the_tool_go_from_waypoint_to_waypoint():
+    q = np.array([start_of(ARM), start_of(ARM) - 0.4, start_of(ARM) - 0.1])
+    tool = tool_pose(ARM, q)[:, :3, 3]
+    curve = path_curve(ARM, q)
+    np.testing.assert_allclose(curve[[0, -1]], tool[[0, 2]], atol=1e-12)
+    pieces = tree_segments(ARM, Tree(nodes=q, parents=[-1, 0, 0]))
+    ends = pieces.reshape(2, -1, 2, 3)
+    np.testing.assert_allclose(ends[:, 0, 0], tool[[0, 0]], atol=1e-12)
+    np.testing.assert_allclose(ends[:, -1, 1], tool[[1, 2]], atol=1e-12)
+
+
+def test_a_bar_along_z_joins_two_points():
+    rng = np.random.default_rng(0)
+    for begin, end in rng.normal(size=(50, 2, 3)):
+        middle, (w, x, y, z), length = along_z(begin, end)
+        axis = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+        np.testing.assert_allclose(middle + 0.5 * length * np.array(axis), end, atol=1e-9)
+
+
+def test_a_motion_plays_to_its_end_and_again():
+    player = Player().loaded(2.0)
+    assert player.time == 2.0
+    player = player.toggled()
+    assert (player.time, player.is_playing) == (0.0, True)
+    assert replace(player, speed=0.5).advanced(1.0).time == 0.5
+    ended = player.advanced(5.0)
+    assert (ended.time, ended.is_playing) == (2.0, False)
+    again = replace(player, is_repeating=True).advanced(5.0).advanced(0.1)
+    assert (again.time, again.is_playing) == (0.0, True)
+    assert player.moved(9.0).time == 2.0
+    assert ended.moved(1.0).loaded(4.0).time == 2.0
+
+
+def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):
+    from rrth_planner.viewers import viewer_picture
+
+    pytest.importorskip('playwright')
+    monkeypatch.setattr(viewer_picture, 'find_browser', lambda: None)
+    with pytest.raises(OptionsError, match='no browser found'):
+        viewer_picture.save_picture('http://127.0.0.1:9', tmp_path / 'a.png')
