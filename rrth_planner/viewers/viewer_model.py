@@ -111,6 +111,7 @@ class ViewerModel:
             )
             if value is not None
         }
+        refused: Answer | None = None
         with self._condition:
             self._n_asked += 1
             try:
@@ -122,13 +123,13 @@ class ViewerModel:
             except RrthError as problem:
                 # The page goes on with the last question that was one.
                 self._wanted = False
-                answer = Answer(number=self._n_asked, sentence=str(problem))
+                refused = Answer(number=self._n_asked, sentence=str(problem))
             else:
-                self._wanted, answer = True, None
+                self._wanted = True
                 self._condition.notify_all()
             number = self._n_asked
-        if answer is not None:
-            self._tell(answer)
+        if refused is not None:
+            self._tell(refused)
         return number
 
     def wait(self, number: int, timeout: float) -> Answer:

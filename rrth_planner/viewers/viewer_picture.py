@@ -15,8 +15,14 @@ from rrth_planner.errors import OptionsError, RrthError
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 WIDTH, HEIGHT = 1500, 940
 # Without a graphics card the browser draws by software.
-ARGUMENTS = ('--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--ignore-gpu-blocklist')
-ARGUMENTS += ('--enable-unsafe-swiftshader', '--hide-scrollbars')
+ARGUMENTS = (
+    '--no-sandbox',
+    '--use-gl=angle',
+    '--use-angle=swiftshader',
+    '--enable-unsafe-swiftshader',
+    '--ignore-gpu-blocklist',
+    '--hide-scrollbars',
+)
 # A page that has not come to rest after this time is not waited for [s].
 PATIENCE, PAUSE = 120.0, 1.5
 

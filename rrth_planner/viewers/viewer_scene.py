@@ -100,7 +100,7 @@ class SceneView:
         boxes: list[Any] = []
         shells: list[Any] = []
         for k, box in enumerate(scene.boxes):
-            place = {'position': box.center, 'wxyz': wxyz(box.rotation)}
+            place: dict[str, Any] = {'position': box.center, 'wxyz': wxyz(box.rotation)}
             is_skin = any(part in box.name for part in ('head', 'forearm', 'hand'))
             boxes.append(
                 self._scene.add_box(f'/body/{k}', SKIN if is_skin else CLOTH, box.size, **place)
