@@ -26,12 +26,14 @@ OWN = {
     'runs': {'numba'},
     'incident_files': {'yaml'},
 }
-# The node says that it compiles before it imports what has to be compiled.
+# The node says that it compiles before it imports what has to be compiled; what only one option of
+# a command needs takes seconds to load.
 # The report says which requirements it misses before it imports what has them.
 REPORTER = 'rrth_planner.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.dry_run'),
 }
 
 
@@ -68,7 +70,7 @@ def allowed(module, name):
         root
         in {
             'kernels': {'numba'},
-            'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
+            'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
             'viewers': {'matplotlib', 'mpl_toolkits'},
             'core': OWN.get(module.split('.')[-1], set()),
         }[layer]

@@ -1,0 +1,285 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command point_at: have the planner point the arm at a place, and wait until it does."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass, field
+import json
+import math
+from pathlib import Path
+import signal
+import sys
+from typing import Any, NoReturn
+
+from geometry_msgs.msg import PointStamped
+import rclpy
+from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rrth_planner.arm import pointing_error
+from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.ros.answers import Answer, answer_from_text
+from rrth_planner.ros.arrival import announced_motion, follow
+from rrth_planner.ros.body_messages import body_from_file
+from rrth_planner.ros.error_codes import ErrorCode
+from rrth_planner.ros.frames import Frames
+from rrth_planner.ros.messages import goal_from_msg, WearerBody
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.remote_parameters import parameters_of_planner
+from visualization_msgs.msg import MarkerArray
+
+DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+# A planner that has just been told everything may need a moment [s].
+PATIENCE = 2.0
+UNITS = {'duration': 's', 'path_length': 'rad', 'least_clearance': 'm', 'planning_time_ms': 'ms'}
+
+DESCRIPTION = """\
+Have the planner turn the arm so that it points at X Y Z [m], and wait until it does. A planner
+node and an arm (playback_node, or a controller) have to run in the same ROS domain."""
+EPILOG = """\
+examples:
+  point_at 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
+  point_at 0.2 1.4 -0.1                     to the left, a little down
+  point_at 1.5 0.1 0.3 --body config/body.yaml
+                                            tell the planner the wearer's body first
+  point_at 1.5 0.1 0.3 --no-move            say how the arm would move, and let it stand
+  point_at 1.5 0.1 0.3 --json | jq .figures.duration
+  point_at 1.5 0.1 0.3 --timeout 5 || echo "not there: $?"
+  point_at 1.5 0.1 0.3 --ros-args -r __ns:=/left
+
+exit codes:
+  0    the arm has arrived; with --no-move: there is a motion
+  1    the planner refused: its code and its sentence say why
+  2    wrong usage: an argument, a file, a name
+  3    no planner, no answer, no joint positions or no body within the timeout
+  4    the arm did not arrive: it does not follow, or was stopped on its way
+  130  interrupted; the arm goes on with what it was told
+
+--json prints one object: exit_code, code and name (of the planner; null without an answer),
+sentence, figures (waypoints, duration [s], path_length [rad], least_clearance [m],
+planning_time_ms, seed), arrived (null with --no-move) and pointing_error, by how much the ray
+passes the target [m] (null where it is not known).
+
+--no-move publishes nothing, neither body nor target: it plans by itself as the planner would, with
+the planner's parameters, from the present joint positions, round the body of --body or the one
+that is heard on body_boxes: a publisher that neither latches nor repeats it is not heard."""
+
+
+@dataclass
+class Report:
+    """How a run ended, as --json says it."""
+
+    exit_code: int = DONE
+    code: int | None = None
+    name: str | None = None
+    sentence: str = ''
+    figures: dict[str, float] = field(default_factory=dict)
+    arrived: bool | None = False
+    pointing_error: float | None = None
+
+    def take(self, answer: Answer) -> None:
+        """Keep an answer of the planner."""
+        self.code, self.name = int(answer.code), answer.code.name
+        self.sentence, self.figures = answer.sentence, answer.figures
+        if answer.code is not ErrorCode.SUCCESS:
+            self.exit_code = REFUSED
+
+    def end(self, exit_code: int, sentence: str) -> None:
+        """Keep why there is no more to report."""
+        self.exit_code, self.sentence = exit_code, sentence
+
+
+class UsageError(RrthError):
+    """Something on the command line that cannot be meant."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Point the arm and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _end)
+    options = _parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+    report = Report(arrived=None if options.no_move else False)
+    try:
+        with ExitStack() as stack:
+            _run(options, given, report, stack)
+    except UsageError as problem:
+        report.end(USAGE, str(problem))
+    except NotInTimeError as problem:
+        report.end(NOT_HEARD, str(problem))
+    except RrthError as problem:
+        report.end(REFUSED, str(problem))
+    except (KeyboardInterrupt, ROSInterruptException):
+        report.end(INTERRUPTED, 'interrupted')
+    if options.json:
+        print(json.dumps(asdict(report)))
+    else:
+        _print(report)
+    return report.exit_code
+
+
+def _run(options: argparse.Namespace, given: list[str], report: Report, stack: ExitStack) -> None:
+    # A bad file is said before anything is waited for.
+    if options.body is not None:
+        _body(options.body, '')
+    try:
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        client = PlannerClient('point_at', options.timeout)
+    except (RuntimeError, ValueError, InvalidNamespaceException) as problem:
+        words = ' '.join(str(problem).split())
+        raise UsageError(f'--ros-args: {words}') from problem
+    stack.callback(client.destroy_node)
+    parameters = parameters_of_planner(client)
+    client.wait_for_planner()
+    client.wait_for_state(parameters.arm.joint_names)
+    body = None
+    if options.body is not None:
+        body = _checked(_body(options.body, parameters.base_frame), options.body, parameters)
+    target = PointStamped()
+    target.header.frame_id = options.frame or parameters.base_frame
+    target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
+    if options.no_move:
+        # It needs the planner itself, which takes seconds to load.
+        from rrth_planner.ros.dry_run import plan_without_moving
+
+        answer, report.pointing_error = plan_without_moving(client, parameters, target, body)
+        report.take(answer)
+        return
+    _move(client, parameters, target, body, options.tolerance, report)
+
+
+def _move(
+    client: PlannerClient,
+    parameters: PlannerParameters,
+    target: PointStamped,
+    body: MarkerArray | None,
+    tolerance: float,
+    report: Report,
+) -> None:
+    """Have the arm point at a target, and wait until it does."""
+    arm, frames = parameters.arm, Frames(client, parameters.base_frame)
+    if body is not None:
+        client.tell_body(body)
+    client.tell_target(target)
+    report.take(answer_from_text(client.ask(PATIENCE).message))
+    if report.exit_code != DONE:
+        return
+    motion = announced_motion(client, arm, report.figures['duration'])
+    point = None
+    with suppress(MessageError):
+        # A frame that the planner knows may not be known here.
+        point = goal_from_msg(target, parameters.base_frame, frames.lookup).target
+    try:
+        follow(client, arm, motion, point, tolerance)
+        report.arrived = True
+    except NotInTimeError as problem:
+        report.end(NOT_ARRIVED, str(problem))
+    if point is not None:
+        report.pointing_error = pointing_error(arm, client.positions(arm.joint_names), point)
+
+
+def _body(path: Path, frame: str) -> MarkerArray:
+    try:
+        return body_from_file(path, frame)
+    except RrthError as problem:
+        raise UsageError(f'--body: {problem}') from problem
+
+
+def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
+    """Return a body that the planner will take: it would go on with the one before, else."""
+    try:
+        taken = WearerBody().apply(body, 0.0, parameters.base_frame)
+    except MessageError as problem:
+        raise UsageError(f'--body: file {path}: {problem}') from problem
+    if taken.n_boxes == 0:
+        raise UsageError(f'--body: file {path}: no box, expected at least one')
+    return body
+
+
+def _print(report: Report) -> None:
+    if report.name is None or report.exit_code in (NOT_HEARD, NOT_ARRIVED, INTERRUPTED):
+        print(f'point_at: {report.sentence}', file=sys.stderr)
+        return
+    stream = sys.stdout if report.exit_code == DONE else sys.stderr
+    print(f'{report.name} ({report.code}): {report.sentence}', file=stream)
+    if report.pointing_error is not None:
+        verb = 'points' if report.arrived else 'would point'
+        print(f'the arm {verb} {1e3 * report.pointing_error:.2f} mm past the target')
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='point_at',
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    for axis, way in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
+        parser.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{way} [m]')
+    parser.add_argument(
+        '--frame', metavar='NAME', help="of the target (the planner's base_frame: torso)"
+    )
+    parser.add_argument(
+        '--body',
+        type=Path,
+        metavar='FILE',
+        help='the wearer: a YAML file of boxes (config/body.yaml) or markers '
+        '(msg_examples/body.yaml), which replaces the body that the planner has',
+    )
+    parser.add_argument('--json', action='store_true', help='one JSON object on standard output')
+    parser.add_argument('--no-move', action='store_true', help='plan only, and publish nothing')
+    parser.add_argument(
+        '--timeout',
+        type=_positive,
+        default=30.0,
+        metavar='S',
+        help='longest wait for anything, and for the arm after the end of its motion [s] '
+        '(%(default)g)',
+    )
+    parser.add_argument(
+        '--tolerance',
+        type=_positive,
+        default=0.01,
+        metavar='RAD',
+        help='how close each joint has to come to the end of the motion [rad] (%(default)g)',
+    )
+    parser.add_argument(
+        '--ros-args',
+        action='store_true',
+        help='everything after it is for ROS, as for any node: namespace, remaps, parameters',
+    )
+    return parser
+
+
+def _coordinate(text: str) -> float:
+    return _number(text, 'a coordinate, a finite number [m]')
+
+
+def _positive(text: str) -> float:
+    value = _number(text, 'a number > 0')
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f'{text}, expected a number > 0')
+    return value
+
+
+def _number(text: str, expected: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'"{text}", expected {expected}')
+    return value
+
+
+def _end(*_: Any) -> NoReturn:
+    """Turn a signal into an interrupt, so that everything is left in order."""
+    raise KeyboardInterrupt
+
+
+if __name__ == '__main__':
+    sys.exit(main())
