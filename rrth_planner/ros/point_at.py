@@ -34,7 +34,6 @@ from visualization_msgs.msg import MarkerArray
 DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 # A planner that has just been told everything may need a moment [s].
 PATIENCE = 2.0
-UNITS = {'duration': 's', 'path_length': 'rad', 'least_clearance': 'm', 'planning_time_ms': 'ms'}
 
 DESCRIPTION = """\
 Have the planner turn the arm so that it points at X Y Z [m], and wait until it does. A planner
@@ -101,7 +100,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _end)
-    options = _parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+    try:
+        options = _parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+    except RuntimeError as problem:
+        print(f'point_at: {_of_ros_args(problem)}', file=sys.stderr)
+        return USAGE
     report = Report(arrived=None if options.no_move else False)
     try:
         with ExitStack() as stack:
@@ -130,8 +133,7 @@ def _run(options: argparse.Namespace, given: list[str], report: Report, stack: E
         stack.callback(rclpy.try_shutdown)
         client = PlannerClient('point_at', options.timeout)
     except (RuntimeError, ValueError, InvalidNamespaceException) as problem:
-        words = ' '.join(str(problem).split())
-        raise UsageError(f'--ros-args: {words}') from problem
+        raise UsageError(_of_ros_args(problem)) from problem
     stack.callback(client.destroy_node)
     parameters = parameters_of_planner(client)
     client.wait_for_planner()
@@ -180,6 +182,10 @@ def _move(
         report.end(NOT_ARRIVED, str(problem))
     if point is not None:
         report.pointing_error = pointing_error(arm, client.positions(arm.joint_names), point)
+
+
+def _of_ros_args(problem: Exception) -> str:
+    return f'--ros-args: {" ".join(str(problem).split())}'
 
 
 def _body(path: Path, frame: str) -> MarkerArray:

@@ -22,6 +22,7 @@ from rrth_planner.arm import pointing_error  # noqa: E402
 from rrth_planner.body_file import load_body  # noqa: E402
 from rrth_planner.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.resources import load_arm, resource_path  # noqa: E402
+from rrth_planner.ros import point_at  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.body_messages import body_from_file, body_to_msg  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
@@ -64,8 +65,9 @@ class Bystander(Node):
         """Listen."""
         super().__init__('bystander')
         self.motions, self.bodies = [], []
-        self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, LATCHED)
-        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, LATCHED)
+        # Not latched: what an earlier test has the planner publish is none of this one's.
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, 10)
+        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, 10)
         self._joints = self.create_publisher(JointState, 'joint_states', 10)
 
     def stand(self):
@@ -219,17 +221,30 @@ def test_it_can_be_interrupted(bystander, wait_until):
         (['1', '2', '3', '--ros-args', '-r', 'nonsense'], '--ros-args'),
     ],
 )
-def test_wrong_usage_is_said_before_anything_is_waited_for(arguments, words):
-    ended = run(*arguments)
+def test_wrong_usage_is_said_before_anything_is_waited_for(arguments, words, monkeypatch, capsys):
+    # The handlers of the tests stay.
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    try:
+        code = point_at.main(arguments)
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_wrong_words_for_ros_are_wrong_usage():
+    ended = run('1', '2', '3', '--ros-args', '-r', 'nonsense')
     assert ended.returncode == 2
-    assert words in ended.stderr
-    assert 'Traceback' not in ended.stderr
+    assert ended.stderr.startswith('point_at: --ros-args: ')
+    assert len(ended.stderr.splitlines()) == 1
 
 
-def test_the_help_names_every_exit_code():
-    ended = run('--help')
-    assert ended.returncode == 0
-    codes = ended.stdout.split('exit codes:')[1].split('--json')[0].split('\n')
+def test_the_help_names_every_exit_code(monkeypatch, capsys):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    with pytest.raises(SystemExit) as end:
+        point_at.main(['--help'])
+    assert end.value.code == 0
+    codes = capsys.readouterr().out.split('exit codes:')[1].split('--json')[0].split('\n')
     assert [line.split()[0] for line in codes if line[2:3].isdigit()] == [
         '0',
         '1',
