@@ -32,6 +32,10 @@ REPORTER = 'rrth_planner.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+    *(
+        ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
+        for name in ('inputs', 'listener', 'plan_queue', 'reporter')
+    ),
 }
 
 
@@ -91,6 +95,7 @@ def test_a_module_imports_only_what_its_layer_may(module):
                 '.fcl_shapes',
                 '.opinions',
                 '.ros.requests',
+                '.ros.second_opinion',
             )
             assert module.endswith(may), f'{module} imports {name}'
 
