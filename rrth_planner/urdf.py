@@ -52,7 +52,7 @@ def arm_to_urdf(
     Raises
     ------
     ModelError
-        A radius or velocity that is none, or two links or joints of one name.
+        A radius or velocity that is none, a name that is none, or two links or joints of one name.
 
     """
     if not 0.0 < radius < np.inf:
@@ -60,8 +60,8 @@ def arm_to_urdf(
     speeds = frozen_array(max_velocity, (arm.dof,), 'max_velocity', 'rad/s or m/s', ModelError)
     links = [base_frame, MOUNT, *(f'{joint}_link' for joint in arm.joint_names), TOOL]
     joints = [f'{MOUNT}_joint', *arm.joint_names, f'{TOOL}_joint']
-    _check_names('links', links)
-    _check_names('joints', joints)
+    for what, names in (('links', links), ('joints', joints), ('robot', [name])):
+        _check_names(what, names)
     robot = ElementTree.Element('robot', name=name)
     robot.append(ElementTree.Comment(HEADER))
     for material, rgba in COLOURS.items():
@@ -163,5 +163,5 @@ def _text(numbers: Sequence[float] | Array) -> str:
 
 
 def _check_names(what: str, names: Sequence[str]) -> None:
-    if len(set(names)) != len(names):
-        raise ModelError(f'{what}: {list(names)}, expected all different names')
+    if len(set(names)) != len(names) or not all(name and name.isprintable() for name in names):
+        raise ModelError(f'{what}: {list(names)}, expected names, printable and all different')

@@ -59,7 +59,7 @@ def urdf_of_file(
 
     """
     arm = load_arm(arm_file)
-    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
+    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name') or 'arm'
     speeds = load_settings(arm.dof, settings_file).limits.velocity
     return arm_to_urdf(arm, speeds, radius, base_frame, str(name))
 

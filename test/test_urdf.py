@@ -177,7 +177,9 @@ def test_the_command_writes_where_it_is_told(tmp_path, capsys):
         (['--radius', 'nan'], 'radius: nan, expected a length > 0 [m]'),
         (['--arm', 'nowhere.yaml'], 'nowhere.yaml'),
         (['--settings', 'nowhere.yaml'], 'nowhere.yaml'),
-        (['--base-frame', 'tool'], 'expected all different names'),
+        (['--base-frame', 'tool'], 'expected names, printable and all different'),
+        (['--base-frame', ''], 'expected names, printable and all different'),
+        (['--base-frame', 'a\x01b'], 'expected names, printable and all different'),
         (['--output', '/dev/null/arm.urdf'], 'expected a file that can be written'),
     ],
 )
@@ -188,6 +190,14 @@ def test_what_cannot_be_written_is_said_in_one_line(arguments, words, capsys):
     assert said.err.startswith('write_urdf: ')
     assert words in said.err
     assert said.err.count('\n') == 1
+
+
+def test_an_arm_without_a_name_is_called_arm(tmp_path):
+    text = resource_path('config/arm.yaml').read_text(encoding='utf-8')
+    file = tmp_path / 'mine.yaml'
+    for name, expected in (('', 'arm'), ('name: "<7> & more"', '<7> & more')):
+        file.write_text(text.replace('name: table_1_arm', name), encoding='utf-8')
+        assert ElementTree.fromstring(urdf_of_file(file)).get('name') == expected
 
 
 def test_speeds_that_are_none_are_refused():

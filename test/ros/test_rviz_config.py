@@ -9,13 +9,12 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
 from rrth_planner.resources import load_yaml, resource_path  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
-NODE = 'rrth_planner'
+NODE, NAMESPACE = 'rrth_planner', '/in_rviz'
 # What displays and tools of RViz take and give.
 TYPES = {
     'MarkerArray': 'visualization_msgs/msg/MarkerArray',
@@ -46,7 +45,7 @@ def manager():
 @pytest.fixture(scope='module')
 def planner(ros_context):
     """Return a planner node."""
-    node = PlannerNode()
+    node = PlannerNode(namespace=NAMESPACE)
     yield node
     node.close()
     node.destroy_node()
@@ -54,12 +53,12 @@ def planner(ros_context):
 
 @pytest.fixture(scope='module')
 def topics(planner):
-    """Return the planner's topics with their types: what it says, what it hears."""
+    """Return the planner's topics with their types, without its namespace: said and heard."""
     return [
-        {name: types[0] for name, types in names}
+        {name.removeprefix(NAMESPACE): types[0] for name, types in names}
         for names in (
-            planner.get_publisher_names_and_types_by_node(NODE, '/'),
-            planner.get_subscriber_names_and_types_by_node(NODE, '/'),
+            planner.get_publisher_names_and_types_by_node(NODE, NAMESPACE),
+            planner.get_subscriber_names_and_types_by_node(NODE, NAMESPACE),
         )
     ]
 
@@ -95,20 +94,16 @@ def test_all_that_can_be_shown_is_shown(manager, topics):
 
 def test_displays_hear_what_was_said_before_and_every_quality(manager, topics, planner):
     said, _ = topics
-    watcher = Node('watcher')
-    try:
-        for _, topic, settings in by_topic(manager['Displays']):
-            asked = settings['Durability Policy'], settings['Reliability Policy']
-            if topic not in said:
-                # Whoever speaks there is heard.
-                assert asked == ('Volatile', 'Best Effort')
-                continue
-            (info,) = watcher.get_publishers_info_by_topic(topic)
-            assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-            assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-            assert asked == ('Transient Local', 'Reliable')
-    finally:
-        watcher.destroy_node()
+    for _, topic, settings in by_topic(manager['Displays']):
+        asked = settings['Durability Policy'], settings['Reliability Policy']
+        if topic not in said:
+            # Whoever speaks there is heard.
+            assert asked == ('Volatile', 'Best Effort')
+            continue
+        (info,) = planner.get_publishers_info_by_topic(f'{NAMESPACE}{topic}')
+        assert info.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        assert asked == ('Transient Local', 'Reliable')
 
 
 def test_the_fixed_frame_is_the_base_frame_of_planner_and_urdf(manager, planner):
