@@ -64,7 +64,8 @@ def test_roll_pitch_and_yaw_give_the_rotation_back(seed, pitch):
 
 
 def test_the_packaged_urdf_is_the_one_that_is_written():
-    assert resource_path('urdf/arm.urdf').read_text(encoding='utf-8') == urdf_of_file()
+    written = resource_path('urdf/arm.urdf').read_text(encoding='utf-8')
+    assert written == urdf_of_file(), './run exec write_urdf --output urdf/arm.urdf'
 
 
 def test_the_packaged_urdf_moves_as_the_arm_does():
