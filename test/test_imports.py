@@ -34,6 +34,10 @@ LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.dry_run'),
+    *(
+        ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
+        for name in ('inputs', 'listener', 'plan_queue', 'reporter')
+    ),
 }
 
 
@@ -93,6 +97,7 @@ def test_a_module_imports_only_what_its_layer_may(module):
                 '.fcl_shapes',
                 '.opinions',
                 '.ros.requests',
+                '.ros.second_opinion',
             )
             assert module.endswith(may), f'{module} imports {name}'
 
