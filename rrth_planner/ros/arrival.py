@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from rrth_planner.arm import ArmModel, pointing_error
 from rrth_planner.arrays import Array
-from rrth_planner.ros.messages import joint_trajectory_from_msg
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
-from rrth_planner.takeover import REST_SPEED
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from rrth_planner.trajectory import positions_at, Trajectory
 from tqdm import tqdm  # type: ignore[import-untyped]
 
@@ -20,6 +19,8 @@ AIMS_ELSEWHERE = 1e-3
 SAME_DURATION = 2e-3
 # An arm that has arrived stays there for so long [s].
 SETTLED = 0.1
+# And moves no faster [rad/s].
+REST_SPEED = 0.01
 SPACING = 0.01
 
 

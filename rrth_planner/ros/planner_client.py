@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rrth_planner.arrays import Array
 from rrth_planner.errors import RrthError
-from rrth_planner.ros.messages import configuration_from_msg
+from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.subscriptions import OpenSubscription
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger

@@ -25,7 +25,7 @@ from rrth_planner.ros.arrival import announced_motion, follow
 from rrth_planner.ros.body_messages import body_from_file
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.frames import Frames
-from rrth_planner.ros.messages import goal_from_msg, WearerBody
+from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
 from rrth_planner.ros.remote_parameters import parameters_of_planner
@@ -197,6 +197,9 @@ def _body(path: Path, frame: str) -> MarkerArray:
 
 def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
     """Return a body that the planner will take: it would go on with the one before, else."""
+    # It loads kernels, which takes seconds that an arm need not wait for without --body.
+    from rrth_planner.ros.bodies import WearerBody
+
     try:
         taken = WearerBody().apply(body, 0.0, parameters.base_frame)
     except MessageError as problem:
