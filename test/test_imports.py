@@ -33,6 +33,7 @@ REPORTER = 'rrth_planner.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.arrival'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.bodies'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.dry_run'),
     *(

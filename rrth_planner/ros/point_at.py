@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
 import json
-import math
 from pathlib import Path
 import signal
 import sys
@@ -21,50 +21,19 @@ from rclpy.utilities import remove_ros_args
 from rrth_planner.arm import pointing_error
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.ros.answers import Answer, answer_from_text
-from rrth_planner.ros.arrival import announced_motion, follow
 from rrth_planner.ros.body_messages import body_from_file
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.frames import Frames
 from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.point_at_options import parser
 from rrth_planner.ros.remote_parameters import parameters_of_planner
 from visualization_msgs.msg import MarkerArray
 
 DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
 # A planner that has just been told everything may need a moment [s].
 PATIENCE = 2.0
-
-DESCRIPTION = """\
-Have the planner turn the arm so that it points at X Y Z [m], and wait until it does. A planner
-node and an arm (playback_node, or a controller) have to run in the same ROS domain."""
-EPILOG = """\
-examples:
-  point_at 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
-  point_at 0.2 1.4 -0.1                     to the left, a little down
-  point_at 1.5 0.1 0.3 --body config/body.yaml
-                                            tell the planner the wearer's body first
-  point_at 1.5 0.1 0.3 --no-move            say how the arm would move, and let it stand
-  point_at 1.5 0.1 0.3 --json | jq .figures.duration
-  point_at 1.5 0.1 0.3 --timeout 5 || echo "not there: $?"
-  point_at 1.5 0.1 0.3 --ros-args -r __ns:=/left
-
-exit codes:
-  0    the arm has arrived; with --no-move: there is a motion
-  1    the planner refused: its code and its sentence say why
-  2    wrong usage: an argument, a file, a name
-  3    no planner, no answer, no joint positions or no body within the timeout
-  4    the arm did not arrive: it does not follow, or was stopped on its way
-  130  interrupted; the arm goes on with what it was told
-
---json prints one object: exit_code, code and name (of the planner; null without an answer),
-sentence, figures (waypoints, duration [s], path_length [rad], least_clearance [m],
-planning_time_ms, seed), arrived (null with --no-move) and pointing_error, by how much the ray
-passes the target [m] (null where it is not known).
-
---no-move publishes nothing, neither body nor target: it plans by itself as the planner would, with
-the planner's parameters, from the present joint positions, round the body of --body or the one
-that is heard on body_boxes: a publisher that neither latches nor repeats it is not heard."""
 
 
 @dataclass
@@ -101,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _end)
     try:
-        options = _parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+        options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
         print(f'point_at: {_of_ros_args(problem)}', file=sys.stderr)
         return USAGE
@@ -109,12 +78,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with ExitStack() as stack:
             _run(options, given, report, stack)
-    except UsageError as problem:
-        report.end(USAGE, str(problem))
     except NotInTimeError as problem:
         report.end(NOT_HEARD, str(problem))
     except RrthError as problem:
-        report.end(REFUSED, str(problem))
+        # Of the planner's arm, which may be described by a file that is not here.
+        report.end(USAGE, str(problem))
     except (KeyboardInterrupt, ROSInterruptException):
         report.end(INTERRUPTED, 'interrupted')
     if options.json:
@@ -125,6 +93,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, given: list[str], report: Report, stack: ExitStack) -> None:
+    if find_spec('tqdm') is None:
+        raise UsageError('tqdm: not installed, expected what requirements/tools.txt lists')
     # A bad file is said before anything is waited for.
     if options.body is not None:
         _body(options.body, '')
@@ -163,6 +133,9 @@ def _move(
     report: Report,
 ) -> None:
     """Have the arm point at a target, and wait until it does."""
+    # Not before it is known that its progress bar is there.
+    from rrth_planner.ros.arrival import announced_motion, follow
+
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
         client.tell_body(body)
@@ -218,71 +191,6 @@ def _print(report: Report) -> None:
     if report.pointing_error is not None:
         verb = 'points' if report.arrived else 'would point'
         print(f'the arm {verb} {1e3 * report.pointing_error:.2f} mm past the target')
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='point_at',
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    for axis, way in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
-        parser.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{way} [m]')
-    parser.add_argument(
-        '--frame', metavar='NAME', help="of the target (the planner's base_frame: torso)"
-    )
-    parser.add_argument(
-        '--body',
-        type=Path,
-        metavar='FILE',
-        help='the wearer: a YAML file of boxes (config/body.yaml) or markers '
-        '(msg_examples/body.yaml), which replaces the body that the planner has',
-    )
-    parser.add_argument('--json', action='store_true', help='one JSON object on standard output')
-    parser.add_argument('--no-move', action='store_true', help='plan only, and publish nothing')
-    parser.add_argument(
-        '--timeout',
-        type=_positive,
-        default=30.0,
-        metavar='S',
-        help='longest wait for anything, and for the arm after the end of its motion [s] '
-        '(%(default)g)',
-    )
-    parser.add_argument(
-        '--tolerance',
-        type=_positive,
-        default=0.01,
-        metavar='RAD',
-        help='how close each joint has to come to the end of the motion [rad] (%(default)g)',
-    )
-    parser.add_argument(
-        '--ros-args',
-        action='store_true',
-        help='everything after it is for ROS, as for any node: namespace, remaps, parameters',
-    )
-    return parser
-
-
-def _coordinate(text: str) -> float:
-    return _number(text, 'a coordinate, a finite number [m]')
-
-
-def _positive(text: str) -> float:
-    value = _number(text, 'a number > 0')
-    if value <= 0.0:
-        raise argparse.ArgumentTypeError(f'{text}, expected a number > 0')
-    return value
-
-
-def _number(text: str, expected: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'"{text}", expected {expected}')
-    return value
 
 
 def _end(*_: Any) -> NoReturn:
