@@ -22,9 +22,9 @@ UNITS = ('{}', '{}/s', '{}/s^2')
 COLUMNS = ('position', 'velocity', 'acceleration')
 SUFFIXES = ('.yaml', '.yml', '.csv')
 HEADER = """\
-# A motion: points in time, one a line. Between two of them each joint follows the quintic that fits
-# position, velocity and acceleration at both. Times in s, units of the joints as given, per second
-# for velocities, per second squared for accelerations.
+# Points in time; between two of them each joint follows the quintic that fits position, velocity
+# and acceleration at both. Times in s; positions in the units given for each joint, velocities in
+# these per second, accelerations per second squared.
 """
 _Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 
@@ -142,53 +142,54 @@ def read_motion(path: str | Path) -> JointMotion:
 
 def _to_yaml(motion: JointMotion, comments: Sequence[str]) -> str:
     trajectory = motion.trajectory
-    points = [
-        {'time': time, **dict(zip(SERIES, values, strict=True))}
-        for time, *values in zip(
-            trajectory.times.tolist(),
-            *(getattr(trajectory, name).tolist() for name in SERIES),
-            strict=True,
-        )
-    ]
-    head = {'joint_names': list(motion.joint_names), 'units': list(motion.units)}
+    columns = [getattr(trajectory, name).tolist() for name in ('times', *SERIES)]
+    data = {
+        'joint_names': list(motion.joint_names),
+        'units': list(motion.units),
+        'points': [
+            dict(zip(('time', *SERIES), point, strict=True))
+            for point in zip(*columns, strict=True)
+        ],
+    }
     said = ''.join(f'# {" ".join(line.split())}\n' for line in comments)
-    text = ''.join(
-        yaml.dump(part, Dumper=_Dumper, sort_keys=False, default_flow_style=flow, width=10**6)
-        for part, flow in ((head, None),)
-    )
-    # A point a line, which no style of the library gives for mappings with lists.
-    lines = ''.join(
-        f'- {yaml.dump(p, Dumper=_Dumper, sort_keys=False, default_flow_style=True, width=10**6)}'
-        for p in points
-    )
-    return f'{said}{HEADER}{text}points:\n{lines}'
+    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=10**6)
+    return f'{said}{HEADER}{text}'
 
 
 def _from_mapping(data: Any) -> JointMotion:
     points = data['points']
-    series = {name: [point[name] for point in points] for name in SERIES}
+    positions, velocities, accelerations = (
+        np.array([point[name] for point in points], dtype=np.float64) for name in SERIES
+    )
     return JointMotion(
         joint_names=tuple(map(str, data['joint_names'])),
         units=tuple(map(str, data['units'])),
-        trajectory=Trajectory(times=[point['time'] for point in points], **series),
+        trajectory=Trajectory(
+            times=np.array([point['time'] for point in points], dtype=np.float64),
+            positions=positions,
+            velocities=velocities,
+            accelerations=accelerations,
+        ),
     )
 
 
+def _header(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Return the names of a table's columns."""
+    return ['time [s]'] + [
+        f'{name} {column} [{form.format(unit)}]'
+        for name, unit in zip(names, units, strict=True)
+        for column, form in zip(COLUMNS, UNITS, strict=True)
+    ]
+
+
 def _to_csv(motion: JointMotion) -> str:
-    names = zip(motion.joint_names, motion.units, strict=True)
-    header = ['time [s]']
-    for name, unit in names:
-        header += [
-            f'{name} {column} [{form.format(unit)}]'
-            for column, form in zip(COLUMNS, UNITS, strict=True)
-        ]
     trajectory = motion.trajectory
     # A joint's position, velocity and acceleration beside each other.
     values = np.stack([getattr(trajectory, name) for name in SERIES], axis=2)
     rows = np.column_stack([trajectory.times, values.reshape(len(values), -1)])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(header)
+    writer.writerow(_header(motion.joint_names, motion.units))
     writer.writerows(rows.tolist())
     return text.getvalue()
 
@@ -201,6 +202,8 @@ def _from_csv(file: Path) -> JointMotion:
         name, unit = column.rsplit(' position [', 1)
         names.append(name)
         units.append(unit.removesuffix(']'))
+    if header != _header(names, units):
+        raise RecordError(f'columns {header}, expected {_header(names, units)}')
     numbers = np.array(rows, dtype=np.float64)
     values = numbers[:, 1:].reshape(len(numbers), len(names), 3)
     return JointMotion(

@@ -101,7 +101,7 @@ def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
         if value is not None
     }
     settings = load_settings(arm.dof, options.settings, **changes)
-    if not isinstance(settings.seed, int) or not -1 <= settings.seed < SEEDS:
+    if not -1 <= settings.seed < SEEDS:
         raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
     return settings
 

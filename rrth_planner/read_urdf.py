@@ -87,7 +87,9 @@ def _report(found: ImportedArm) -> list[str]:
         unit = 'm' if arm.is_prismatic[k] else 'rad'
         low, high = arm.bounds[:, k]
         note = ', half a turn either way: it is continuous' if name in chain.endless else ''
-        lines.append(f'  {name}: {low:.4f} to {high:.4f} {unit}, radius {arm.radii[k]:.4f} m{note}')
+        lines.append(
+            f'  {name}: {low:.4f} to {high:.4f} {unit}, radius {arm.radii[k]:.4f} m{note}'
+        )
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')
     if arm.radii.max() > found.radius:
         lines.append(
@@ -110,7 +112,9 @@ def _report_ray(found: ImportedArm, q: Array) -> list[str]:
     """Return where the tool is and where it points, by the arm and by the URDF."""
     lines = [f'at {" ".join(f"{value:g}" for value in q)}, in the base frame:']
     for what, (p, z) in (('arm', found.ray_at(q)), ('URDF', found.urdf_ray_at(q))):
-        position, ray = (' '.join(f'{value:.6f}' for value in np.round(v, 6) + 0.0) for v in (p, z))
+        position, ray = (
+            ' '.join(f'{value:.6f}' for value in np.round(v, 6) + 0.0) for v in (p, z)
+        )
         lines.append(f'  {what + ":":6} tool at {position} m, ray along {ray}')
     return lines
 

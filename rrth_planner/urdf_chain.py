@@ -56,8 +56,8 @@ class UrdfChain:
         The pointing ray in the tool's link.
     endless : tuple of str
         Continuous joints, which may turn by half a turn either way.
-    model : yourdfpy.URDF
-        What the chain was read from.
+    joints : tuple of yourdfpy.Joint
+        All from base to tool, as they are in the file.
 
     """
 
@@ -73,12 +73,24 @@ class UrdfChain:
     x_first: Array
     ray: Array
     endless: tuple[str, ...]
-    model: Any
+    joints: tuple[Any, ...]
 
     def tool_pose(self, q: Array) -> Array:
-        """Return the tool link's pose in the base link, (dof,) [rad or m] -> (4, 4) [m]."""
-        self.model.update_cfg(dict(zip(self.joint_names, np.asarray(q).tolist(), strict=True)))
-        return np.asarray(self.model.get_transform(self.tool, self.base))
+        """
+        Return the tool link's pose in the base link, (dof,) [rad or m] -> (4, 4) [m].
+
+        This is the URDF's own way, which knows nothing of lines: origin after origin.
+        """
+        T = np.eye(4)
+        values = dict(zip(self.joint_names, np.asarray(q).tolist(), strict=True))
+        for joint in self.joints:
+            if joint.origin is not None:
+                T = T @ joint.origin
+            if joint.type == 'prismatic':
+                T = T @ transformations.translation_matrix(values[joint.name] * _axis(joint))
+            elif joint.type != 'fixed':
+                T = T @ transformations.rotation_matrix(values[joint.name], _axis(joint))
+        return np.asarray(T)
 
 
 def read_chain(
@@ -113,7 +125,9 @@ def read_chain(
             moving.append(joint)
             frames.append(T)
     if not moving:
-        raise ModelError(f'URDF {path}: no joint moves between "{base}" and "{tool}", expected one')
+        raise ModelError(
+            f'URDF {path}: no joint moves between "{base}" and "{tool}", expected one'
+        )
     axes = [R[:3, :3] @ _axis(joint) for R, joint in zip(frames, moving, strict=True)]
     limits = [_limits(joint) for joint in moving]
     speeds = [joint.limit.velocity if joint.limit else None for joint in moving]
@@ -130,7 +144,7 @@ def read_chain(
         x_first=frames[0][:3, 0],
         ray=RAYS[ray],
         endless=tuple(joint.name for joint in moving if joint.type == 'continuous'),
-        model=model,
+        joints=tuple(joints),
     )
 
 
@@ -142,7 +156,7 @@ def _load(path: Path) -> Any:
                 raise ModelError(
                     f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
                 )
-        return yourdfpy.URDF.load(str(path), load_meshes=False)
+        return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
     except OSError as problem:
         raise ModelError(f'file {path}: {problem.strerror}; expected a URDF file') from problem
     except NO_URDF as problem:
@@ -155,6 +169,8 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
     links = [link.name for link in model.robot.links]
     above = {joint.child: joint for joint in model.robot.joints}
     parents = {joint.parent for joint in model.robot.joints}
+    if len(above) < len(model.robot.joints):
+        raise ModelError('URDF: two joints lead to the same link, expected a tree of links')
     if base is None:
         base = _only([link for link in links if link not in above], 'base')
     if tool is None:

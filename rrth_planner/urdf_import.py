@@ -55,7 +55,8 @@ class ImportedArm:
         """Return the greatest differences between both, of position [m] and direction [rad]."""
         rng = np.random.default_rng(0)
         found = []
-        for q in rng.uniform(*self.arm.bounds, (N_COMPARED, self.arm.dof)):
+        low, high = self.arm.bounds
+        for q in rng.uniform(low, high, (N_COMPARED, self.arm.dof)):
             (p, z), (p_urdf, z_urdf) = self.ray_at(q), self.urdf_ray_at(q)
             found.append((np.linalg.norm(p - p_urdf), np.linalg.norm(z - z_urdf)))
         far, tilt = np.max(found, axis=0)
