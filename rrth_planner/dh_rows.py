@@ -69,11 +69,12 @@ def rows_of_axes(points: Array, directions: Array, x_0: Array) -> DhRows:
         before = x
         x, foot, far_foot = _common_normal(p, z, i, before)
         dh[i, 2] = _angle(before, x, z[i])
-        dh[i, 3] = _rounded((foot - corner) @ z[i])
+        dh[i, 3] = _rounded(float((foot - corner) @ z[i]))
         dh[i + 1, 0] = _angle(z[i], z[i + 1], x)
-        dh[i + 1, 1] = _rounded((far_foot - foot) @ x)
+        dh[i + 1, 1] = _rounded(float((far_foot - foot) @ x))
         corner = far_foot
-    return DhRows(T_0=T_0, dh=dh, ray_lead=_rounded((p[-1] - corner) @ z[-1]))
+    lead = float((p[-1] - corner) @ z[-1])
+    return DhRows(T_0=T_0, dh=dh, ray_lead=_rounded(lead))
 
 
 def _straighten(p: Array, z: Array, i: int) -> None:
@@ -122,7 +123,7 @@ def _angle(u: Array, v: Array, axis: Array) -> float:
 
 
 def _rounded(length: float) -> float:
-    return 0.0 if abs(length) < MEETING else round(float(length), 12)
+    return 0.0 if abs(length) < MEETING else round(length, 12)
 
 
 def _across(wish: Array, axis: Array) -> Array:

@@ -109,6 +109,11 @@ def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
 def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
     """Return where the motion begins, (dof,) [rad or m]."""
     if options.q_from is not None:
+        if len(options.q_from) != arm.dof:
+            raise OptionsError(
+                f'--from: {len(options.q_from)} values, expected {arm.dof}, one for each of '
+                f'{list(arm.joint_names)} [rad or m]'
+            )
         return frozen_array(options.q_from, (arm.dof,), '--from', 'rad or m', OptionsError)
     if options.arm is None:
         file = load_yaml(resource_path('config/playback.yaml'))

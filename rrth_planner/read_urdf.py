@@ -60,6 +60,11 @@ def _import(options: argparse.Namespace) -> None:
     check_pointing_arm(arm)
     lines = _report(found)
     if options.check is not None:
+        if len(options.check) != arm.dof:
+            raise ModelError(
+                f'--check: {len(options.check)} values, expected {arm.dof}, one for each of '
+                f'{list(arm.joint_names)} [rad or m]'
+            )
         q = frozen_array(options.check, (arm.dof,), '--check', 'rad or m', ModelError)
         lines += _report_ray(found, q)
     comments = [

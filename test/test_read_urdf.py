@@ -189,7 +189,7 @@ def test_what_is_no_arm_is_refused_in_a_sentence(tmp_path, capsys, words):
         (['--radius', 'nan'], 'radius: nan'),
         (['--mount', '0', '0', '0', '0', '0', '0', '0'], 'not all 0'),
         (['--mount', '0', '0', 'inf', '0', '0', '0', '1'], 'finite'),
-        (['--check', '1', '2'], '--check: shape (2,), expected (6)'),
+        (['--check', '1', '2'], '--check: 2 values, expected 6, one for each'),
         # The first joint alone sweeps a cone.
         (['--tool', 'turret'], 'expected 2: the ray sweeps a surface'),
     ],
