@@ -11,7 +11,7 @@ import sys
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.body_file import load_body
 from rrth_planner.errors import one_line, OptionsError, RrthError
@@ -77,7 +77,7 @@ def _run(options: argparse.Namespace) -> int:
         seed=seed,
         escape_depth=settings.escape_depth,
     )
-    figures = _figures(plan)
+    figures = _figures(arm, q_start, plan)
     if plan.trajectory is not None and options.output is not None:
         motion = motion_of(arm, plan.trajectory)
         if options.period is not None:
@@ -121,9 +121,13 @@ def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
 
 
-def _figures(plan: MotionPlan) -> dict[str, Any]:
+def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
     """Return what there is to say of a plan; a unit ends its name."""
-    figures: dict[str, Any] = {'status': plan.status.value, 'sentence': plan.sentence}
+    figures: dict[str, Any] = {
+        'status': plan.status.value,
+        'sentence': plan.sentence,
+        'start': _tool(arm, q_start),
+    }
     if plan.path is not None and plan.trajectory is not None:
         figures |= {
             'waypoints': len(plan.path.waypoints),
@@ -133,9 +137,15 @@ def _figures(plan: MotionPlan) -> dict[str, Any]:
             'clearance_m': plan.clearance if math.isfinite(plan.clearance) else None,
             'reach_m': plan.reach,
             'escape_time_s': plan.escape_time,
-            'q_goal': plan.trajectory.positions[-1].tolist(),
+            'end': _tool(arm, plan.trajectory.positions[-1]),
         }
     return figures | {'planning_time_s': plan.planning_time, 'seed': plan.seed}
+
+
+def _tool(arm: ArmModel, q: Array) -> dict[str, list[float]]:
+    """Return a configuration, and where the tool is and points there."""
+    T = tool_pose(arm, q)
+    return {'q': q.tolist(), 'tool_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
 
 
 def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
@@ -146,8 +156,13 @@ def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
         f'clearance      {figures["clearance_m"]:.4f} m',
         f'planning time  {1e3 * figures["planning_time_s"]:.2f} ms',
         f'seed           {figures["seed"]}',
-        f'ends at        {_listed(figures["q_goal"])}',
     ]
+    for label in ('start', 'end'):
+        found = figures[label]
+        lines += [
+            f'{label:15}{_listed(found["q"])}',
+            f'  tool at      {_listed(found["tool_m"])} m, ray along {_listed(found["ray"])}',
+        ]
     if figures['escape_time_s'] > 0.0:
         lines.append(f'leaves boxes   until {figures["escape_time_s"]:.3f} s')
     return lines if output is None else [*lines, f'written        {output}']
