@@ -17,6 +17,8 @@ from rrth_planner.rotation import pose_matrix
 from rrth_planner.urdf_chain import RAYS, read_chain
 from rrth_planner.urdf_import import import_chain, ImportedArm
 
+# Bars this much longer than all links together are no links.
+LONG = 2.0
 DESCRIPTION = """\
 Read the joints between two links of a URDF and write them as an arm of the planner, laid out as
 config/arm.yaml: modified Denavit-Hartenberg rows, limits, radii, mount and tool. Meshes are not
@@ -99,6 +101,13 @@ def _report(found: ImportedArm) -> list[str]:
     if arm.radii.max() > found.radius:
         lines.append(
             f'radii: more than {found.radius:g} m where a link leaves the straight bars of its row'
+        )
+    longest = np.abs(arm.dh[:, [1, 3]]).max()
+    size = np.linalg.norm(np.diff(chain.points, axis=0), axis=1).sum()
+    if longest > LONG * size:
+        lines.append(
+            f'bars: up to {longest:.2f} m long in an arm of {size:.2f} m, since two axes next to '
+            'parallel have their common normal far away; make them parallel in the URDF'
         )
     if found.ray_lead != 0.0:
         where = 'before' if found.ray_lead > 0.0 else 'beyond'

@@ -7,6 +7,7 @@ import logging
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from rrth_planner.arrays import Array
@@ -151,11 +152,12 @@ def read_chain(
 def _load(path: Path) -> Any:
     logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
     try:
-        with path.open('rb') as file:
-            if b'xmlns:xacro' in file.read():
-                raise ModelError(
-                    f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
-                )
+        # Strictly, where yourdfpy would make something of any file.
+        root = ElementTree.parse(path).getroot()
+        if any('xacro' in element.tag for element in root.iter()):
+            raise ModelError(
+                f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
+            )
         return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
     except OSError as problem:
         raise ModelError(f'file {path}: {problem.strerror}; expected a URDF file') from problem

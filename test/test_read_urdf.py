@@ -125,6 +125,24 @@ def test_angles_written_with_few_digits_are_right_angles(tmp_path):
     assert 0.0 < tilt < 5e-5
 
 
+def test_axes_next_to_parallel_are_told(tmp_path, capsys):
+    joints = [
+        joint('a', 'revolute', 'base', 'l1', **TURN),
+        joint('b', 'revolute', 'l1', 'l2', **TURN, origin={'xyz': '.3 0 0', 'rpy': '0 .002 0'}),
+        joint('c', 'revolute', 'l2', 'l3', **{**TURN, 'axis': {'xyz': '1 0 0'}}),
+        joint('d', 'fixed', 'l3', 'tool', origin={'xyz': '0.2 0 0'}),
+    ]
+    file, arm = file_of(tmp_path, urdf(joints)), tmp_path / 'arm.yaml'
+    assert read_urdf.main([str(file), '--output', str(arm)]) == 0
+    assert 'bars: up to 150.00 m long in an arm of 0.50 m' in capsys.readouterr().out
+    # Made from a xacro file, of which the name of its language is left.
+    chest = resource_path('config/examples/chest_arm.urdf').read_text()
+    named = chest.replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    file.write_text(named)
+    assert read_urdf.main([str(file), '--ray', '+x', '--output', str(arm)]) == 0
+    assert 'bars' not in capsys.readouterr().out.replace('straight bars', '')
+
+
 def test_lines_that_are_no_numbers_are_refused():
     with pytest.raises(ModelError, match='finite'):
         rows_of_axes(np.full((2, 3), np.nan), np.eye(3)[:2], np.eye(3)[2])
@@ -157,7 +175,7 @@ CHAINS = {
     'expected a tree': [LAST, joint('b', 'fixed', 'base', 'tool')],
 }  # fmt: skip
 TEXTS = {
-    'a xacro file': '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="a"/>',
+    'a xacro file': '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro/></robot>',
     'no URDF': '<sdf version="1.9"/>',
     'no URDF (.*': 'joints: [1, 2]\n',
     'no URDF [(].*': '<robot name="a"><link name="b"/><joint name="c" type="revolute"/></robot>',

@@ -45,6 +45,7 @@ def shape(text):
     return NUMBER.sub('#', text).split()
 
 
+@pytest.mark.slow
 def test_every_offline_command_prints_what_the_tutorial_shows(tmp_path):
     pytest.importorskip('yourdfpy')
     pytest.importorskip('fcl')
