@@ -25,6 +25,9 @@ OWN = {
     'store': {'pyarrow'},
     'runs': {'numba'},
     'incident_files': {'yaml'},
+    'arm_file': {'yaml'},
+    'motion_files': {'yaml'},
+    'urdf_chain': {'yourdfpy', 'trimesh'},
 }
 # The node says that it compiles before it imports what has to be compiled; what only one option of
 # a command needs takes seconds to load.
