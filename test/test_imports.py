@@ -25,6 +25,10 @@ OWN = {
     'store': {'pyarrow'},
     'runs': {'numba'},
     'incident_files': {'yaml'},
+    # Tools to look at motions, in the layers of ROS and of the viewers.
+    'record': {'tqdm'},
+    'recorder': {'mcap'},
+    'recordings': {'mcap', 'mcap_ros2'},
 }
 # The node says that it compiles before it imports what has to be compiled.
 # The report says which requirements it misses before it imports what has them.
@@ -32,6 +36,9 @@ REPORTER = 'rrth_planner.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+    # Once it is known that what they need is installed.
+    ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
+    ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
 }
 
 
@@ -61,7 +68,7 @@ def allowed(module, name):
         if target == 'viewers':
             is_demo = layer == 'ros' and 'demo' in module
             return layer == 'viewers' or is_demo or module == REPORTER
-        return target != 'ros' or layer == 'ros'
+        return target != 'ros' or layer == 'ros' or (module, name) in LATE
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
     return (
@@ -70,8 +77,9 @@ def allowed(module, name):
             'kernels': {'numba'},
             'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
             'viewers': {'matplotlib', 'mpl_toolkits'},
-            'core': OWN.get(module.split('.')[-1], set()),
+            'core': set(),
         }[layer]
+        | OWN.get(module.split('.')[-1], set())
     )
 
 
