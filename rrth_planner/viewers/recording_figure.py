@@ -21,7 +21,7 @@ from rrth_planner.viewers.plots import DASHES, JOINT_COLOURS, LIMIT, TIME_STEP
 
 SIZE = (14.0, 8.6)
 # Of the view of the arm: its width over its height.
-VIEW_SHAPE = 0.86
+VIEW_SHAPE = 0.94
 # Between two instants that are further apart the arm was not seen [s].
 UNSEEN = 0.25
 N_DENSE = 300
@@ -59,7 +59,7 @@ def recording_figure(
     figure = Figure(figsize=SIZE, facecolor='white')
     FigureCanvasAgg(figure)
     grid = figure.add_gridspec(
-        1, 2, width_ratios=(1.0, 1.05), left=0.01, right=0.985, top=0.91, bottom=0.07, wspace=0.24
+        1, 2, width_ratios=(1.0, 1.05), left=0.02, right=0.985, top=0.91, bottom=0.07, wspace=0.24
     )
     view = figure.add_subplot(grid[0], projection='3d')
     curves = grid[1].subgridspec(4, 1, height_ratios=(1.25, 1.0, 0.9, 0.16), hspace=0.13)
