@@ -99,9 +99,11 @@ def section(recording: Recording, begin: float, end: float) -> Recording:
     """
     chosen = (recording.times >= begin) & (recording.times <= end)
     if not chosen.any():
+        # No -0.00.
+        first, last = recording.times[[0, -1]].round(2) + 0.0
         raise RecordError(
-            f'from {begin:g} to {end:g}, expected times between {recording.times[0]:.2f} and '
-            f'{recording.times[-1]:.2f}, when the arm was seen [s]'
+            f'from {begin:g} to {end:g}, expected times between {first:.2f} and {last:.2f}, when '
+            'the arm was seen [s]'
         )
     return replace(
         recording,

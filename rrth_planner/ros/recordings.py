@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+import struct
 from typing import Any, NamedTuple
 
 from mcap.exceptions import EndOfFile
@@ -227,8 +228,8 @@ def _read(path: Path) -> tuple[dict[str, list[Heard]], int]:
                 topics.setdefault(channel.topic, []).append(heard)
     except OSError as problem:
         raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
-    except EndOfFile:
-        # What is there counts.
+    except (EndOfFile, struct.error):
+        # Cut short: what is there counts.
         pass
     except Exception as problem:
         # Whoever made the file may have written anything.

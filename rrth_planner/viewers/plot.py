@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 import sys
-from typing import Any
 
 from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.body_file import load_body
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
@@ -121,14 +120,16 @@ def _arm_and_settings(options: argparse.Namespace) -> tuple[ArmModel, PlanSettin
 
 def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:
     """Return where the arm starts, (dof,) [rad]: as told, or as the playback does."""
-    file = resource_path('config/playback.yaml')
-    q: Any = load_yaml(file)['/**']['ros__parameters']['initial_positions']
-    if given is None and len(q) != arm.dof:
+    if given is not None:
+        return frozen_array(given, (arm.dof,), '--from', 'rad', OptionsError)
+    data = load_yaml(resource_path('config/playback.yaml'))
+    q = data['/**']['ros__parameters']['initial_positions']
+    if len(q) != arm.dof:
         raise OptionsError(
             f'no --from, expected {arm.dof} positions, one for each of '
             f'{", ".join(arm.joint_names)} [rad]'
         )
-    return np.array(q if given is None else given, dtype=np.float64)
+    return np.array(q, dtype=np.float64)
 
 
 def _seed(given: int) -> int:
