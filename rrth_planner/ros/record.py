@@ -73,6 +73,7 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
     from tqdm import tqdm  # type: ignore[import-untyped]
 
     told: list[int] = []
+    known: set[str] = set()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         # Only noted, so that no message is cut in the middle.
         signal.signal(number, lambda number, _: told.append(number))
@@ -91,9 +92,12 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
         while not told and since(begin) < options.duration:
             executor.spin_once(timeout_sec=min(0.1, max(0.0, options.duration - since(begin))))
             recorder.check()
-            # Their whole names are in the table at the end.
-            heard = {k.rsplit('/', 1)[-1]: n for k, n in recording.counts.items() if n}
-            bar.set_postfix(heard, refresh=False)
+            heard = {topic: n for topic, n in recording.counts.items() if n}
+            for topic in heard.keys() - known:
+                tqdm.write(f'hears {topic}')
+                sys.stdout.flush()
+            known |= heard.keys()
+            bar.set_postfix({k.rsplit('/', 1)[-1]: n for k, n in heard.items()}, refresh=False)
             bar.update(sum(recording.counts.values()) - bar.n)
     for topic, count in recording.counts.items():
         print(f'{count:8d}  {topic}')
