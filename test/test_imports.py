@@ -71,16 +71,12 @@ def allowed(module, name):
         return target != 'ros' or layer == 'ros' or (module, name) in LATE
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
-    return (
-        root
-        in {
-            'kernels': {'numba'},
-            'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
-            'viewers': {'matplotlib', 'mpl_toolkits'},
-            'core': set(),
-        }[layer]
-        | OWN.get(module.split('.')[-1], set())
-    )
+    return root in {
+        'kernels': {'numba'},
+        'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
+        'viewers': {'matplotlib', 'mpl_toolkits'},
+        'core': set(),
+    }[layer] | OWN.get(module.split('.')[-1], set())
 
 
 @pytest.mark.parametrize('module', MODULES)

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from importlib.util import find_spec
 import math
 from pathlib import Path
+import re
 import signal
 import sys
 import time
@@ -38,6 +39,7 @@ TOPICS: dict[str, Any] = {
     'arm_playback/tool_pose': PoseStamped,
 }
 TOOLS = ('mcap', 'tqdm')
+SOURCE_LINES = re.compile(r', at /\S+\.c:\d+')
 DESCRIPTION = """\
 Record a run of the nodes in an MCAP file until Ctrl-C: every message once, as it came from the
 wire, whether its publisher is reliable, best effort, or latched it before. Foxglove opens the
@@ -54,11 +56,13 @@ example:    ./run exec record -o run.mcap --duration 30 --ros-args -r __ns:=/lef
 def main(arguments: Sequence[str] | None = None) -> int:
     """Record until told to end, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(remove_ros_args(['record', *given])[1:])
     try:
+        options = _parser().parse_args(remove_ros_args(['record', *given])[1:])
         return _record(options, given)
     except (RrthError, OSError, RuntimeError, InvalidTopicNameException) as problem:
-        print(f'record: {one_line(" ".join(str(problem).split()))}', file=sys.stderr)
+        # ROS says in which lines of its sources it found what is wrong.
+        sentence = SOURCE_LINES.sub('', ' '.join(str(problem).split()))
+        print(f'record: {one_line(sentence)}', file=sys.stderr)
         return 1
 
 

@@ -309,6 +309,21 @@ def test_a_folder_that_is_missing_is_named(tmp_path):
     assert 'No such file or directory' in said
 
 
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--topics', 'bad name'], 'topic name must not contain'),
+        (['--ros-args', '-r', 'nonsense'], 'nonsense'),
+    ],
+)
+def test_names_that_are_none_are_refused(tmp_path, arguments, words):
+    path = tmp_path / 'run.mcap'
+    said = refusal('-o', path, '--duration', 0.5, *arguments)
+    assert words in said
+    assert '.c:' not in said
+    assert not path.exists()
+
+
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'soon'])
 def test_a_bad_duration_is_refused(value):
     ended = subprocess.run(
