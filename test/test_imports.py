@@ -28,6 +28,9 @@ OWN = {
     'arm_file': {'yaml'},
     'motion_files': {'yaml'},
     'urdf_chain': {'yourdfpy', 'trimesh'},
+    # Tools to look at motions, in the layers of ROS and of the viewers.
+    'recorder': {'mcap'},
+    'recordings': {'mcap', 'mcap_ros2'},
 }
 # The node says that it compiles before it imports what has to be compiled; what only one option of
 # a command needs takes seconds to load.
@@ -43,6 +46,9 @@ LATE = {
         ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
         for name in ('inputs', 'listener', 'plan_queue', 'reporter')
     ),
+    # Once it is known that what they need is installed.
+    ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
+    ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
 }
 
 
@@ -72,18 +78,15 @@ def allowed(module, name):
         if target == 'viewers':
             is_demo = layer == 'ros' and 'demo' in module
             return layer == 'viewers' or is_demo or module == REPORTER
-        return target != 'ros' or layer == 'ros'
+        return target != 'ros' or layer == 'ros' or (module, name) in LATE
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
-    return (
-        root
-        in {
-            'kernels': {'numba'},
-            'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
-            'viewers': {'matplotlib', 'mpl_toolkits'},
-            'core': OWN.get(module.split('.')[-1], set()),
-        }[layer]
-    )
+    return root in {
+        'kernels': {'numba'},
+        'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
+        'viewers': {'matplotlib', 'mpl_toolkits'},
+        'core': set(),
+    }[layer] | OWN.get(module.split('.')[-1], set())
 
 
 @pytest.mark.parametrize('module', MODULES)
