@@ -369,7 +369,7 @@ def test_a_disk_that_is_full_ends_the_recording_with_one_sentence(tmp_path):
     assert said == f'{path}: File too large, expected to write there'
 
 
-@pytest.mark.parametrize('kind', [*{*TOPICS.values(), String}], ids=type_name)
+@pytest.mark.parametrize('kind', [*dict.fromkeys([*TOPICS.values(), String])], ids=type_name)
 def test_definitions_are_those_that_others_know(kind):
     name = type_name(kind)
     found = get_types_from_msg(definition_of(kind), name)
