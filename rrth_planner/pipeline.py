@@ -86,6 +86,8 @@ class MotionPlan:
         The motion that the two judges disagree about, where that is why there is none.
     escape_time : float
         Until then the trajectory leads out of boxes that the arm was in [s]; 0: it was in none.
+    search : PlanResult or None
+        How the path was found: the first path, the trees; None unless solved.
 
     """
 
@@ -99,6 +101,7 @@ class MotionPlan:
     reach: float = float('nan')
     disagreement: Disagreement | None = None
     escape_time: float = 0.0
+    search: PlanResult | None = None
 
 
 def plan_motion(
@@ -432,6 +435,7 @@ def _solved(
         clearance=clearance,
         reach=_reach(arm, goal, path.waypoints[-1]),
         escape_time=escape_time,
+        search=result,
     )
 
 

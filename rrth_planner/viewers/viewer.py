@@ -1,0 +1,193 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The viewer in the browser: plan by dragging the target, or follow the nodes that run."""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+import os
+from pathlib import Path
+import signal
+import socket
+import sys
+from typing import Any, NoReturn
+import webbrowser
+
+from rrth_planner.compiling import compile_kernels
+from rrth_planner.errors import OptionsError, RrthError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.jit import cache_folder, is_compiled
+from rrth_planner.pipeline import warm_up
+from rrth_planner.question import PlanQuestion
+from rrth_planner.resources import load_arm
+from rrth_planner.settings import load_settings
+from rrth_planner.viewers.viewer_examples import example_target, load_wearer, start_of
+from rrth_planner.viewers.viewer_picture import save_picture
+
+ROS_ARGS = '--ros-args'
+PORT = 8081
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serve the page until it is interrupted; return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    at = given.index(ROS_ARGS) if ROS_ARGS in given else len(given)
+    options, ros_args = _parse(given[:at]), given[at:]
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _end)
+    try:
+        _run(options, ros_args)
+    except (RrthError, OSError) as problem:
+        print(f'viewer: {" ".join(str(problem).split())}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        pass
+    return 0
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog='viewer',
+        description='Show the planner in the browser: drag the target, and it plans anew. '
+        'Ctrl-C ends it.',
+        epilog=f'With --live, what follows {ROS_ARGS} is for ROS: remaps, parameters.',
+    )
+    parser.add_argument('--arm', type=Path, metavar='FILE', help='laid out as config/arm.yaml')
+    parser.add_argument(
+        '--body',
+        type=Path,
+        metavar='FILE',
+        help='laid out as config/body.yaml, or msg_examples/body.yaml',
+    )
+    parser.add_argument(
+        '--settings', type=Path, metavar='FILE', help='parameters, laid out as config/planner.yaml'
+    )
+    parser.add_argument(
+        '--target', type=float, nargs=3, metavar=('X', 'Y', 'Z'), help='at first [m] (1.5 0.1 0.3)'
+    )
+    parser.add_argument('--host', default='127.0.0.1', help='to listen on (%(default)s)')
+    parser.add_argument(
+        '--port', type=int, default=PORT, help='to listen on; 0: any that is free (%(default)s)'
+    )
+    parser.add_argument(
+        '--open',
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help='open the page in the browser (where there is a display)',
+    )
+    parser.add_argument(
+        '--live', action='store_true', help='follow the running nodes instead of planning'
+    )
+    parser.add_argument(
+        '--screenshot', type=Path, metavar='FILE', help='save a picture of the page, and end'
+    )
+    return parser.parse_args(arguments)
+
+
+def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
+    if ros_args and not options.live:
+        raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
+    if find_spec('viser') is None:
+        raise OptionsError('viser: not installed, expected for the page (pip install viser)')
+    if options.live:
+        _run_live(options, ros_args)
+    else:
+        _run_planning(options)
+
+
+def _run_planning(options: argparse.Namespace) -> None:
+    """Serve the page that plans itself."""
+    from rrth_planner.viewers.viewer_page import ViewerPage
+
+    question = _question(options)
+    if not is_compiled():
+        how_often = 'at every start' if cache_folder() is None else 'once for this machine'
+        print(f'Compiling the planner, {how_often}: takes up to a minute.', flush=True)
+        if cache_folder() is not None:
+            compile_kernels()
+    warm_up(question.arm, question.options)
+    with _served(options) as (server, url):
+        page = ViewerPage(server, question)
+        try:
+            if options.screenshot is None:
+                page.run()
+            else:
+                page.model.wait(1, question.options.time_limit + 60.0)
+                page.draw()
+                save_picture(url, options.screenshot)
+        finally:
+            page.close()
+
+
+def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
+    """Serve the page that follows the nodes."""
+    if find_spec('rclpy') is None:
+        raise OptionsError('rclpy: not installed, expected for --live (source ROS 2 Jazzy)')
+    if options.screenshot is not None or options.body is not None or options.target is not None:
+        raise OptionsError('--live: given with --screenshot, --body or --target, expected without')
+    from rrth_planner.ros.viewer_feed import following
+    from rrth_planner.viewers.viewer_live import LivePage
+
+    with following(options.arm, options.settings, ros_args) as feed:
+        with _served(options) as (server, _):
+            LivePage(server, feed).run()
+
+
+def _question(options: argparse.Namespace) -> PlanQuestion:
+    arm = load_arm(options.arm)
+    settings = load_settings(arm.dof, options.settings)
+    target = example_target('front') if options.target is None else options.target
+    return PlanQuestion(
+        arm=arm,
+        scene=load_wearer(options.body),
+        q_start=start_of(arm),
+        goal=PointingGoal(target),
+        limits=settings.limits,
+        options=settings.options,
+        margin=settings.margin,
+        ray_guard_length=settings.ray_guard_length,
+        seed=max(0, settings.seed),
+        escape_depth=settings.escape_depth,
+    )
+
+
+@contextmanager
+def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
+    """Serve an empty page while the block runs; give the server and the page's address."""
+    import viser
+
+    port = _free_port(options.host, options.port)
+    server = viser.ViserServer(host=options.host, port=port, verbose=False)
+    host = 'localhost' if options.host in ('0.0.0.0', '::') else options.host
+    url = f'http://{host}:{server.get_port()}'
+    print(f'The viewer is at {url} (Ctrl-C ends it).', flush=True)
+    has_display = any(os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY'))
+    is_wanted = has_display and options.screenshot is None
+    try:
+        if is_wanted if options.open is None else options.open:
+            webbrowser.open(url)
+        yield server, url
+    finally:
+        server.stop()
+
+
+def _free_port(host: str, port: int) -> int:
+    """Return the port, for 0 one that is free, or raise OptionsError where it is taken."""
+    try:
+        with socket.create_server((host, port)) as listener:
+            return int(listener.getsockname()[1])
+    except (OSError, OverflowError) as problem:
+        raise OptionsError(
+            f'--host {host} --port {port}: {problem}; expected an address of this machine and a '
+            'port that is free'
+        ) from problem
+
+
+def _end(*_: Any) -> NoReturn:
+    """Turn a signal into an interrupt."""
+    raise KeyboardInterrupt
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,201 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page that plans itself: controls change the question, one thread draws what comes of it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from threading import Event, Lock
+import time
+from typing import Any
+
+import numpy as np
+from rrth_planner.question import PlanQuestion
+from rrth_planner.trajectory import positions_at, Trajectory
+from rrth_planner.viewers.viewer_examples import example_body, example_target
+from rrth_planner.viewers.viewer_geometry import path_curve, tool_positions, trajectory_curve
+from rrth_planner.viewers.viewer_model import Answer, ViewerModel
+from rrth_planner.viewers.viewer_panel import answer_html, OWN, Panel
+from rrth_planner.viewers.viewer_player import Player
+from rrth_planner.viewers.viewer_scene import SceneView
+import viser
+
+# Pictures of a motion that plays, and how long a page at rest may sleep [s].
+FRAME, NAP = 1.0 / 30.0, 0.5
+# Widths of the ways of the tool [m].
+FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.007, 0.007, 0.010
+
+
+class ViewerPage:
+    """
+    Show a question, let it be changed, and show and play the motion that answers it.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    question : PlanQuestion
+        Asked at once.
+
+    """
+
+    def __init__(self, server: viser.ViserServer, question: PlanQuestion) -> None:
+        """Draw what is known, and ask."""
+        self._own = question
+        self._arm = question.arm
+        self._lock, self._wake = Lock(), Event()
+        # Both are written by the callbacks of the page, and drawn by `run`.
+        self._player, self._trajectory = Player(), None
+        self._drawn: Answer | None = None
+        self._body: Any = None
+        self.view = SceneView(server, question.arm, question.ray_guard_length)
+        self.panel = Panel(server, is_live=False, on_layer=self._on_layer)
+        panel = self.panel
+        panel.target.value = tuple(question.goal.target.tolist())
+        panel.margin.max = max(panel.margin.max, question.margin)
+        panel.margin.value = question.margin
+        panel.seed.max = max(panel.seed.max, question.seed)
+        panel.seed.value = question.seed
+        panel.step_size.max = max(panel.step_size.max, question.options.step_size)
+        panel.step_size.value = question.options.step_size
+        self.view.target.position = question.goal.target
+        self.model = ViewerModel(question, lambda answer: self._wake.set())
+        self._connect()
+        self.model.ask()
+
+    def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
+        """Draw what changes until it is over, or the thread is interrupted."""
+        before = time.monotonic()
+        while not is_over():
+            now = time.monotonic()
+            with self._lock:
+                self._player = self._player.advanced(now - before)
+                is_playing = self._player.is_playing
+            before = now
+            self.draw()
+            self._wake.wait(FRAME if is_playing else NAP)
+            self._wake.clear()
+
+    def draw(self) -> None:
+        """Draw the newest answer, and the arm where the motion is."""
+        question, answer = self.model.question, self.model.answer
+        body = (question.scene, question.margin)
+        if body != self._body:
+            self._body = body
+            self.view.show_body(*body)
+        if answer is not self._drawn:
+            self._drawn = answer
+            self._draw_answer(answer)
+        with self._lock:
+            player, trajectory = self._player, self._trajectory
+        q = question.q_start
+        if trajectory is not None:
+            q = positions_at(trajectory, [player.time])[0]
+        self.view.show_posture(q, question.goal.target)
+        self.panel.play.label = 'Pause' if player.is_playing else 'Play'
+        self.panel.time.value = round(player.time, 3)
+
+    def close(self) -> None:
+        """End the thread that plans."""
+        self.model.close()
+
+    def _draw_answer(self, answer: Answer) -> None:
+        plan, question = answer.plan, answer.question
+        trajectory = None if plan is None else plan.trajectory
+        self.panel.said.content = answer_html(answer)
+        if question is not None:
+            self.view.start.move(question.q_start)
+        nothing = np.empty((0, 3))
+        search = None if plan is None else plan.search
+        self.view.show_trees(() if search is None else search.trees)
+        for layer, path, width in (
+            ('first', None if search is None else search.raw_path, FIRST_WIDTH),
+            ('short', None if plan is None else plan.path, SHORT_WIDTH),
+        ):
+            curve = nothing if path is None else path_curve(self._arm, path.waypoints)
+            corners = nothing if path is None else tool_positions(self._arm, path.waypoints)
+            self.view.show_path(layer, curve, corners, width)
+        curve = nothing if trajectory is None else trajectory_curve(self._arm, trajectory)
+        self.view.show_path('timed', curve, nothing, TIMED_WIDTH)
+        self._load(trajectory)
+
+    def _load(self, trajectory: Trajectory | None) -> None:
+        """Have another motion played; with none the arm stays at the start."""
+        duration = 0.0 if trajectory is None else trajectory.duration
+        with self._lock:
+            self._trajectory = trajectory
+            self._player = self._player.loaded(duration)
+        self.panel.time.max = max(round(duration, 3), 0.01)
+        self.panel.time.disabled = self.panel.play.disabled = trajectory is None
+
+    def _connect(self) -> None:
+        """Have the controls change the question and the player."""
+        panel, view = self.panel, self.view
+        for control, change in (
+            (panel.target, self._on_numbers),
+            (panel.target_example, self._on_target_example),
+            (panel.body_example, self._on_body_example),
+            (panel.margin, lambda: self.model.ask(margin=panel.margin.value)),
+            (panel.seed, lambda: self.model.ask(seed=panel.seed.value)),
+            (panel.step_size, lambda: self.model.ask(step_size=panel.step_size.value)),
+            (panel.time, lambda: self._play(lambda player: player.moved(panel.time.value), False)),
+            (panel.speed, self._on_motion_settings),
+            (panel.repeat, self._on_motion_settings),
+        ):
+            control.on_update(self._by_hand(change))
+        panel.start_here.on_click(self._by_hand(self._on_start_here))
+        panel.play.on_click(self._by_hand(lambda: self._play(Player.toggled)))
+        view.target.on_update(self._by_hand(self._on_drag))
+
+    def _by_hand(self, change: Callable[[], Any]) -> Callable[[Any], None]:
+        """Return a callback that answers to people only, not to what this program writes."""
+
+        def on_event(event: Any) -> None:
+            if event.client is not None:
+                change()
+                self._wake.set()
+
+        return on_event
+
+    def _on_drag(self) -> None:
+        # Read late: callbacks may overtake each other, the position does not go back.
+        target = np.asarray(self.view.target.position, dtype=np.float64)
+        self.panel.target.value = tuple(target.round(4).tolist())
+        self.panel.target_example.value = OWN
+        self.model.ask(target=target)
+
+    def _on_numbers(self) -> None:
+        self.panel.target_example.value = OWN
+        self._aim(np.array(self.panel.target.value))
+
+    def _on_target_example(self) -> None:
+        name = self.panel.target_example.value
+        target = self._own.goal.target if name == OWN else example_target(name)
+        self.panel.target.value = tuple(target.tolist())
+        self._aim(target)
+
+    def _aim(self, target: Any) -> None:
+        self.view.target.position = target
+        self.model.ask(target=target)
+
+    def _on_body_example(self) -> None:
+        name = self.panel.body_example.value
+        self.model.ask(scene=self._own.scene if name == OWN else example_body(name))
+
+    def _on_start_here(self) -> None:
+        with self._lock:
+            player, trajectory = self._player, self._trajectory
+        if trajectory is None:
+            self.model.ask(q_start=self._own.q_start)
+        else:
+            self.model.ask(q_start=positions_at(trajectory, [player.time])[0])
+
+    def _on_motion_settings(self) -> None:
+        speed, is_repeating = float(self.panel.speed.value), self.panel.repeat.value
+        self._play(lambda player: replace(player, speed=speed, is_repeating=is_repeating))
+
+    def _play(self, change: Callable[[Player], Player], is_on: bool = True) -> None:
+        with self._lock:
+            player = change(self._player)
+            self._player = player if is_on else replace(player, is_playing=False)
+
+    def _on_layer(self, name: str, is_shown: bool) -> None:
+        self.view.layers[name].visible = is_shown

@@ -1,0 +1,136 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The page's controls, and what it says of an answer."""
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+from rrth_planner.viewers.viewer_examples import BODIES, TARGETS
+from rrth_planner.viewers.viewer_model import Answer
+from rrth_planner.viewers.viewer_scene import FIRST, LAYERS, SHORT, TIMED, TREES
+import viser
+
+OWN = 'own'
+# What the checkboxes call the layers.
+SHOWN = {
+    'margin': 'margin round the boxes',
+    'start': 'arm at the start',
+    'tree': 'tree',
+    'first': 'first path',
+    'short': 'path after shortening',
+    'timed': 'path after rounding, in time',
+}
+BRAND = (59, 111, 182)
+GOOD, BAD = '#14804a', '#b3261e'
+SPEEDS = ('0.1', '0.25', '0.5', '1')
+MOST_SEEDS, STEP_SIZES, MOST_MARGIN, FARTHEST = 99, (0.05, 1.5), 0.1, 5.0
+
+
+def answer_html(answer: Answer) -> str:
+    """Return what an answer says, as HTML: planning time, sentence, and the three steps."""
+    sentence = escape(answer.sentence)
+    plan = answer.plan
+    if plan is None:
+        return _page('no motion', BAD, sentence, [])
+    took = f'planning time {1e3 * plan.planning_time:.2f} ms'
+    if plan.trajectory is None or plan.path is None or plan.search is None:
+        return _page(f'no motion, {took}', BAD, f'{plan.status.value}: {sentence}', [])
+    raw, trees = plan.search.raw_path, plan.search.trees
+    rows = [
+        (
+            FIRST,
+            'first path: a straight joint motion'
+            if raw is None
+            else f'first path: {len(raw.waypoints)} waypoints, {raw.length:.3f} rad',
+        ),
+        (
+            SHORT,
+            f'after shortening: {len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad',
+        ),
+        (
+            TIMED,
+            f'after rounding, in time: {len(plan.trajectory.times)} points, '
+            f'{plan.trajectory.duration:.2f} s',
+        ),
+    ]
+    rows += [
+        (colour, f'tree from the {end}: {len(tree.nodes)} nodes')
+        for colour, end, tree in zip(TREES, ('start', 'goals'), trees, strict=False)
+    ]
+    return _page(took, GOOD, sentence, rows)
+
+
+def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -> str:
+    lines = ''.join(
+        f'<div style="margin-top:0.25em"><span style="display:inline-block;width:1.5em;'
+        f'height:0.3em;margin-right:0.5em;vertical-align:middle;background:rgb{rgb}"></span>'
+        f'{text}</div>'
+        for rgb, text in rows
+    )
+    return (
+        f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em;line-height:1.35">'
+        f'<b style="color:{colour}">{title}</b><div>{sentence}</div>{lines}</div>'
+    )
+
+
+class Panel:
+    """
+    The controls; each calls back with nothing, and is read by whom it calls.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    is_live : bool
+        Where nodes plan: without what only a plan of this process has.
+    on_layer : callable
+        Gets a layer's name and whether it is shown.
+
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, *, is_live: bool, on_layer: Callable[[str, bool], None]
+    ) -> None:
+        """Make them."""
+        gui = server.gui
+        gui.configure_theme(
+            control_layout='fixed',
+            control_width='large',
+            show_logo=False,
+            show_share_button=False,
+            brand_color=BRAND,
+        )
+        gui.set_panel_label('rrth_planner')
+        with gui.add_folder('Answer'):
+            self.said = gui.add_html(answer_html(Answer()))
+        with gui.add_folder('Target'):
+            self.target_example = gui.add_dropdown('example', (OWN, *TARGETS))
+            self.target = gui.add_vector3(
+                'x, y, z [m]', (0.0, 0.0, 0.0), min=(-FARTHEST,) * 3, max=(FARTHEST,) * 3, step=0.01
+            )
+            self.plan = gui.add_button('Plan', visible=is_live)
+        with gui.add_folder('Question', visible=not is_live):
+            self.body_example = gui.add_dropdown('body', (OWN, *BODIES))
+            self.margin = gui.add_slider('margin [m]', 0.0, MOST_MARGIN, 0.005, 0.02)
+            self.seed = gui.add_slider('seed', 0, MOST_SEEDS, 1, 0)
+            self.step_size = gui.add_slider(
+                'tree step [rad]', *STEP_SIZES, 0.05, STEP_SIZES[1], hint='step_size'
+            )
+            self.start_here = gui.add_button('Start from where the arm is')
+        with gui.add_folder('Motion', visible=not is_live):
+            self.play = gui.add_button('Play')
+            self.time = gui.add_slider('time [s]', 0.0, 1.0, 0.01, 0.0)
+            self.speed = gui.add_dropdown('speed', SPEEDS, initial_value='1')
+            self.repeat = gui.add_checkbox('repeat', False)
+        with gui.add_folder('Show'):
+            for name in LAYERS:
+                if is_live and name in ('start', 'tree', 'first', 'short'):
+                    continue
+                self._layer(gui, name, on_layer)
+
+    def _layer(self, gui: Any, name: str, on_layer: Callable[[str, bool], None]) -> None:
+        box = gui.add_checkbox(SHOWN[name], True)
+        box.on_update(lambda _: on_layer(name, box.value))
+
+
+

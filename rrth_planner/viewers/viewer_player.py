@@ -1,0 +1,55 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where in a motion the page is, and how it goes on."""
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Player:
+    """
+    A place in a motion; a value, never changed.
+
+    Parameters
+    ----------
+    duration, time : float
+        Of the motion, and within it [s].
+    speed : float
+        How much faster than the clock, > 0 [-].
+    is_playing, is_repeating : bool
+
+    """
+
+    duration: float = 0.0
+    time: float = 0.0
+    speed: float = 1.0
+    is_playing: bool = False
+    is_repeating: bool = False
+
+    def advanced(self, elapsed: float) -> 'Player':
+        """Return the place after so long by the clock [s]; playing ends at the end."""
+        if not self.is_playing:
+            return self
+        if self.time >= self.duration and self.is_repeating:
+            return replace(self, time=0.0)
+        time = min(self.duration, self.time + self.speed * elapsed)
+        return replace(self, time=time, is_playing=time < self.duration or self.is_repeating)
+
+    def toggled(self) -> 'Player':
+        """Return it playing, from the begin where it was at the end, or not playing any more."""
+        at_end = self.time >= self.duration
+        return replace(
+            self,
+            time=0.0 if at_end and not self.is_playing else self.time,
+            is_playing=not self.is_playing,
+        )
+
+    def moved(self, time: float) -> 'Player':
+        """Return it at another time of the motion [s]."""
+        return replace(self, time=min(max(0.0, time), self.duration))
+
+    def loaded(self, duration: float) -> 'Player':
+        """Return it in another motion [s]: at its begin when playing, else as far along."""
+        share = self.time / self.duration if self.duration > 0.0 else 1.0
+        time = 0.0 if self.is_playing else share * duration
+        return replace(self, duration=duration, time=time)

@@ -1,0 +1,189 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the page shows in space: wearer, margin, arm, ray, target, tree and paths."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rrth_planner.arm import ArmModel, pointing_error, tool_pose
+from rrth_planner.arrays import Array
+from rrth_planner.result import Tree
+from rrth_planner.scene import Scene
+from rrth_planner.viewers.arm_view import arm_points
+from rrth_planner.viewers.viewer_geometry import along_z, segments_of, tree_segments, wxyz
+import viser
+
+Color = tuple[int, int, int]
+CLOTH, SKIN, SHELL = (126, 147, 178), (227, 184, 152), (70, 110, 170)
+BAR, JOINT, GHOST, RAY = (38, 43, 52), (232, 138, 32), (110, 116, 128), (209, 50, 70)
+TARGET = (242, 183, 5)
+# The trees from the start and from the goals; the path as found, shortened, and in time.
+TREES: tuple[Color, Color] = ((59, 111, 182), (200, 60, 140))
+FIRST, SHORT, TIMED = (224, 123, 0), (20, 140, 80), (123, 63, 160)
+# Thinnest bar, and the ray [m].
+BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
+# A ray that passes so near to the target points at it [m].
+AIMED = 5e-3
+# The camera at first: behind the wearer, to the right [m].
+CAMERA, LOOK_AT = (-2.05, -1.75, 1.35), (0.25, -0.05, 0.12)
+LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
+
+
+class ArmShape:
+    """Bars and joints of the arm in one posture, which moves."""
+
+    def __init__(
+        self, server: viser.ViserServer, name: str, arm: ArmModel, opacity: float | None = None
+    ) -> None:
+        """Begin with all bars of length zero."""
+        self._arm = arm
+        bar, joint = (BAR, JOINT) if opacity is None else (GHOST, GHOST)
+        radii = np.repeat(np.maximum(arm.radii, BAR_RADIUS), 2)
+        options: dict[str, Any] = {'opacity': opacity, 'cast_shadow': opacity is None}
+        self._bars = [
+            server.scene.add_cylinder(f'{name}/bar_{k}', float(r), 1.0, bar, **options)
+            for k, r in enumerate(radii)
+        ]
+        self._joints = [
+            server.scene.add_icosphere(f'{name}/joint_{k}', 1.45 * float(r), joint, **options)
+            for k, r in enumerate(np.append(radii[:1], radii))
+        ]
+
+    def move(self, q: Array) -> None:
+        """Take a posture, (dof,) [rad]."""
+        points = arm_points(self._arm, q)
+        for k, bar in enumerate(self._bars):
+            place_bar(bar, points[k], points[k + 1])
+            self._joints[k + 1].position = points[k + 1]
+        self._joints[0].position = points[0]
+
+
+class SceneView:
+    """
+    Draw into a server's scene, x forward, y left, z up [m].
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    arm : ArmModel
+    ray_guard_length : float
+        How much of the ray is drawn where it does not point at the target [m].
+
+    """
+
+    def __init__(self, server: viser.ViserServer, arm: ArmModel, ray_guard_length: float) -> None:
+        """Set up light, camera, floor and the layers that can be hidden."""
+        self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
+        server.scene.set_up_direction('+z')
+        server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
+        server.scene.add_grid(
+            '/floor', 6.0, 6.0, position=(0.0, 0.0, -0.87), cell_size=0.25, section_size=1.0
+        )
+        self.layers = {
+            name: server.scene.add_frame(f'/{name}', show_axes=False) for name in LAYERS
+        }
+        self.arm = ArmShape(server, '/arm', arm)
+        self.start = ArmShape(server, '/start', arm, 0.35)
+        self._ray = server.scene.add_cylinder('/ray', RAY_RADIUS, 1.0, RAY, cast_shadow=False)
+        self.target = server.scene.add_transform_controls(
+            '/target', scale=0.28, disable_rotations=True, disable_sliders=True, depth_test=False
+        )
+        server.scene.add_icosphere('/target/ball', 0.035, TARGET)
+        self._drawn: dict[str, list[Any]] = {}
+
+    def show_body(self, scene: Scene, margin: float) -> None:
+        """Draw the wearer's boxes, and round each the shell of the margin [m]."""
+        boxes: list[Any] = []
+        shells: list[Any] = []
+        for k, box in enumerate(scene.boxes):
+            place = {'position': box.center, 'wxyz': wxyz(box.rotation)}
+            is_skin = any(part in box.name for part in ('head', 'forearm', 'hand'))
+            boxes.append(
+                self._scene.add_box(f'/body/{k}', SKIN if is_skin else CLOTH, box.size, **place)
+            )
+            shells.append(
+                self._scene.add_box(
+                    f'/margin/{k}',
+                    SHELL,
+                    box.size + 2.0 * margin,
+                    opacity=0.16,
+                    cast_shadow=False,
+                    receive_shadow=False,
+                    **place,
+                )
+            )
+        self._replace('body', boxes)
+        self._replace('margin', shells)
+
+    def show_posture(self, q: Array, target: Array | None) -> None:
+        """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""
+        self.arm.move(q)
+        T = tool_pose(self._arm, q)
+        length = self._ray_length
+        if target is not None and pointing_error(self._arm, q, target) < AIMED:
+            length = float(np.linalg.norm(target - T[:3, 3]))
+        place_bar(self._ray, T[:3, 3], T[:3, 3] + length * T[:3, 2])
+
+    def show_trees(self, trees: Sequence[Tree]) -> None:
+        """Draw where the tool is along the edges of the trees."""
+        handles: list[Any] = []
+        for k, (tree, colour) in enumerate(zip(trees, TREES, strict=False)):
+            handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.0035)
+            nodes = tool_pose(self._arm, tree.nodes)[:, :3, 3]
+            handles.append(
+                self._scene.add_point_cloud(
+                    f'/tree/nodes_{k}', nodes, colour, point_size=0.011, point_shape='circle'
+                )
+            )
+        self._replace('tree', handles)
+
+    def show_path(self, layer: str, curve: Array, corners: Array, width: float) -> None:
+        """
+        Draw a way of the tool in a layer.
+
+        Parameters
+        ----------
+        layer : str
+            'first', 'short' or 'timed'.
+        curve : ndarray, shape (n, 3)
+            [m]; none: an empty one.
+        corners : ndarray, shape (m, 3)
+            Where its waypoints are [m].
+        width : float
+            [m].
+
+        """
+        colour = {'first': FIRST, 'short': SHORT, 'timed': TIMED}[layer]
+        handles = self._lines(f'/{layer}/line', segments_of(curve), colour, width)
+        if len(corners):
+            handles.append(
+                self._scene.add_point_cloud(
+                    f'/{layer}/corners',
+                    corners,
+                    colour,
+                    point_size=2.6 * width,
+                    point_shape='circle',
+                )
+            )
+        self._replace(layer, handles)
+
+    def _lines(self, name: str, segments: Array, colour: Color, width: float) -> list[Any]:
+        if not len(segments):
+            return []
+        return [self._scene.add_line_segments(name, segments, colour, thickness=width)]
+
+    def _replace(self, what: str, handles: list[Any]) -> None:
+        """Remove what was drawn before and has not been drawn anew under its name."""
+        kept = {handle.name for handle in handles}
+        for handle in self._drawn.get(what, []):
+            if handle.name not in kept:
+                handle.remove()
+        self._drawn[what] = handles
+
+
+def place_bar(bar: Any, begin: Array, end: Array) -> None:
+    """Put a bar of length 1 along z between two points, (3,) [m]."""
+    middle, rotation, length = along_z(begin, end)
+    bar.position, bar.wxyz, bar.scale = middle, rotation, (1.0, 1.0, length)
+    bar.visible = length > 1e-6
