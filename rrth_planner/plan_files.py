@@ -210,8 +210,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help='parameters of the node; what it does not say is as in config/planner.yaml',
     )
-    parser.add_argument('--margin', type=float, metavar='M', help='clearance kept from every box [m]')
-    parser.add_argument('--seed', type=int, metavar='N', help='of the random draws; -1: fresh each time')
+    parser.add_argument(
+        '--margin', type=float, metavar='M', help='clearance kept from every box [m]'
+    )
+    parser.add_argument(
+        '--seed', type=int, metavar='N', help='of the random draws; -1: fresh each time'
+    )
     parser.add_argument(
         '--output', type=Path, metavar='FILE', help='motion to write, .yaml or .csv'
     )
