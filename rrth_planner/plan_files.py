@@ -14,8 +14,10 @@ import numpy as np
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.body_file import load_body
+from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.pipeline import MotionPlan, plan_motion, warm_up
 from rrth_planner.resources import load_arm, load_yaml, resource_path
@@ -34,9 +36,10 @@ exit codes: 0  solved: figures on standard output, the motion in the file of --o
             1  refused: why, in one sentence on standard error
             2  wrong usage or input: what, on standard error
 
-In the file a point a line has its time [s] and of each joint position, velocity and acceleration;
-between two points each joint follows the quintic that fits both. A name that ends in .csv gives a
-table, .yaml the same as YAML. Without --period the points are as few as fix the motion exactly.
+A motion is points in time [s] with position, velocity and acceleration of each joint; between two
+of them each joint follows the quintic that fits both. A file whose name ends in .csv has a header
+and a line a point, .yaml says the same as YAML. Without --period there are as few points as fix
+the motion exactly.
 
 example:    ./run exec plan --target 1.5 0.8 0.6 --output motion.csv --period 0.01
             ./run exec plan --arm config/examples/chest_arm.yaml \\
@@ -63,6 +66,10 @@ def _run(options: argparse.Namespace) -> int:
     settings = _settings(options, arm)
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # What compiling and loading takes is not planning time.
+    if not is_compiled():
+        print('plan: compiling the planner, takes up to a minute', file=sys.stderr, flush=True)
+        if cache_folder() is not None:
+            compile_kernels()
     warm_up(arm, settings.options)
     seed = settings.seed if settings.seed >= 0 else int(np.random.default_rng().integers(SEEDS))
     plan = plan_motion(
@@ -201,10 +208,14 @@ def _parser() -> argparse.ArgumentParser:
         '--settings',
         type=Path,
         metavar='FILE',
-        help="parameters of the node; what it does not say, and others', config/planner.yaml",
+        help='parameters of the node; what it does not say is as in config/planner.yaml',
     )
-    parser.add_argument('--margin', type=float, help='clearance kept from every box [m]')
-    parser.add_argument('--seed', type=int, help='of the random draws; -1: fresh each time')
+    parser.add_argument(
+        '--margin', type=float, metavar='M', help='clearance kept from every box [m]'
+    )
+    parser.add_argument(
+        '--seed', type=int, metavar='N', help='of the random draws; -1: fresh each time'
+    )
     parser.add_argument(
         '--output', type=Path, metavar='FILE', help='motion to write, .yaml or .csv'
     )

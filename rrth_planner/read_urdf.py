@@ -33,7 +33,7 @@ fingers, are left out.
 exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (why, is printed)
 
-example:    ./run exec read_urdf config/examples/chest_arm.urdf --tool lamp --radius 0.03 \\
+example:    ./run exec read_urdf config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
                 --output my_arm.yaml --check 0 -0.5 1 0 0.3 0
 """
 

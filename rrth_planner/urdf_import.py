@@ -13,7 +13,7 @@ from rrth_planner.link_cover import cover_radii
 from rrth_planner.urdf_chain import UrdfChain
 
 # Configurations at which an arm is compared with its URDF.
-N_COMPARED = 200
+N_COMPARED = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

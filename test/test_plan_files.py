@@ -23,6 +23,12 @@ FOLDED = load_yaml(resource_path('config/playback.yaml'))['/**']['ros__parameter
 ]
 
 
+def sentence(said):
+    """Return the one line that was said, but for that of a planner that had to be compiled."""
+    (line,) = (line for line in said.splitlines() if 'compiling the planner' not in line)
+    return line
+
+
 def test_a_motion_is_printed_and_written(tmp_path, capsys):
     exact, table = tmp_path / 'motion.yaml', tmp_path / 'motion.csv'
     assert plan_files.main([*TARGET, '--seed', '5', '--output', str(exact)]) == 0
@@ -54,8 +60,8 @@ def test_figures_as_json(capsys):
     assert plan_files.main(['--target', '0', '0', '0', '--json']) == 1
     streams = capsys.readouterr()
     assert json.loads(streams.out)['status'] == 'goal in collision'
-    assert streams.err.startswith('plan: goal in collision: ')
-    assert streams.err.count('\n') == 1
+    assert sentence(streams.err).startswith('plan: goal in collision: ')
+    assert 'torso' in streams.err
 
 
 def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
@@ -87,9 +93,7 @@ def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
 def test_wrong_input_is_a_sentence(tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
     assert plan_files.main([*TARGET, *arguments]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count('\n') == 1
+    assert words in sentence(capsys.readouterr().err)
     assert not list(tmp_path.iterdir())
 
 
@@ -110,8 +114,7 @@ def test_settings_that_are_none_are_a_sentence(tmp_path, capsys, line):
     file = tmp_path / 'mine.yaml'
     file.write_text(f'/**: {{ros__parameters: {{{line}}}}}\n')
     assert plan_files.main([*TARGET, '--settings', str(file)]) == 2
-    said = capsys.readouterr().err
-    assert said.count('\n') == 1
+    said = sentence(capsys.readouterr().err)
     assert line.split(':')[0] in said or 'settings' in said
 
 
