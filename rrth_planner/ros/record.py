@@ -22,6 +22,7 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
+from rclpy.validate_topic_name import validate_topic_name
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -76,6 +77,8 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
     from rrth_planner.ros.recorder import Recorder, RecordingFile, since
     from tqdm import tqdm  # type: ignore[import-untyped]
 
+    for topic in options.topics or ():
+        validate_topic_name(topic)
     told: list[int] = []
     known: set[str] = set()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write what is said on topics to an MCAP file, byte for byte."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 import time
@@ -114,6 +114,21 @@ class RecordingFile:
         return RecordingError(f'{self._path}: {problem.strerror}, expected to write there')
 
 
+class RawSubscription(OpenSubscription):
+    """Hears the same as its parent, and hands on the bytes, with their own time of sending."""
+
+    def _hand_on(
+        self,
+        data: bytes,
+        hearer: Callable[[Any, int, int], None],
+        sent: int,
+        info: dict[str, Any],
+    ) -> None:
+        # Not every middleware says when it came. `sent` never falls; a recording wants to know.
+        received = info.get('received_timestamp') or time.time_ns()
+        hearer(data, info['source_timestamp'], received)
+
+
 class Recorder(Node):
     """
     Hears topics from publishers of any quality of service, and writes down what comes.
@@ -167,11 +182,7 @@ class Recorder(Node):
                     self._problem = problem
 
         # What was latched before is part of the recording too, whatever has come since.
-        self._heard.append(
-            OpenSubscription(
-                self, msg_type, topic, write, on_late=write, decode=lambda data, _: data
-            )
-        )
+        self._heard.append(RawSubscription(self, msg_type, topic, write, on_late=write))
 
     def _look_for_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}

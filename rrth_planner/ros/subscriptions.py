@@ -103,8 +103,6 @@ class OpenSubscription:
         without, these are dropped, since the last one wins.
     on_refusal : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
-    decode : callable, optional
-        What is made of the bytes of a message, and of its type, before it is handed on.
 
     """
 
@@ -116,10 +114,8 @@ class OpenSubscription:
         on_message: Callable[[Any, int, int], None],
         on_late: Callable[[Any, int, int], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
-        decode: Callable[[bytes, type], Any] = decoded,
     ) -> None:
         """Begin to listen."""
-        self._decode = decode
         self._on_refusal = on_refusal
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
@@ -190,7 +186,7 @@ class OpenSubscription:
     ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
         try:
-            msg = self._decode(data, self._msg_type)
+            msg = decoded(data, self._msg_type)
         except MessageError as problem:
             self._on_refusal(problem)
             return
