@@ -1,0 +1,202 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the viewer hears of the running nodes, and what it asks of the planner."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock, Thread
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rrth_planner.arrays import Array
+from rrth_planner.errors import MessageError, OptionsError
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.listener import Listener
+from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
+from rrth_planner.ros.parameters import declare_parameters
+from rrth_planner.ros.subscriptions import OpenSubscription
+from rrth_planner.scene import Scene
+from rrth_planner.trajectory import Trajectory
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
+LATCHED = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class ViewerFeed(Node):
+    """
+    Hear body, target, joints and motions; publish targets and call the planner's service.
+
+    Its parameters are those of the planner: arm, base frame, margin and the length of the guarded
+    ray are taken from them.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        """
+        Begin to listen.
+
+        Raises
+        ------
+        RrthError, ParameterException
+            A parameter that is refused.
+
+        """
+        super().__init__(NAME, **kwargs)
+        parameters = declare_parameters(self)
+        self.arm, self.margin = parameters.arm, parameters.margin
+        self.ray_guard_length = parameters.ray_guard_length
+        self._frame = parameters.base_frame
+        self._heard = Inputs(
+            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        )
+        self._listener = Listener(self, parameters, self._heard, lambda: None)
+        self._motions = OpenSubscription(
+            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._refuse
+        )
+        self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
+        self._client = self.create_client(Trigger, SERVICE)
+        self._motion: Trajectory | None = None
+        self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
+        # Of the calls: written by the page's threads and by the node's.
+        self._lock = Lock()
+        self._is_asking, self._is_wanted = False, False
+        self._answer = ''
+
+    @property
+    def scene(self) -> Scene:
+        """The wearer in the base frame."""
+        now = self.get_clock().now().nanoseconds * 1e-9
+        body = self._heard.body.value.at(now)
+        if body is not self._shown[0]:
+            self._shown = (body, scene_of(body))
+        return self._shown[1]
+
+    @property
+    def target(self) -> Array | None:
+        """In the base frame, (3,) [m]."""
+        goal = self._heard.target.value
+        return None if goal is None else goal.target
+
+    @property
+    def positions(self) -> Array | None:
+        """Of the joints, (dof,) [rad]."""
+        reading = self._heard.joints.value
+        return None if reading is None else reading.positions
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The last motion that was published."""
+        return self._motion
+
+    @property
+    def said(self) -> str:
+        """The last answer of the planner, or what is still missing."""
+        heard = self._heard
+        missing = [
+            topic.topic for topic in (heard.body, heard.target, heard.joints) if not topic.n_good
+        ]
+        if not self._client.service_is_ready():
+            missing.append(f'service {self._client.srv_name}')
+        waiting = f'waiting for {", ".join(missing)}' if missing else ''
+        return '; '.join(filter(None, (self._answer, waiting))) or 'drag the target, or press Plan'
+
+    def ask(self, target: Array | None = None) -> None:
+        """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
+        if target is not None:
+            msg = PointStamped()
+            msg.header.frame_id = self._frame
+            msg.header.stamp = self.get_clock().now().to_msg()
+            msg.point.x, msg.point.y, msg.point.z = (float(value) for value in target)
+            self._targets.publish(msg)
+        with self._lock:
+            if not self._client.service_is_ready():
+                return
+            # One call at a time: what is asked meanwhile is asked once, afterwards.
+            self._is_wanted = self._is_asking
+            if self._is_asking:
+                return
+            self._is_asking = True
+        self._call()
+
+    def _call(self) -> None:
+        self._client.call_async(Trigger.Request()).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future: Any) -> None:
+        with self._lock:
+            self._answer = str(future.result().message)
+            self._is_asking, self._is_wanted = self._is_wanted, False
+            is_asked_again = self._is_asking
+        if is_asked_again:
+            self._call()
+
+    def _on_motion(self, msg: JointTrajectory, *_: int) -> None:
+        try:
+            self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
+        except MessageError as problem:
+            self._refuse(problem)
+
+    def _refuse(self, problem: MessageError) -> None:
+        self.get_logger().warning(f'joint_trajectory refused: {problem}')
+
+
+@contextmanager
+def following(
+    arm: Path | None, settings: Path | None, ros_args: Sequence[str] = ()
+) -> Iterator[ViewerFeed]:
+    """
+    Give a feed that listens in a thread of its own while the block runs.
+
+    Parameters
+    ----------
+    arm : Path or None
+        File of the arm, laid out as `config/arm.yaml`; None: as the settings or `ros_args` say.
+    settings : Path or None
+        Parameters, laid out as `config/planner.yaml`.
+    ros_args : sequence of str
+        From `--ros-args` on: remaps and parameters.
+
+    Raises
+    ------
+    RrthError
+        An argument or a parameter that is refused.
+
+    """
+    own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []
+    try:
+        rclpy.init(args=[*own, *ros_args], signal_handler_options=SignalHandlerOptions.NO)
+        overrides = [Parameter('arm', value=str(arm))] if arm else []
+        node = ViewerFeed(parameter_overrides=overrides)
+    except (ParameterException, RuntimeError) as problem:
+        rclpy.try_shutdown()
+        raise OptionsError(f'--live: {problem}') from problem
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = Thread(target=_spin, args=(executor,), name='viewer feed', daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        pass
