@@ -31,6 +31,7 @@ OWN = {
     # Tools to look at motions, in the layers of ROS and of the viewers.
     'recorder': {'mcap'},
     'recordings': {'mcap', 'mcap_ros2'},
+    'viewer_picture': {'playwright'},
 }
 # The node says that it compiles before it imports what has to be compiled; what only one option of
 # a command needs takes seconds to load.
@@ -49,6 +50,9 @@ LATE = {
     # Once it is known that what they need is installed.
     ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
     ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_live'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_page'),
 }
 
 
@@ -84,7 +88,7 @@ def allowed(module, name):
     return root in {
         'kernels': {'numba'},
         'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
-        'viewers': {'matplotlib', 'mpl_toolkits'},
+        'viewers': {'matplotlib', 'mpl_toolkits', 'viser'},
         'core': set(),
     }[layer] | OWN.get(module.split('.')[-1], set())
 

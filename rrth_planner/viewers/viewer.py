@@ -129,9 +129,11 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
     from rrth_planner.ros.viewer_feed import following
     from rrth_planner.viewers.viewer_live import LivePage
 
-    with following(options.arm, options.settings, ros_args) as feed:
-        with _served(options) as (server, _):
-            LivePage(server, feed).run()
+    with (
+        following(options.arm, options.settings, ros_args) as feed,
+        _served(options) as (server, _),
+    ):
+        LivePage(server, feed).run()
 
 
 def _question(options: argparse.Namespace) -> PlanQuestion:

@@ -112,6 +112,7 @@ class ViewerModel:
             if value is not None
         }
         with self._condition:
+            answer: Answer | None = None
             self._n_asked += 1
             try:
                 if target is not None:
@@ -124,7 +125,7 @@ class ViewerModel:
                 self._wanted = False
                 answer = Answer(number=self._n_asked, sentence=str(problem))
             else:
-                self._wanted, answer = True, None
+                self._wanted = True
                 self._condition.notify_all()
             number = self._n_asked
         if answer is not None:

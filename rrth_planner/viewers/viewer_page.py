@@ -43,7 +43,8 @@ class ViewerPage:
         self._arm = question.arm
         self._lock, self._wake = Lock(), Event()
         # Both are written by the callbacks of the page, and drawn by `run`.
-        self._player, self._trajectory = Player(), None
+        self._player = Player()
+        self._trajectory: Trajectory | None = None
         self._drawn: Answer | None = None
         self._body: Any = None
         self.view = SceneView(server, question.arm, question.ray_guard_length)

@@ -106,7 +106,11 @@ class Panel:
         with gui.add_folder('Target'):
             self.target_example = gui.add_dropdown('example', (OWN, *TARGETS))
             self.target = gui.add_vector3(
-                'x, y, z [m]', (0.0, 0.0, 0.0), min=(-FARTHEST,) * 3, max=(FARTHEST,) * 3, step=0.01
+                'x, y, z [m]',
+                (0.0, 0.0, 0.0),
+                min=(-FARTHEST,) * 3,
+                max=(FARTHEST,) * 3,
+                step=0.01,
             )
             self.plan = gui.add_button('Plan', visible=is_live)
         with gui.add_folder('Question', visible=not is_live):
@@ -131,6 +135,3 @@ class Panel:
     def _layer(self, gui: Any, name: str, on_layer: Callable[[str, bool], None]) -> None:
         box = gui.add_checkbox(SHOWN[name], True)
         box.on_update(lambda _: on_layer(name, box.value))
-
-
-
