@@ -17,6 +17,7 @@ setup(
         (share, ['package.xml']),
         (f'{share}/launch', sorted(glob('launch/*.py'))),
         (f'{share}/config', sorted(glob('config/*.yaml') + glob('config/*.xml'))),
+        (f'{share}/config/examples', sorted(glob('config/examples/*'))),
         (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
         (f'{share}/urdf', sorted(glob('urdf/*.urdf'))),
         (f'{share}/rviz', sorted(glob('rviz/*.rviz'))),

@@ -37,7 +37,8 @@ METHOD = """\
   bar of the arm or its ray is about to come, 0.05 s to 1.5 s ahead. The arm's joint states are
   judged against the boxes without any margin until the arm rests. The time from the body to the
   brake as the client sees it counts from the first body with the hand, even where going on was
-  less bad for a while."""
+  less bad for a while; the node's own counts from when the middleware received the body that it
+  braked for, to when the trajectory was published."""
 
 
 def report(plans: PlansRecord | None, guard: GuardRecord | None, command: str) -> str:

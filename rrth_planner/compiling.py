@@ -8,7 +8,10 @@ import subprocess
 import sys
 
 # What either process compiles, about as much each, the one what the other does not ask for soon.
-SHARES = (('lean', 'arm_clearance', 'chain', 'boxes'), ('taut', 'rrt', 'rrt_h', 'goals'))
+SHARES = (
+    ('lean', 'arm_clearance', 'chain', 'pieces'),
+    ('quick_stop', 'following', 'speeds', 'taut', 'rrt', 'rrt_h', 'goals'),
+)
 
 
 def compile_kernels() -> bool:

@@ -45,6 +45,23 @@ def quaternion_xyzw(rotation: Array) -> Array:
     return -q if q[3] < 0 else q
 
 
+def roll_pitch_yaw(rotation: Array) -> Array:
+    """
+    Return the angles of a rotation about the fixed axes x, y and z, in that order, (3,) [rad].
+
+    They are those of URDF: `Rz(yaw) Ry(pitch) Rx(roll)`. Where roll and yaw turn about the same
+    axis, the yaw is 0.
+    """
+    r = rotation
+    is_upright = np.hypot(r[0, 0], r[1, 0]) < 1e-12
+    yaw = 0.0 if is_upright else np.arctan2(r[1, 0], r[0, 0])
+    c, s = np.cos(yaw), np.sin(yaw)
+    # What the yaw leaves is a roll and a pitch, precise even where the yaw is not.
+    pitch = np.arctan2(-r[2, 0], c * r[0, 0] + s * r[1, 0])
+    roll = np.arctan2(s * r[0, 2] - c * r[1, 2], c * r[1, 1] - s * r[0, 1])
+    return np.array([roll, pitch, yaw])
+
+
 def pose_matrix(position: ArrayLike, quaternion: ArrayLike) -> Array:
     """Return the pose of a frame from its position [m] and quaternion (x, y, z, w), (4, 4)."""
     T = np.eye(4)

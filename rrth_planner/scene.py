@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wearer as boxes."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels import boxes as kernels
+from rrth_planner.kernels.layout import NUMBERS, ORTHOGONAL, ROTATION, SIZE
 
 # Further out the slack of the certificates would no longer cover rounding.
 FARTHEST = 1e4
@@ -33,7 +32,7 @@ class Box:
     Attributes
     ----------
     numbers : ndarray, shape (15,)
-        Centre, size and rotation, as in `kernels.boxes`.
+        Centre, size and rotation, as in `kernels.layout`.
 
     Raises
     ------
@@ -62,8 +61,6 @@ class Box:
             for name, shape in (('center', (3,)), ('size', (3,)), ('rotation', (3, 3)))
         ]
         _fill(self, self.name, _frozen(np.concatenate(parts)))
-        if first_bad(self.numbers[None]) < 0:
-            return
         if not (self.size > 0.0).all():
             raise SceneError(f'{label}: size {self.size.tolist()}, expected three lengths > 0 [m]')
         if max(np.abs(self.center).max(), self.size.max()) > FARTHEST:
@@ -71,35 +68,16 @@ class Box:
                 f'{label}: center {self.center.tolist()}, size {self.size.tolist()}, expected '
                 f'lengths up to {FARTHEST:g} [m]'
             )
-        raise SceneError(
-            f'{label}: rotation {self.rotation.tolist()}, expected a rotation matrix [-]'
-        )
+        r = self.rotation
+        if np.abs(r @ r.T - np.eye(3)).max() > ORTHOGONAL or np.linalg.det(r) < 0.0:
+            raise SceneError(f'{label}: rotation {r.tolist()}, expected a rotation matrix [-]')
 
-
-def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:
-    """
-    Return boxes from their names and numbers, shape (n, 15), which are frozen by this.
-
-    Raises
-    ------
-    SceneError
-        Of the first that is no box.
-
-    """
-    rows = list(_frozen(numbers))
-    bad = first_bad(numbers)
-    if bad >= 0:
-        row = rows[bad]
-        Box(names[bad], row[: kernels.SIZE], row[kernels.SIZE : kernels.ROTATION], _rotation(row))
-    boxes = tuple(object.__new__(Box) for _ in rows)
-    for box, name, row in zip(boxes, names, rows, strict=True):
+    @classmethod
+    def of_row(cls, name: str, row: Array) -> 'Box':
+        """Return a box of numbers, (15,), that are known to be one and may not be changed."""
+        box: Box = object.__new__(cls)
         _fill(box, name, row)
-    return boxes
-
-
-def first_bad(numbers: Array) -> int:
-    """Return which of some numbers, shape (n, 15), are the first that are no box; -1: none."""
-    return int(kernels.first_bad(numbers, FARTHEST))
+        return box
 
 
 def _frozen(numbers: Array) -> Array:
@@ -107,18 +85,14 @@ def _frozen(numbers: Array) -> Array:
     return numbers
 
 
-def _rotation(row: Array) -> Array:
-    return row[kernels.ROTATION :].reshape(3, 3)
-
-
 def _fill(box: Box, name: str, row: Array) -> None:
     """Write the fields of a box, all of them parts of one array."""
     put = object.__setattr__
     put(box, 'name', name)
     put(box, 'numbers', row)
-    put(box, 'center', row[: kernels.SIZE])
-    put(box, 'size', row[kernels.SIZE : kernels.ROTATION])
-    put(box, 'rotation', _rotation(row))
+    put(box, 'center', row[:SIZE])
+    put(box, 'size', row[SIZE:ROTATION])
+    put(box, 'rotation', row[ROTATION:].reshape(3, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,5 +118,5 @@ class Scene:
         """Freeze the collection."""
         boxes = tuple(self.boxes)
         object.__setattr__(self, 'boxes', boxes)
-        numbers = np.array([box.numbers for box in boxes]).reshape(len(boxes), kernels.NUMBERS)
+        numbers = np.array([box.numbers for box in boxes]).reshape(len(boxes), NUMBERS)
         object.__setattr__(self, 'numbers', _frozen(numbers))

@@ -15,6 +15,7 @@ from rrth_planner.resources import load_yaml, resource_path
 from rrth_planner.trajectory import MotionLimits
 
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
+LENGTHS = ('margin', 'ray_guard_length', 'escape_depth')
 LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 
 
@@ -98,7 +99,16 @@ def load_settings(dof: int, path: str | Path | None = None, **changes: Any) -> P
             raise OptionsError(f'{name}: no parameter, expected one of {", ".join(packaged)}')
     # A value a joint of the packaged arm is the same for each.
     limits = {name: packaged[name][:1] for name in LIMIT_UNITS}
-    return settings_from_values({**packaged, **limits, **given, **changes}, dof)
+    values = {**packaged, **limits, **given, **changes}
+    for name in (*LENGTHS, 'seed'):
+        kinds = (int, float) if name in LENGTHS else (int,)
+        if not isinstance(values[name], kinds) or isinstance(values[name], bool):
+            expected = 'a length [m]' if name in LENGTHS else 'a whole number'
+            raise OptionsError(f'{name}: {values[name]!r}, expected {expected}')
+    try:
+        return settings_from_values(values, dof)
+    except TypeError as problem:
+        raise OptionsError(f'settings: {problem}; expected as in config/planner.yaml') from problem
 
 
 def _parameters(path: str | Path) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from rrth_planner.trajectory import MotionLimits, positions_at, sample, Trajecto
 
 # An arm that moves no faster is at rest [rad/s].
 REST_SPEED = 0.01
+# What rounding leaves of a speed where a motion ends: it has no direction [rad/s].
+RESIDUAL_SPEED = 1e-6
 # Accelerations die away in whole ticks, so that no two points are closer [s].
 TICK = 1e-3
 # The joints' limits less this, for the end of the lead-in to spend.
@@ -87,6 +89,8 @@ def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
     positions += v_end * (times[:, None] - t)
     accelerations = np.where(times[:, None] < fade, a + jerk * t, 0.0)
     speed = float(np.linalg.norm(velocities[-1]))
+    if speed <= RESIDUAL_SPEED:
+        velocities[-1], speed = 0.0, 0.0
     u = velocities[-1] / max(speed, 1e-300)
     share = np.abs(u) + 1e-300
     grip = RESERVE * float((limits.acceleration / share).min())

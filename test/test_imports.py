@@ -25,8 +25,16 @@ OWN = {
     'store': {'pyarrow'},
     'runs': {'numba'},
     'incident_files': {'yaml'},
+    'arm_file': {'yaml'},
+    'motion_files': {'yaml'},
+    'urdf_chain': {'yourdfpy', 'trimesh'},
+    # Tools to look at motions, in the layers of ROS and of the viewers.
+    'recorder': {'mcap'},
+    'recordings': {'mcap', 'mcap_ros2'},
+    'viewer_picture': {'playwright'},
 }
-# The node says that it compiles before it imports what has to be compiled.
+# The node says that it compiles before it imports what has to be compiled; what only one option of
+# a command needs takes seconds to load.
 # The report says which requirements it misses before it imports what has them.
 REPORTER = 'rrth_planner.reproduce'
 # The viewer says what it misses before it imports what needs it, and follows the nodes on demand.
@@ -37,6 +45,19 @@ LATE = {
     (VIEWER, 'rrth_planner.viewers.viewer_page'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.arrival'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.bodies'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.dry_run'),
+    *(
+        ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
+        for name in ('inputs', 'listener', 'plan_queue', 'reporter')
+    ),
+    # Once it is known that what they need is installed.
+    ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
+    ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_live'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_page'),
 }
 
 
@@ -66,18 +87,15 @@ def allowed(module, name):
         if target == 'viewers':
             is_demo = layer == 'ros' and 'demo' in module
             return layer == 'viewers' or is_demo or module == REPORTER
-        return target != 'ros' or layer == 'ros' or (module, name) == (VIEWER, FEED)
+        return target != 'ros' or layer == 'ros' or (module, name) in LATE
     if root in sys.stdlib_module_names or root == 'numpy':
         return True
-    return (
-        root
-        in {
-            'kernels': {'numba'},
-            'ros': {*ROS, 'yaml', root if root.endswith('_msgs') else 'rclpy'},
-            'viewers': {'matplotlib', 'mpl_toolkits', 'playwright', 'viser'},
-            'core': OWN.get(module.split('.')[-1], set()),
-        }[layer]
-    )
+    return root in {
+        'kernels': {'numba'},
+        'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
+        'viewers': {'matplotlib', 'mpl_toolkits', 'viser'},
+        'core': set(),
+    }[layer] | OWN.get(module.split('.')[-1], set())
 
 
 @pytest.mark.parametrize('module', MODULES)
@@ -96,6 +114,7 @@ def test_a_module_imports_only_what_its_layer_may(module):
                 '.fcl_shapes',
                 '.opinions',
                 '.ros.requests',
+                '.ros.second_opinion',
             )
             assert module.endswith(may), f'{module} imports {name}'
 

@@ -174,3 +174,20 @@ def test_an_arm_on_another_way_goes_on_at_its_velocity():
     assert np.allclose(found.positions, q + 0.1 * v)
     assert np.array_equal(found.velocities, v)
     assert not found.accelerations.any()
+
+
+@pytest.mark.parametrize('before_end', [0.0, 1e-12, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2, 0.05])
+def test_a_motion_is_taken_over_where_it_ends(before_end):
+    scene, world = wearer(), wearer_world()
+    q_start = np.array([0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi])
+    # By several corners, so that rounding leaves something of the speed.
+    running = motion(scene, q_start, [0.3, 1.4, 0.2], 1).trajectory
+    assert running is not None
+    q, v, a = (values[0] for values in sample(running, [running.duration - before_end]))
+    # As the end of a motion comes out of `sample` on its own: nearly, not quite, at rest.
+    state = MotionState(positions=q, velocities=v + 3e-16, accelerations=a - 8e-15)
+    moving = Takeover(state=state, running=running, time=running.duration - before_end)
+    found = motion(scene, q, [0.5, 0.3, 1.6], 1, moving)
+    assert found.status is PlanStatus.SOLVED, found.sentence
+    assert np.array_equal(found.trajectory.positions[0], q)
+    assert certify(found.trajectory, world).is_proven

@@ -19,13 +19,12 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     READ_INTS,
 )
+from rrth_planner.kernels.layout import ORTHOGONAL, ROTATION, SIZE
 
-# Numbers of a box: centre (3), size (3), rotation row by row (9).
-SIZE, ROTATION, NUMBERS = 3, 6, 15
 # Numbers of a marker: position, quaternion x y z w, scale, and a point in its own axes.
 QUATERNION, SCALE, POINT, POSED = 3, 7, 10, 13
-# A rotation is orthogonal up to this; a bound holds its boxes with this to spare [m].
-ORTHOGONAL, SPARE = 1e-6, 1e-9
+# A bound holds its boxes with this to spare [m].
+SPARE = 1e-9
 
 
 @kernel(void(MAT, READ_INTS, CUBE, OUT_MAT), is_short=True)

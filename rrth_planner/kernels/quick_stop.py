@@ -92,7 +92,7 @@ def points_between(times, begin, end):
     return n
 
 
-@kernel(int64(CUBE, VEC, float64, float64, VEC, VEC, VEC, OUT_VEC, OUT_CUBE))
+@kernel(int64(CUBE, VEC, float64, float64, VEC, VEC, VEC, OUT_VEC, OUT_CUBE), is_short=True)
 def quick_stop(curves, times, now, lead, velocity, acceleration, jerk, points, states):
     """
     Write the points of the soonest stop that is found; return their number.

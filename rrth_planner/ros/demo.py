@@ -146,7 +146,7 @@ def _visit(
     for name, message in targets.items():
         target = goal_from_msg(message, frame).target
         client.tell_target(message)
-        q_present = client.positions()
+        q_present = client.present()
         trajectory, planning_time = client.ask_for_motion()
         found = inspect_motion(
             arm,
@@ -159,7 +159,7 @@ def _visit(
             ray_guard_length=ray_guard_length,
         )
         client.wait_for_arrival(trajectory)
-        error = pointing_error(arm, client.positions(), target)
+        error = pointing_error(arm, client.present(), target)
         if not error <= POINTING_TOLERANCE:
             raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
         lines.append(
@@ -186,7 +186,6 @@ def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
     for name in RAISED_ON_THE_WAY:
         message = _example(f'target_{name}', PointStamped)
         client.tell_target(message)
-        client.watch()
         trajectory, _ = client.ask_for_motion()
         if name != RAISED_ON_THE_WAY[-1]:
             client.wait_for_arrival(trajectory)
@@ -196,7 +195,7 @@ def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
     if contact is not None:
         raise DemoError(f'bar {contact.bar} of the arm touched {contact.box} after it was raised')
     clearance = least_clearance(arm, scene, q, settings['ray_guard_length'])
-    error = pointing_error(arm, client.positions(), goal_from_msg(message, frame).target)
+    error = pointing_error(arm, client.present(), goal_from_msg(message, frame).target)
     if not error <= POINTING_TOLERANCE:
         raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
     return (

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.arrays import Array
+from rrth_planner.boxes import boxes_of, first_bad
 from rrth_planner.errors import MessageError, one_line, SceneError
-from rrth_planner.kernels.boxes import NUMBERS, place, POSED
+from rrth_planner.kernels.boxes import place, POSED
+from rrth_planner.kernels.layout import NUMBERS
 from rrth_planner.ros.fields import seconds_of, triple_of, unit_quaternion_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
-from rrth_planner.scene import Box, boxes_of, first_bad
+from rrth_planner.scene import Box
 from visualization_msgs.msg import Marker, MarkerArray
 
 # More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.

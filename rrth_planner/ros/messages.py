@@ -3,32 +3,24 @@
 """
 Messages and the core's types, in both directions: the only place where input is checked.
 
-Bodies and trajectories have modules of their own; their names are offered here too.
+Each kind has a module of its own; their names are offered here.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-from geometry_msgs.msg import PointStamped
-import numpy as np
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import MessageError, SceneError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.fields import position_of, seconds_of
-from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
+from rrth_planner.ros.frames import FrameError
+from rrth_planner.ros.goals import goal_from_msg
+from rrth_planner.ros.joints import (
+    configuration_from_msg,
+    has_joint_of,
+    joint_reading,
+    JointReading,
+)
 from rrth_planner.ros.trajectories import (
     joint_trajectory_from_msg,
     joint_trajectory_to_msg,
     pose_to_msg,
     tool_path_to_msg,
 )
-from sensor_msgs.msg import JointState
-
-# A message may be so long on its way; its stamp is of another clock if it seems longer [s].
-LONGEST_WAY = 1.0
-# Positions that are older than this say nothing about the present velocity [s].
-DIFFERENCE_AGE = 0.5
 
 __all__ = [
     'FrameError',
@@ -44,134 +36,3 @@ __all__ = [
     'scene_of',
     'tool_path_to_msg',
 ]
-
-
-def goal_from_msg(
-    msg: PointStamped, base_frame: str, lookup: Lookup | None = None
-) -> PointingGoal:
-    """
-    Return the goal to point at a point.
-
-    Parameters
-    ----------
-    msg : PointStamped
-    base_frame : str
-        Frame of the goal; an empty frame of the message is taken as it.
-    lookup : callable, optional
-        frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
-
-    Raises
-    ------
-    MessageError
-        A bad point; a FrameError when its frame is the reason.
-
-    """
-    point = position_of(msg.point, 'point')
-    T = pose_in_base(msg.header.frame_id, base_frame, lookup)
-    try:
-        # What overflows is infinite, which a goal refuses.
-        with np.errstate(over='ignore', invalid='ignore'):
-            return PointingGoal(T[:3, :3] @ point + T[:3, 3])
-    except SceneError as problem:
-        raise MessageError(str(problem)) from problem
-
-
-def has_joint_of(msg: JointState, joint_names: Sequence[str]) -> bool:
-    """Return whether a message speaks of any of these joints."""
-    return not set(joint_names).isdisjoint(msg.name)
-
-
-def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array:
-    """
-    Return the positions of these joints, by name, shape (dof,) [rad]; others are ignored.
-
-    Raises
-    ------
-    MessageError
-        A joint that is missing or there twice, a position that is missing or not finite.
-
-    """
-    names = list(msg.name)
-    missing = [name for name in joint_names if name not in names]
-    if missing:
-        raise MessageError(f'name: no {missing} in {names}, expected all of {list(joint_names)}')
-    twice = [name for name in joint_names if names.count(name) > 1]
-    if twice:
-        raise MessageError(f'name: {twice} twice in {names}, expected each joint once')
-    if len(msg.position) != len(names):
-        raise MessageError(
-            f'position: {len(msg.position)} values for {len(names)} names, expected one a name '
-            '[rad]'
-        )
-    q = [msg.position[names.index(name)] for name in joint_names]
-    return frozen_array(q, (len(q),), f'position of {list(joint_names)}', 'rad', MessageError)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointReading:
-    """
-    What one message says of the arm.
-
-    Parameters
-    ----------
-    positions : ndarray, shape (dof,)
-        [rad].
-    velocities : ndarray, shape (dof,)
-        As they were given, NaN included, or how the positions changed [rad/s].
-    taken : float
-        When the arm was there: the stamp of the message if it is a little older than its
-        reception, else that [s].
-    received : float
-        [s].
-    velocities_expire : float
-        Until when the velocities count; inf: as long as the positions [s].
-
-    """
-
-    positions: Array
-    velocities: Array
-    taken: float
-    received: float
-    velocities_expire: float
-
-
-def joint_reading(
-    msg: JointState, joint_names: Sequence[str], received: float, before: JointReading | None
-) -> JointReading:
-    """
-    Return the positions and velocities of these joints, by name; others are ignored.
-
-    Parameters
-    ----------
-    msg : JointState
-        Without velocities, these are the change since the reading before.
-    joint_names : sequence of str
-    received : float
-        When it came [s].
-    before : JointReading or None
-
-    Raises
-    ------
-    MessageError
-        As `configuration_from_msg`, or velocities of only some of the names.
-
-    """
-    q = configuration_from_msg(msg, joint_names)
-    names, stamp = list(msg.name), seconds_of(msg.header.stamp)
-    taken = stamp if 0.0 <= received - stamp <= LONGEST_WAY else received
-    if len(msg.velocity):
-        if len(msg.velocity) != len(names):
-            raise MessageError(
-                f'velocity: {len(msg.velocity)} values for {len(names)} names, expected none or '
-                'one a name [rad/s]'
-            )
-        v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
-        return JointReading(q, v, taken, received, float('inf'))
-    if before is None or received < before.received:
-        # A clock that was set back tells no time that passed.
-        return JointReading(q, np.zeros_like(q), taken, received, received)
-    step = max(received - before.received, 1e-9)
-    # What overflows is infinite, and never at rest.
-    with np.errstate(over='ignore'):
-        v = (q - before.positions) / step
-    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE)

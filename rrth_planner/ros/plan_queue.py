@@ -23,6 +23,7 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
+from rrth_planner.ros.second_opinion import incident_of_stop
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED
 from rrth_planner.trajectory import Trajectory
@@ -257,9 +258,6 @@ class PlanQueue:
 
     def _judge(self, stop: Trajectory, scene: Scene, goal: PointingGoal) -> None:
         """Have the second judge look at a stop that was published."""
-        # Loaded late, as what plans is.
-        from rrth_planner.ros.second_opinion import incident_of_stop
-
         parameters = self._reporter.parameters
 
         def work() -> None:

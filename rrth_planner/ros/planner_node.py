@@ -22,14 +22,9 @@ from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
 from rrth_planner.kernels.jit import cache_folder, is_compiled
-from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.frames import FrameError
-from rrth_planner.ros.inputs import Inputs
-from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.parameters import current_parameters, declare_parameters
-from rrth_planner.ros.plan_queue import PlanQueue
-from rrth_planner.ros.reporter import Reporter
 from std_srvs.srv import Trigger
 
 NAME = 'rrth_planner'
@@ -53,6 +48,13 @@ class PlannerNode(Node):
         """
         super().__init__(NAME, **kwargs)
         parameters = declare_parameters(self)
+        self._compile()
+        # Only now: loading them compiles the kernels that nobody has compiled yet.
+        from rrth_planner.ros.inputs import Inputs
+        from rrth_planner.ros.listener import Listener
+        from rrth_planner.ros.plan_queue import PlanQueue
+        from rrth_planner.ros.reporter import Reporter
+
         heard = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
@@ -71,8 +73,8 @@ class PlannerNode(Node):
         """End the plan in progress, those that wait, and the worker."""
         self._queue.close()
 
-    def _load_planner(self) -> Callable[..., Any]:
-        """Return what plans, compiled; imported here, since that may take up to a minute."""
+    def _compile(self) -> None:
+        """Compile all kernels, in processes of their own where they can be kept."""
         if find_spec('fcl') is None:
             raise ModelError(
                 'python-fcl: not installed, expected for the second check of every motion '
@@ -83,6 +85,9 @@ class PlannerNode(Node):
             self.get_logger().info(f'compiling kernels, {how_often}: takes up to a minute')
             if cache_folder() is not None:
                 compile_kernels()
+
+    def _load_planner(self) -> Callable[..., Any]:
+        """Return what plans, ready for its first plan."""
         from rrth_planner.pipeline import warm_up
         from rrth_planner.ros.requests import plan_request
 
@@ -127,7 +132,7 @@ class PlannerNode(Node):
                 if is_frame
                 else ErrorCode.INVALID_GOAL_CONSTRAINTS
             )
-            self._reporter.conclude(code, f'request of get_plan: {problem}', PlanReport())
+            self._reporter.refuse(code, f'request of get_plan: {problem}')
             return response
         found = await self._queue.respond(goal)
         response.plan = found.tool_path()

@@ -21,13 +21,13 @@ from rrth_planner.arm import tool_pose
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
-from rrth_planner.ros.messages import joint_trajectory_from_msg, pose_to_msg
 from rrth_planner.ros.playback_parameters import (
     declare_playback_parameters,
     initial_positions,
     playback_rules,
 )
 from rrth_planner.ros.subscriptions import decoded
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg, pose_to_msg
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory

@@ -122,6 +122,10 @@ class Reporter:
                 'regard them'
             )
 
+    def refuse(self, code: ErrorCode, sentence: str) -> None:
+        """Log and publish how a request ended that nothing was planned for."""
+        self.conclude(code, sentence, PlanReport())
+
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
         """Log and publish how a request ended, and return the answer to it."""
         text, sentence = answer(code, sentence), one_line(sentence)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm round its wearer in space, seen from where the wearer hides least of it."""
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -15,7 +16,7 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import sample, Trajectory
 from rrth_planner.viewers.line_of_sight import best_view, cut, is_hidden
 
-START, GOAL, PATH = '#3b6fb6', '#d1495b', '#7b3fa0'
+START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'
 CLOTH, SKIN = '#8fa3bf', '#e3b898'
 # Behind the wearer's boxes, between, and in front of them.
 HIDDEN, BODY, SEEN = 1.0, 2.0, 3.0
@@ -60,15 +61,61 @@ def draw_motion(
 
     """
     q = sample(trajectory, np.linspace(0.0, trajectory.duration, N_POSTURES))[0]
-    postures = np.array([arm_points(arm, row) for row in q])
     q_dense = sample(trajectory, np.linspace(0.0, trajectory.duration, 200))[0]
-    poses = np.array([forward_kinematics(arm, row)[-1] for row in q_dense])
-    tool_path, start_z = poses[:, :3, 3], poses[0, :3, 2]
-    ray = np.array([postures[-1, -1], target])
-    first_ray = np.array([postures[0, -1], postures[0, -1] + ray_guard_length * start_z])
+    draw_way(axes, arm, scene, q, q_dense, target, ray_guard_length)
 
-    towards = best_view(scene, postures, ray)
-    _frame(axes, scene, np.concatenate([*postures, ray, first_ray]), towards)
+
+def draw_way(
+    axes: Any,
+    arm: ArmModel,
+    scene: Scene,
+    q: Array,
+    q_dense: Array,
+    target: Array | None,
+    ray_guard_length: float,
+    q_stops: Sequence[Array] = (),
+    names: tuple[str, str] = ('start', 'goal'),
+    shape: float = SHAPE,
+    towards: Array | None = None,
+) -> None:
+    """
+    Draw the same of any sequence of configurations.
+
+    Parameters
+    ----------
+    axes : Axes3D
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    q : ndarray, shape (n, dof)
+        What is drawn as postures, from start to goal [rad].
+    q_dense : ndarray, shape (m, dof)
+        What the tool's path is drawn through [rad].
+    target : ndarray, shape (3,), or None
+        In the base frame [m].
+    ray_guard_length : float
+        How much of a ray is drawn where it does not point at the target [m].
+    q_stops : sequence of ndarray, shape (dof,)
+        Where the arm was stopped on its way [rad].
+    names : tuple of str
+        What is written at the first and at the last posture.
+    shape : float
+        Width of the picture over its height.
+    towards : ndarray, shape (3,), optional
+        Direction to the eye; without, the one that shows most of the arm and of the last ray.
+
+    """
+    postures = np.array([arm_points(arm, row) for row in q])
+    poses = np.array([forward_kinematics(arm, row)[-1] for row in q_dense])
+    tool_path, first, last = poses[:, :3, 3], poses[0], poses[-1]
+    first_ray = np.array([first[:3, 3], first[:3, 3] + ray_guard_length * first[:3, 2]])
+    ray = np.array([last[:3, 3], last[:3, 3] + ray_guard_length * last[:3, 2]])
+    if target is not None:
+        ray[1] = target
+
+    if towards is None:
+        towards = best_view(scene, postures, ray)
+    _frame(axes, scene, np.concatenate([*postures, ray, first_ray]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)
     blend = np.linspace(0.0, 1.0, N_POSTURES)[:, None]
@@ -78,13 +125,14 @@ def draw_motion(
     _draw_line(axes, scene, towards, tool_path, PATH, 1.8, 0.95)
     _draw_line(axes, scene, towards, first_ray, START, 1.2, 0.7)
     _draw_line(axes, scene, towards, ray, GOAL, 1.8, 0.95)
-    for posture, colour, name, offset in (
-        (postures[0], START, 'start', -0.14),
-        (postures[-1], GOAL, 'goal', 0.07),
-    ):
+    ends = [(postures[0], START, names[0], -0.14), (postures[-1], GOAL, names[1], 0.07)]
+    stops = [(arm_points(arm, row), STOP, '', 0.0) for row in q_stops]
+    for posture, colour, name, offset in (*stops, *ends):
         _draw_line(axes, scene, towards, posture, colour, 5.0, 1.0)
         axes.plot(*posture.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=SEEN)
         axes.text(*posture[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
+    if target is None:
+        return
     axes.plot(
         *target[:, None],
         ls='',
@@ -146,7 +194,7 @@ def _draw_box(axes: Any, box: Box, towards: Array) -> None:
     )
 
 
-def _frame(axes: Any, scene: Scene, points: Array, towards: Array) -> None:
+def _frame(axes: Any, scene: Scene, points: Array, towards: Array, shape: float) -> None:
     corners = [
         box.center + box.rotation @ (0.5 * box.size * np.array(signs))
         for box in scene.boxes
@@ -155,11 +203,14 @@ def _frame(axes: Any, scene: Scene, points: Array, towards: Array) -> None:
     everything = np.concatenate([points, np.array(corners).reshape(-1, 3)])
     low, high = everything.min(axis=0) - 0.05, everything.max(axis=0) + 0.05
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    # Fill the picture: matplotlib keeps the diagonal of the space, whatever its shape.
+    # Fill the picture: matplotlib keeps the diagonal of the space, whatever its shape, and fits it
+    # to the shorter side of the picture.
     right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
     up = np.cross(towards, right)
     width, height = (high - low) @ abs(right), (high - low) @ abs(up)
-    zoom = ZOOM * np.linalg.norm(high - low) / max(height, width / SHAPE)
+    zoom = (
+        ZOOM * np.linalg.norm(high - low) / max(height * min(1.0, shape), width / max(1.0, shape))
+    )
     axes.set_box_aspect(high - low, zoom=zoom)
     axes.set_proj_type('persp', focal_length=0.9)
     axes.computed_zorder = False

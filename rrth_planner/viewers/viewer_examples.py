@@ -58,8 +58,8 @@ def example_target(name: str) -> Array:
     file = resource_path(f'msg_examples/target_{name}.yaml')
     try:
         point = load_yaml(file)['point']
-        return PointingGoal(np.array([float(point[axis]) for axis in 'xyz'])).target
-    except (KeyError, TypeError, ValueError) as problem:
+        return PointingGoal(np.array([point[axis] for axis in 'xyz'])).target
+    except (KeyError, TypeError) as problem:
         raise SceneError(f'file {file}: {problem!r}; expected a point with x, y, z') from problem
 
 

@@ -113,6 +113,7 @@ class ViewerModel:
         }
         refused: Answer | None = None
         with self._condition:
+            answer: Answer | None = None
             self._n_asked += 1
             try:
                 if target is not None:

@@ -19,10 +19,12 @@ ARGUMENTS = (
     '--no-sandbox',
     '--use-gl=angle',
     '--use-angle=swiftshader',
-    '--enable-unsafe-swiftshader',
     '--ignore-gpu-blocklist',
+    '--enable-unsafe-swiftshader',
     '--hide-scrollbars',
 )
+# The page's remark that there is no graphics card, which is nothing to show.
+REMARK = 'Software WebGL rendering detected'
 # A page that has not come to rest after this time is not waited for [s].
 PATIENCE, PAUSE = 120.0, 1.5
 
@@ -86,8 +88,8 @@ def save_picture(url: str, file: Path) -> None:
         raise OptionsError(f'--screenshot {file}: its folder does not exist')
     with opened(url) as page:
         page.get_by_text('planning time').first.wait_for()
-        # The page warns of a browser without a graphics card.
-        for button in page.locator('.mantine-Notification-closeButton').all():
-            button.click()
+        page.wait_for_timeout(1e3 * PAUSE)
+        if page.get_by_text(REMARK).count():
+            page.locator('.mantine-Notification-closeButton').first.click()
         file.write_bytes(settled(page))
     print(f'Picture: {file}')

@@ -1,0 +1,230 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plan from files to a file, without ROS."""
+
+import argparse
+from collections.abc import Sequence
+import json
+import math
+from pathlib import Path
+import sys
+from typing import Any
+
+import numpy as np
+from rrth_planner.arm import ArmModel, tool_pose
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.body_file import load_body
+from rrth_planner.compiling import compile_kernels
+from rrth_planner.errors import one_line, OptionsError, RrthError
+from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels.jit import cache_folder, is_compiled
+from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
+from rrth_planner.pipeline import MotionPlan, plan_motion, warm_up
+from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.settings import load_settings, PlanSettings
+from rrth_planner.status import PlanStatus
+
+SOLVED, REFUSED, WRONG = 0, 1, 2
+SEEDS = 2**31
+DESCRIPTION = """\
+Plan one motion that ends with the arm's pointing ray on a target and touches the wearer nowhere,
+from files, without ROS: as the node plans it, with the same proof and the same second opinion.
+Lengths in metres, angles in radians, in the wearer's base frame: x forward, y left, z up.
+"""
+EPILOG = """\
+exit codes: 0  solved: figures on standard output, the motion in the file of --output
+            1  refused: why, in one sentence on standard error
+            2  wrong usage or input: what, on standard error
+
+A motion is points in time [s] with position, velocity and acceleration of each joint; between two
+of them each joint follows the quintic that fits both. A file whose name ends in .csv has a header
+and a line a point, .yaml says the same as YAML. Without --period there are as few points as fix
+the motion exactly.
+
+example:    ./run exec plan --target 1.5 0.8 0.6 --output motion.csv --period 0.01
+            ./run exec plan --arm config/examples/chest_arm.yaml \\
+                --body config/examples/seated_body.yaml --target 1 0.5 0 --json
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Plan a motion, print its figures, write it, and return the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        return _run(options)
+    except (RrthError, OSError) as problem:
+        print(f'plan: {one_line(str(problem))}', file=sys.stderr)
+        return WRONG
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.output is not None:
+        check_suffix(options.output)
+    elif options.period is not None:
+        raise OptionsError('--period: without --output, expected a file to write the points to')
+    arm, scene = load_arm(options.arm), load_body(options.body)
+    settings = _settings(options, arm)
+    q_start, goal = _start(options, arm), PointingGoal(options.target)
+    # What compiling and loading takes is not planning time.
+    if not is_compiled():
+        print('plan: compiling the planner, takes up to a minute', file=sys.stderr, flush=True)
+        if cache_folder() is not None:
+            compile_kernels()
+    warm_up(arm, settings.options)
+    seed = settings.seed if settings.seed >= 0 else int(np.random.default_rng().integers(SEEDS))
+    plan = plan_motion(
+        arm,
+        scene,
+        q_start,
+        goal,
+        settings.limits,
+        settings.options,
+        margin=settings.margin,
+        ray_guard_length=settings.ray_guard_length,
+        seed=seed,
+        escape_depth=settings.escape_depth,
+    )
+    figures = _figures(arm, q_start, plan)
+    if plan.trajectory is not None and options.output is not None:
+        motion = motion_of(arm, plan.trajectory)
+        if options.period is not None:
+            motion = sampled(motion, options.period)
+        said = f'Target {_listed(goal.target)} m: {plan.sentence}.'
+        write_motion(motion, options.output, [said])
+    if options.json:
+        print(json.dumps(figures, indent=2))
+    elif plan.status is PlanStatus.SOLVED:
+        print('\n'.join(_lines(figures, options.output)))
+    if plan.status is PlanStatus.SOLVED:
+        return SOLVED
+    print(f'plan: {plan.status.value}: {plan.sentence}', file=sys.stderr)
+    return REFUSED
+
+
+def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
+    changes = {
+        name: value
+        for name, value in (('margin', options.margin), ('seed', options.seed))
+        if value is not None
+    }
+    settings = load_settings(arm.dof, options.settings, **changes)
+    if not -1 <= settings.seed < SEEDS:
+        raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
+    return settings
+
+
+def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
+    """Return where the motion begins, (dof,) [rad or m]."""
+    if options.q_from is not None:
+        if len(options.q_from) != arm.dof:
+            raise OptionsError(
+                f'--from: {len(options.q_from)} values, expected {arm.dof}, one for each of '
+                f'{list(arm.joint_names)} [rad or m]'
+            )
+        return frozen_array(options.q_from, (arm.dof,), '--from', 'rad or m', OptionsError)
+    if options.arm is None:
+        file = load_yaml(resource_path('config/playback.yaml'))
+        return np.array(file['/**']['ros__parameters']['initial_positions'])
+    return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
+
+
+def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
+    """Return what there is to say of a plan; a unit ends its name."""
+    figures: dict[str, Any] = {
+        'status': plan.status.value,
+        'sentence': plan.sentence,
+        'start': _tool(arm, q_start),
+    }
+    if plan.path is not None and plan.trajectory is not None:
+        figures |= {
+            'waypoints': len(plan.path.waypoints),
+            'duration_s': plan.trajectory.duration,
+            'length_rad': plan.path.length,
+            # No box: nothing to keep clear of.
+            'clearance_m': plan.clearance if math.isfinite(plan.clearance) else None,
+            'reach_m': plan.reach,
+            'escape_time_s': plan.escape_time,
+            'end': _tool(arm, plan.trajectory.positions[-1]),
+        }
+    return figures | {'planning_time_s': plan.planning_time, 'seed': plan.seed}
+
+
+def _tool(arm: ArmModel, q: Array) -> dict[str, list[float]]:
+    """Return a configuration, and where the tool is and points there."""
+    T = tool_pose(arm, q)
+    return {'q': q.tolist(), 'tool_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
+
+
+def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
+    lines = [
+        f'waypoints      {figures["waypoints"]}',
+        f'duration       {figures["duration_s"]:.3f} s',
+        f'length         {figures["length_rad"]:.4f} rad',
+        f'clearance      {figures["clearance_m"]:.4f} m',
+        f'planning time  {1e3 * figures["planning_time_s"]:.2f} ms',
+        f'seed           {figures["seed"]}',
+    ]
+    for label in ('start', 'end'):
+        found = figures[label]
+        lines += [
+            f'{label:15}{_listed(found["q"])}',
+            f'  tool at      {_listed(found["tool_m"])} m, ray along {_listed(found["ray"])}',
+        ]
+    if figures['escape_time_s'] > 0.0:
+        lines.append(f'leaves boxes   until {figures["escape_time_s"]:.3f} s')
+    return lines if output is None else [*lines, f'written        {output}']
+
+
+def _listed(numbers: Any) -> str:
+    return ' '.join(f'{number:.4f}' for number in np.round(numbers, 4) + 0.0)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='plan',
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        '--target',
+        type=float,
+        nargs=3,
+        required=True,
+        metavar=('X', 'Y', 'Z'),
+        help='the point to point at [m]',
+    )
+    parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm (config/arm.yaml)')
+    parser.add_argument('--body', type=Path, metavar='FILE', help='the wearer (config/body.yaml)')
+    parser.add_argument(
+        '--from',
+        dest='q_from',
+        type=float,
+        nargs='+',
+        metavar='Q',
+        help='where the arm is, a value a joint [rad or m] (folded; with --arm, 0 each)',
+    )
+    parser.add_argument(
+        '--settings',
+        type=Path,
+        metavar='FILE',
+        help='parameters of the node; what it does not say is as in config/planner.yaml',
+    )
+    parser.add_argument(
+        '--margin', type=float, metavar='M', help='clearance kept from every box [m]'
+    )
+    parser.add_argument(
+        '--seed', type=int, metavar='N', help='of the random draws; -1: fresh each time'
+    )
+    parser.add_argument(
+        '--output', type=Path, metavar='FILE', help='motion to write, .yaml or .csv'
+    )
+    parser.add_argument(
+        '--period', type=float, metavar='S', help='a point every so often [s] in that file'
+    )
+    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

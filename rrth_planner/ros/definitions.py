@@ -1,0 +1,88 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The text that defines a message and all that it contains, for files that others read."""
+
+from importlib import import_module
+from pathlib import Path
+import sys
+from typing import Any
+
+from rosidl_parser.definition import (  # type: ignore[import-untyped]
+    AbstractNestedType,
+    NamespacedType,
+)
+from rrth_planner.errors import MessageError
+
+# Between the text of a message and those of the messages in it, as rosbag2 and Foxglove have it.
+SEPARATOR = '=' * 80
+
+
+def type_name(msg_type: Any) -> str:
+    """Return what a type is called in files, as `sensor_msgs/msg/JointState`."""
+    return f'{_package(msg_type)}/msg/{msg_type.__name__}'
+
+
+def type_of_name(name: str) -> Any:
+    """
+    Return the type that is called so.
+
+    Raises
+    ------
+    MessageError
+        It is not installed.
+
+    """
+    package, _, kind = name.partition('/msg/')
+    try:
+        return getattr(import_module(f'{package}.msg'), kind)
+    except (ImportError, AttributeError, ValueError) as problem:
+        raise MessageError(f'type "{name}": {problem}, expected one that is installed') from None
+
+
+def definition_of(msg_type: Any) -> str:
+    """
+    Return the definition of a type, followed by those of all types that it contains.
+
+    Raises
+    ------
+    MessageError
+        A definition is not where the packages of ROS keep them.
+
+    """
+    inner: dict[str, Any] = {}
+    _collect(msg_type, inner)
+    inner.pop(type_name(msg_type), None)
+    parts = [_text_of(msg_type)]
+    parts += [
+        f'MSG: {_package(kind)}/{kind.__name__}\n{_text_of(kind)}' for kind in inner.values()
+    ]
+    return f'{SEPARATOR}\n'.join(f'{part.rstrip()}\n' for part in parts)
+
+
+def _package(msg_type: Any) -> str:
+    return str(msg_type.__module__).split('.', maxsplit=1)[0]
+
+
+def _collect(msg_type: Any, found: dict[str, Any]) -> None:
+    """Add a type and what it contains, each once."""
+    if type_name(msg_type) in found:
+        return
+    found[type_name(msg_type)] = msg_type
+    for kind in msg_type.SLOT_TYPES:
+        element = kind.value_type if isinstance(kind, AbstractNestedType) else kind
+        if isinstance(element, NamespacedType):
+            _collect(getattr(import_module('.'.join(element.namespaces)), element.name), found)
+
+
+def _text_of(msg_type: Any) -> str:
+    """Return the file that a type was made from: its package keeps it in share/."""
+    package = _package(msg_type)
+    file = Path('share', package, 'msg', f'{msg_type.__name__}.msg')
+    # Beside lib/ in wheels, in /opt/ros and in the workspaces of colcon alike.
+    for folder in Path(str(sys.modules[package].__file__)).resolve().parents:
+        if (folder / file).is_file():
+            return (folder / file).read_text(encoding='utf-8')
+    raise MessageError(
+        f'{file}: not found above {sys.modules[package].__file__}, expected the definition of '
+        f'{type_name(msg_type)}'
+    )

@@ -1,0 +1,202 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command point_at: have the planner point the arm at a place, and wait until it does."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
+import json
+from pathlib import Path
+import signal
+import sys
+from typing import Any, NoReturn
+
+from geometry_msgs.msg import PointStamped
+import rclpy
+from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rrth_planner.arm import pointing_error
+from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.ros.answers import Answer, answer_from_text
+from rrth_planner.ros.body_messages import body_from_file
+from rrth_planner.ros.error_codes import ErrorCode
+from rrth_planner.ros.frames import Frames
+from rrth_planner.ros.goals import goal_from_msg
+from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.point_at_options import parser
+from rrth_planner.ros.remote_parameters import parameters_of_planner
+from visualization_msgs.msg import MarkerArray
+
+DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+# A planner that has just been told everything may need a moment [s].
+PATIENCE = 2.0
+
+
+@dataclass
+class Report:
+    """How a run ended, as --json says it."""
+
+    exit_code: int = DONE
+    code: int | None = None
+    name: str | None = None
+    sentence: str = ''
+    figures: dict[str, float] = field(default_factory=dict)
+    arrived: bool | None = False
+    pointing_error: float | None = None
+
+    def take(self, answer: Answer) -> None:
+        """Keep an answer of the planner."""
+        self.code, self.name = int(answer.code), answer.code.name
+        self.sentence, self.figures = answer.sentence, answer.figures
+        if answer.code is not ErrorCode.SUCCESS:
+            self.exit_code = REFUSED
+
+    def end(self, exit_code: int, sentence: str) -> None:
+        """Keep why there is no more to report."""
+        self.exit_code, self.sentence = exit_code, sentence
+
+
+class UsageError(RrthError):
+    """Something on the command line that cannot be meant."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Point the arm and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, _end)
+    try:
+        options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+    except RuntimeError as problem:
+        print(f'point_at: {_of_ros_args(problem)}', file=sys.stderr)
+        return USAGE
+    report = Report(arrived=None if options.no_move else False)
+    try:
+        with ExitStack() as stack:
+            _run(options, given, report, stack)
+    except NotInTimeError as problem:
+        report.end(NOT_HEARD, str(problem))
+    except RrthError as problem:
+        # Of the planner's arm, which may be described by a file that is not here.
+        report.end(USAGE, str(problem))
+    except (KeyboardInterrupt, ROSInterruptException):
+        report.end(INTERRUPTED, 'interrupted')
+    if options.json:
+        print(json.dumps(asdict(report)))
+    else:
+        _print(report)
+    return report.exit_code
+
+
+def _run(options: argparse.Namespace, given: list[str], report: Report, stack: ExitStack) -> None:
+    if find_spec('tqdm') is None:
+        raise UsageError('tqdm: not installed, expected what requirements/tools.txt lists')
+    # A bad file is said before anything is waited for.
+    if options.body is not None:
+        _body(options.body, '')
+    try:
+        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        client = PlannerClient('point_at', options.timeout)
+    except (RuntimeError, ValueError, InvalidNamespaceException) as problem:
+        raise UsageError(_of_ros_args(problem)) from problem
+    stack.callback(client.destroy_node)
+    parameters = parameters_of_planner(client)
+    client.wait_for_planner()
+    client.wait_for_state(parameters.arm.joint_names)
+    body = None
+    if options.body is not None:
+        body = _checked(_body(options.body, parameters.base_frame), options.body, parameters)
+    target = PointStamped()
+    target.header.frame_id = options.frame or parameters.base_frame
+    target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
+    if options.no_move:
+        # It needs the planner itself, which takes seconds to load.
+        from rrth_planner.ros.dry_run import plan_without_moving
+
+        answer, report.pointing_error = plan_without_moving(client, parameters, target, body)
+        report.take(answer)
+        return
+    _move(client, parameters, target, body, options.tolerance, report)
+
+
+def _move(
+    client: PlannerClient,
+    parameters: PlannerParameters,
+    target: PointStamped,
+    body: MarkerArray | None,
+    tolerance: float,
+    report: Report,
+) -> None:
+    """Have the arm point at a target, and wait until it does."""
+    # Not before it is known that its progress bar is there.
+    from rrth_planner.ros.arrival import announced_motion, follow
+
+    arm, frames = parameters.arm, Frames(client, parameters.base_frame)
+    if body is not None:
+        client.tell_body(body)
+    client.tell_target(target)
+    report.take(answer_from_text(client.ask(PATIENCE).message))
+    if report.exit_code != DONE:
+        return
+    motion = announced_motion(client, arm, report.figures['duration'])
+    point = None
+    with suppress(MessageError):
+        # A frame that the planner knows may not be known here.
+        point = goal_from_msg(target, parameters.base_frame, frames.lookup).target
+    try:
+        follow(client, arm, motion, point, tolerance)
+        report.arrived = True
+    except NotInTimeError as problem:
+        report.end(NOT_ARRIVED, str(problem))
+    if point is not None:
+        report.pointing_error = pointing_error(arm, client.positions(arm.joint_names), point)
+
+
+def _of_ros_args(problem: Exception) -> str:
+    return f'--ros-args: {" ".join(str(problem).split())}'
+
+
+def _body(path: Path, frame: str) -> MarkerArray:
+    try:
+        return body_from_file(path, frame)
+    except RrthError as problem:
+        raise UsageError(f'--body: {problem}') from problem
+
+
+def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
+    """Return a body that the planner will take: it would go on with the one before, else."""
+    # It loads kernels, which takes seconds that an arm need not wait for without --body.
+    from rrth_planner.ros.bodies import WearerBody
+
+    try:
+        taken = WearerBody().apply(body, 0.0, parameters.base_frame)
+    except MessageError as problem:
+        raise UsageError(f'--body: file {path}: {problem}') from problem
+    if taken.n_boxes == 0:
+        raise UsageError(f'--body: file {path}: no box, expected at least one')
+    return body
+
+
+def _print(report: Report) -> None:
+    if report.name is None or report.exit_code in (NOT_HEARD, NOT_ARRIVED, INTERRUPTED):
+        print(f'point_at: {report.sentence}', file=sys.stderr)
+        return
+    stream = sys.stdout if report.exit_code == DONE else sys.stderr
+    print(f'{report.name} ({report.code}): {report.sentence}', file=stream)
+    if report.pointing_error is not None:
+        verb = 'points' if report.arrived else 'would point'
+        print(f'the arm {verb} {1e3 * report.pointing_error:.2f} mm past the target')
+
+
+def _end(*_: Any) -> NoReturn:
+    """Turn a signal into an interrupt, so that everything is left in order."""
+    raise KeyboardInterrupt
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,167 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The arm as a URDF: the same frames, joints and limits as its DH rows, its bars as cylinders."""
+
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.errors import ModelError
+from rrth_planner.rotation import roll_pitch_yaw
+
+MOUNT, TOOL = 'mount', 'tool'
+# How much of the pointing ray is drawn, and how thick it is beside the bars.
+RAY_LENGTH, RAY_WIDTH = 0.15, 0.4
+# URDF asks for the greatest force of a joint, of which an arm's description says nothing.
+EFFORT = 0.0
+# Shorter bars are none [m].
+SHORTEST = 1e-9
+# Digits after the point: finer ones are rounding.
+DIGITS = 15
+COLOURS = {'bar': (0.29, 0.35, 0.42, 1.0), 'ray': (0.9, 0.15, 0.15, 0.6)}
+HEADER = """
+     Written by write_urdf from the DH rows of the arm; write it again rather than change it.
+     Frame 0 of the arm is the link "mount", frame i the link of joint i, the pointing ray the +z
+     axis of the link "tool". Metres, radians, seconds; effort 0 stands for unknown.
+"""
+
+
+def arm_to_urdf(
+    arm: ArmModel, max_velocity: Array, radius: float, base_frame: str = 'torso', name: str = 'arm'
+) -> str:
+    """
+    Return the URDF of an arm: links, joints with limits, and bars to look at; no masses.
+
+    The base frame and the mount are fixed to each other, as are the last joint and the tool. A
+    prismatic joint shows as a rod that slides through the place where it begins.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    max_velocity : ndarray, shape (dof,)
+        [rad/s or m/s].
+    radius : float
+        Of the cylinders of bars that have no thickness of their own [m].
+    base_frame : str
+        Link that the arm is mounted on.
+    name : str
+        Of the robot.
+
+    Raises
+    ------
+    ModelError
+        A radius or velocity that is none, a name that is none, or two links or joints of one name.
+
+    """
+    if not 0.0 < radius < np.inf:
+        raise ModelError(f'radius: {radius}, expected a length > 0 [m]')
+    speeds = frozen_array(max_velocity, (arm.dof,), 'max_velocity', 'rad/s or m/s', ModelError)
+    links = [base_frame, MOUNT, *(f'{joint}_link' for joint in arm.joint_names), TOOL]
+    joints = [f'{MOUNT}_joint', *arm.joint_names, f'{TOOL}_joint']
+    for what, names in (('links', links), ('joints', joints), ('robot', [name])):
+        _check_names(what, names)
+    robot = ElementTree.Element('robot', name=name)
+    robot.append(ElementTree.Comment(HEADER))
+    for material, rgba in COLOURS.items():
+        colour = ElementTree.SubElement(robot, 'material', name=material)
+        ElementTree.SubElement(colour, 'color', rgba=_text(rgba))
+    ElementTree.SubElement(robot, 'link', name=links[0])
+    _add_joint(robot, joints[0], 'fixed', links[:2], arm.T_base_mount)
+    thickness = [float(r) or radius for r in arm.radii]
+    for i, link in enumerate(links[1:]):
+        element = ElementTree.SubElement(robot, 'link', name=link)
+        if i > 0:
+            _add_bar(element, _along_z(arm, i - 1), 2, thickness[i - 1], 'bar')
+        if i > arm.dof:
+            _add_bar(element, (0.0, RAY_LENGTH), 2, RAY_WIDTH * thickness[-1], 'ray')
+            break
+        a = float(arm.dh[i, 1])
+        _add_bar(element, (min(0.0, a), max(0.0, a)), 0, thickness[i], 'bar')
+        kind = 'fixed'
+        if i < arm.dof:
+            kind = 'prismatic' if arm.is_prismatic[i] else 'revolute'
+        joint = _add_joint(robot, joints[i + 1], kind, links[i + 1 :], _row_pose(arm.dh[i]))
+        if i < arm.dof:
+            ElementTree.SubElement(joint, 'axis', xyz='0 0 1')
+            lower, upper = arm.bounds[:, i].tolist()
+            ElementTree.SubElement(
+                joint,
+                'limit',
+                lower=repr(lower),
+                upper=repr(upper),
+                velocity=repr(float(speeds[i])),
+                effort=repr(EFFORT),
+            )
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'
+
+
+def _row_pose(row: Array) -> Array:
+    """Return the pose of a row's frame at joint position 0 in the one before (Craig, eq. 3.6)."""
+    alpha, a, offset, d = row.tolist()
+    ca, sa, co, so = np.cos(alpha), np.sin(alpha), np.cos(offset), np.sin(offset)
+    return np.array(
+        [
+            [co, -so, 0.0, a],
+            [so * ca, co * ca, -sa, -sa * d],
+            [so * sa, co * sa, ca, ca * d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def _along_z(arm: ArmModel, i: int) -> tuple[float, float]:
+    """Return from where to where the bar of row i lies on its own z axis [m]."""
+    low = high = float(arm.dh[i, 3])
+    if i < arm.dof and arm.is_prismatic[i]:
+        low, high = low + float(arm.bounds[0, i]), high + float(arm.bounds[1, i])
+    return -max(0.0, high), -min(0.0, low)
+
+
+def _add_joint(
+    robot: ElementTree.Element, name: str, kind: str, links: Sequence[str], pose: Array
+) -> ElementTree.Element:
+    joint = ElementTree.SubElement(robot, 'joint', name=name, type=kind)
+    ElementTree.SubElement(joint, 'parent', link=links[0])
+    ElementTree.SubElement(joint, 'child', link=links[1])
+    _add_origin(joint, pose[:3, 3], roll_pitch_yaw(pose[:3, :3]))
+    return joint
+
+
+def _add_bar(
+    link: ElementTree.Element,
+    ends: tuple[float, float],
+    axis: int,
+    radius: float,
+    material: str,
+) -> None:
+    """Add a cylinder between two places on an axis of a link; cylinders lie along z."""
+    if ends[1] - ends[0] < SHORTEST:
+        return
+    visual = ElementTree.SubElement(link, 'visual')
+    middle = np.zeros(3)
+    middle[axis] = 0.5 * (ends[0] + ends[1])
+    _add_origin(visual, middle, [0.0, 0.5 * np.pi if axis == 0 else 0.0, 0.0])
+    geometry = ElementTree.SubElement(visual, 'geometry')
+    ElementTree.SubElement(
+        geometry, 'cylinder', radius=_text([radius]), length=_text([ends[1] - ends[0]])
+    )
+    ElementTree.SubElement(visual, 'material', name=material)
+
+
+def _add_origin(
+    element: ElementTree.Element, xyz: Sequence[float] | Array, rpy: Sequence[float] | Array
+) -> None:
+    ElementTree.SubElement(element, 'origin', xyz=_text(xyz), rpy=_text(rpy))
+
+
+def _text(numbers: Sequence[float] | Array) -> str:
+    # Adding 0 turns -0 into 0.
+    return ' '.join(f'{round(float(x), DIGITS) + 0.0!r}'.removesuffix('.0') for x in numbers)
+
+
+def _check_names(what: str, names: Sequence[str]) -> None:
+    if len(set(names)) != len(names) or not all(name and name.isprintable() for name in names):
+        raise ModelError(f'{what}: {list(names)}, expected names, printable and all different')

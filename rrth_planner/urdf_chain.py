@@ -1,0 +1,246 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The serial chain between two links of a URDF."""
+
+from dataclasses import dataclass
+import logging
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.errors import ModelError
+import trimesh.transformations as transformations
+import yourdfpy
+
+RAYS = {
+    sign + axis: value * np.eye(3)[k]
+    for sign, value in (('+', 1.0), ('-', -1.0), ('', 1.0))
+    for k, axis in enumerate('xyz')
+}
+# What the library raises, depending on which part of a file is missing.
+NO_URDF = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+)
+# Roll, pitch and yaw this near to right angles are right angles, written with few digits [rad].
+SQUARE = 5e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class UrdfChain:
+    """
+    The moving joints between two links, all positions at 0, in the frame of the first link.
+
+    Parameters
+    ----------
+    name, base, tool : str
+        Of the robot and of the two links.
+    joint_names : tuple of str
+    is_prismatic : tuple of bool
+    bounds : ndarray, shape (2, dof)
+        [rad or m].
+    velocities : tuple of float
+        Greatest ones that the file gives, infinity where it gives none [rad/s or m/s].
+    points, directions : ndarray, shape (dof + 1, 3)
+        The joints' origins [m] and axes; last the tool's origin and its ray.
+    x_first : ndarray, shape (3,)
+        The x axis of the first joint's frame.
+    ray : ndarray, shape (3,)
+        The pointing ray in the tool's link.
+    endless : tuple of str
+        Continuous joints, which may turn by half a turn either way.
+    joints : tuple of yourdfpy.Joint
+        All from base to tool, as they are in the file.
+
+    """
+
+    name: str
+    base: str
+    tool: str
+    joint_names: tuple[str, ...]
+    is_prismatic: tuple[bool, ...]
+    bounds: Array
+    velocities: tuple[float, ...]
+    points: Array
+    directions: Array
+    x_first: Array
+    ray: Array
+    endless: tuple[str, ...]
+    joints: tuple[Any, ...]
+
+    def tool_pose(self, q: Array) -> Array:
+        """
+        Return the tool link's pose in the base link, (dof,) [rad or m] -> (4, 4) [m].
+
+        This is the URDF's own way, which knows nothing of lines: origin after origin.
+        """
+        T = np.eye(4)
+        values = dict(zip(self.joint_names, np.asarray(q).tolist(), strict=True))
+        for joint in self.joints:
+            if joint.origin is not None:
+                T = T @ joint.origin
+            if joint.type == 'prismatic':
+                T = T @ transformations.translation_matrix(values[joint.name] * _axis(joint))
+            elif joint.type != 'fixed':
+                T = T @ transformations.rotation_matrix(values[joint.name], _axis(joint))
+        return np.asarray(T)
+
+
+def read_chain(
+    path: str | Path, base: str | None = None, tool: str | None = None, ray: str = '+z'
+) -> UrdfChain:
+    """
+    Return the chain of a URDF file; meshes are not looked at.
+
+    Parameters
+    ----------
+    path : str or Path
+    base, tool : str, optional
+        The links that it leads from and to: the root and, where there is only one, the last link.
+    ray : str
+        Which axis of the tool's link is the pointing ray: +x, -x, +y, -y, +z or -z.
+
+    Raises
+    ------
+    ModelError
+        The file is no URDF, or there is no chain of joints that an arm may have.
+
+    """
+    if ray not in RAYS:
+        raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
+    model = _load(Path(path))
+    joints, base, tool = _between(model, base, tool)
+    T, frames, moving = np.eye(4), [], []
+    for joint in joints:
+        if joint.origin is not None:
+            T = T @ _squared(joint.origin, joint.name)
+        if joint.type != 'fixed':
+            moving.append(joint)
+            frames.append(T)
+    if not moving:
+        raise ModelError(
+            f'URDF {path}: no joint moves between "{base}" and "{tool}", expected one'
+        )
+    axes = [R[:3, :3] @ _axis(joint) for R, joint in zip(frames, moving, strict=True)]
+    limits = [_limits(joint) for joint in moving]
+    speeds = [joint.limit.velocity if joint.limit else None for joint in moving]
+    return UrdfChain(
+        name=str(model.robot.name),
+        base=base,
+        tool=tool,
+        joint_names=tuple(joint.name for joint in moving),
+        is_prismatic=tuple(joint.type == 'prismatic' for joint in moving),
+        bounds=np.array(limits).T,
+        velocities=tuple(speed if speed else math.inf for speed in speeds),
+        points=np.array([T_joint[:3, 3] for T_joint in (*frames, T)]),
+        directions=np.array([*axes, T[:3, :3] @ RAYS[ray]]),
+        x_first=frames[0][:3, 0],
+        ray=RAYS[ray],
+        endless=tuple(joint.name for joint in moving if joint.type == 'continuous'),
+        joints=tuple(joints),
+    )
+
+
+def _load(path: Path) -> Any:
+    logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
+    try:
+        # Strictly, where yourdfpy would make something of any file.
+        root = ElementTree.parse(path).getroot()
+        if any('xacro' in element.tag for element in root.iter()):
+            raise ModelError(
+                f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
+            )
+        return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
+    except OSError as problem:
+        raise ModelError(f'file {path}: {problem.strerror}; expected a URDF file') from problem
+    except NO_URDF as problem:
+        said = ' '.join(f'{type(problem).__name__}: {problem}'.split())
+        raise ModelError(f'file {path}: no URDF ({said}), expected one') from problem
+
+
+def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any], str, str]:
+    """Return the joints that lead from one link to another, and the two links."""
+    links = [link.name for link in model.robot.links]
+    above = {joint.child: joint for joint in model.robot.joints}
+    parents = {joint.parent for joint in model.robot.joints}
+    if len(above) < len(model.robot.joints):
+        raise ModelError('URDF: two joints lead to the same link, expected a tree of links')
+    if base is None:
+        base = _only([link for link in links if link not in above], 'base')
+    if tool is None:
+        tool = _only([link for link in links if link not in parents], 'tool')
+    for option, link in (('base', base), ('tool', tool)):
+        if link not in links:
+            raise ModelError(f'--{option} {link}: no link of the URDF, expected one of {links}')
+    joints: list[Any] = []
+    link = tool
+    while link != base:
+        if link not in above or len(joints) > len(links):
+            raise ModelError(f'links "{base}" and "{tool}": no chain of joints from first to last')
+        joints.insert(0, above[link])
+        link = joints[0].parent
+    for joint in joints:
+        if joint.type not in ('revolute', 'continuous', 'prismatic', 'fixed'):
+            raise ModelError(
+                f'joint "{joint.name}": {joint.type}, expected revolute, continuous, prismatic or '
+                'fixed ones between base and tool'
+            )
+        if joint.mimic is not None:
+            raise ModelError(
+                f'joint "{joint.name}": moves with "{joint.mimic.joint}", expected joints that '
+                'move by themselves between base and tool'
+            )
+    return joints, base, tool
+
+
+def _only(links: list[str], option: str) -> str:
+    if len(links) != 1:
+        raise ModelError(f'URDF: {links} may be the {option}, expected one: give --{option} LINK')
+    return links[0]
+
+
+def _axis(joint: Any) -> Array:
+    axis = np.asarray(joint.axis, dtype=np.float64)
+    length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
+    if not 1e-9 < length < math.inf:
+        raise ModelError(
+            f'joint "{joint.name}": axis {axis.tolist()}, expected three numbers, not all 0 [-]'
+        )
+    return np.asarray(axis / length)
+
+
+def _limits(joint: Any) -> tuple[float, float]:
+    if joint.type == 'continuous':
+        return -math.pi, math.pi
+    limit, unit = joint.limit, 'm' if joint.type == 'prismatic' else 'rad'
+    if limit is None or limit.lower is None or limit.upper is None:
+        raise ModelError(f'joint "{joint.name}": no limits, expected lower and upper [{unit}]')
+    if not -math.inf < limit.lower < limit.upper < math.inf:
+        raise ModelError(
+            f'joint "{joint.name}": limits {limit.lower} and {limit.upper}, expected '
+            f'lower < upper [{unit}]'
+        )
+    return limit.lower, limit.upper
+
+
+def _squared(T: Array, name: str) -> Array:
+    """Return the origin of a joint with angles that were meant to be right angles made right."""
+    if not np.isfinite(T).all():
+        raise ModelError(f'joint "{name}": origin with {T.tolist()}, expected finite numbers')
+    angles = np.array(transformations.euler_from_matrix(T))
+    right = 0.5 * np.pi * np.round(angles / (0.5 * np.pi))
+    squared = np.array(transformations.euler_matrix(*_nearer(angles, right)))
+    squared[:3, 3] = T[:3, 3]
+    return squared
+
+
+def _nearer(angles: Array, right: Array) -> Array:
+    return np.where(np.abs(angles - right) < SQUARE, right, angles)

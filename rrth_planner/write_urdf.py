@@ -1,0 +1,113 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Write the URDF of an arm, for RViz, robot_state_publisher and controllers."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+import sys
+
+from rrth_planner.errors import ModelError, RrthError
+from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.settings import load_settings
+from rrth_planner.urdf import arm_to_urdf
+
+DESCRIPTION = """\
+Write an arm as a URDF, from the same DH rows that the planner plans with: a link for each frame,
+joints with their limits, the bars as cylinders, and a link "tool" whose +z axis is the pointing
+ray. It needs no ROS.
+"""
+EPILOG = """\
+The velocities are max_velocity of the settings. URDF asks for an effort too, of which neither file
+says anything: it is written as 0, and has to be filled in for a simulation of forces.
+
+exit codes: 0  written
+            2  not written (why, is printed)
+
+example:    ./run exec write_urdf --arm my_arm.yaml --output my_arm.urdf
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the URDF and return the exit code."""
+    options = _parser().parse_args(arguments)
+    try:
+        text = urdf_of_file(options.arm, options.settings, options.radius, options.base_frame)
+        if options.output is None:
+            print(text, end='')
+        else:
+            _write(options.output, text)
+    except RrthError as problem:
+        print(f'write_urdf: {problem}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def urdf_of_file(
+    arm_file: Path | None = None,
+    settings_file: Path | None = None,
+    radius: float = 0.015,
+    base_frame: str = 'torso',
+) -> str:
+    """
+    Return the URDF of an arm's file, named as there; without files, those of the package.
+
+    Raises
+    ------
+    RrthError
+        A file that cannot be read, or that describes no arm or no settings.
+
+    """
+    arm = load_arm(arm_file)
+    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name') or 'arm'
+    speeds = load_settings(arm.dof, settings_file).limits.velocity
+    return arm_to_urdf(arm, speeds, radius, base_frame, str(name))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding='utf-8')
+    except OSError as problem:
+        raise ModelError(
+            f'file {path}: {problem.strerror}, expected a file that can be written'
+        ) from problem
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='write_urdf',
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        '--arm', type=Path, metavar='FILE', help='the arm, as config/arm.yaml (default: that one)'
+    )
+    parser.add_argument(
+        '--settings',
+        type=Path,
+        metavar='FILE',
+        help='parameters of the node, as config/planner.yaml (default: those)',
+    )
+    parser.add_argument(
+        '--output', type=Path, metavar='FILE', help='where to write (default: standard output)'
+    )
+    parser.add_argument(
+        '--radius',
+        type=float,
+        default=0.015,
+        metavar='M',
+        help='of bars without a thickness of their own [m] (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--base-frame',
+        default='torso',
+        metavar='NAME',
+        help='link that the arm is mounted on, as base_frame of the node (default: %(default)s)',
+    )
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,301 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command point_at from outside: beside real nodes, beside half of them, and alone."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+pytest.importorskip('tqdm')
+
+from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner.arm import pointing_error  # noqa: E402
+from rrth_planner.body_file import load_body  # noqa: E402
+from rrth_planner.errors import MessageError, RrthError  # noqa: E402
+from rrth_planner.resources import load_arm, resource_path  # noqa: E402
+from rrth_planner.ros import point_at  # noqa: E402
+from rrth_planner.ros.answers import answer_from_text  # noqa: E402
+from rrth_planner.ros.body_messages import body_from_file, body_to_msg  # noqa: E402
+from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages import scene_of, WearerBody  # noqa: E402
+from samples import joints  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Cold, the planner is compiled first [s].
+LONGEST_RUN = 280.0
+START = 250.0
+BOXES = resource_path('config/body.yaml')
+MARKERS = resource_path('msg_examples/body.yaml')
+COMMAND = [sys.executable, '-m', 'rrth_planner.ros.point_at']
+
+
+def run(*arguments):
+    """Return how the command ended."""
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=LONGEST_RUN
+    )
+
+
+def report_of(*arguments):
+    """Return what the command says with --json; its exit code is in it."""
+    ended = run(*arguments, '--json')
+    (line,) = ended.stdout.splitlines()
+    report = json.loads(line)
+    assert report['exit_code'] == ended.returncode, ended.stderr
+    return report
+
+
+class Bystander(Node):
+    """Hears what the planner publishes and is told, and stands in for an arm."""
+
+    def __init__(self):
+        """Listen."""
+        super().__init__('bystander')
+        self.motions, self.bodies = [], []
+        # Not latched: what an earlier test has the planner publish is none of this one's.
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, 10)
+        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, 10)
+        self._joints = self.create_publisher(JointState, 'joint_states', 10)
+
+    def stand(self):
+        """Publish the joints of an arm that never moves."""
+        self.create_timer(0.05, lambda: self._joints.publish(joints()))
+
+
+@pytest.fixture(scope='module')
+def planner(ros_context):
+    """Have a planner running as a process."""
+    with ChildProcess(
+        'rrth_planner.ros.planner_node', ['--ros-args', '-p', 'seed:=3'], lambda _: None
+    ) as child:
+        yield child
+
+
+@pytest.fixture
+def bystander(ros_context, spinning):
+    """Give a node that listens."""
+    node = Bystander()
+    with spinning(node):
+        yield node
+    node.destroy_node()
+
+
+@pytest.fixture
+def arm(planner):
+    """Have a playback running as a process."""
+    with ChildProcess('rrth_planner.ros.playback_node', [], lambda _: None) as child:
+        yield child
+
+
+@pytest.mark.slow
+def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
+    report = report_of(1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START)
+    assert report['exit_code'] == 0, report
+    assert (report['code'], report['name'], report['arrived']) == (1, 'SUCCESS', True)
+    assert report['pointing_error'] < 1e-3
+    wait_until(lambda: bystander.motions)
+    (motion,) = bystander.motions
+    end = motion.points[-1].time_from_start
+    assert report['figures']['duration'] == pytest.approx(end.sec + 1e-9 * end.nanosec, abs=1e-3)
+    assert report['figures']['seed'] == 3
+    assert report['figures']['least_clearance'] >= 0.02
+    assert (
+        pointing_error(load_arm(), np.array(motion.points[-1].positions), [1.5, 0.1, 0.3]) < 1e-6
+    )
+
+    # The body stays; without --json the figures come as the planner says them.
+    ended = run(0.3, 1.3, 0.2)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.startswith('SUCCESS (1): ')
+    assert 'mm past the target' in ended.stdout
+    wait_until(lambda: len(bystander.motions) == 2)
+
+    # A target that the planner refuses moves nothing.
+    report = report_of(0, 0, 0)
+    assert (report['exit_code'], report['name']) == (1, 'GOAL_IN_COLLISION')
+    assert 'inside box' in report['sentence']
+    assert report['arrived'] is False
+    ended = run(1.5, 0.1, 0.3, '--frame', 'nowhere')
+    assert ended.returncode == 1
+    assert ended.stderr.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
+    assert len(bystander.motions) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('body', [BOXES, MARKERS])
+def test_planning_without_moving_publishes_nothing(planner, bystander, body):
+    bystander.stand()
+    report = report_of(1.5, 0.1, 0.3, '--no-move', '--body', body, '--timeout', START)
+    assert (report['exit_code'], report['name'], report['arrived']) == (0, 'SUCCESS', None)
+    # The planner's own seed and limits, so that this is the motion that it would make.
+    assert report['figures']['seed'] == 3
+    assert report['figures']['duration'] > 0.5
+    assert report['pointing_error'] < 1e-6
+    refused = report_of(0, 0, 0, '--no-move', '--body', body)
+    assert (refused['exit_code'], refused['name']) == (1, 'GOAL_IN_COLLISION')
+    assert not bystander.motions
+    assert not bystander.bodies
+
+
+@pytest.mark.slow
+def test_planning_without_moving_goes_round_the_body_that_is_heard(planner, bystander):
+    bystander.stand()
+    silent = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', '5')
+    assert silent['exit_code'] == 3
+    assert '/body_boxes' in silent['sentence']
+    latched = bystander.create_publisher(MarkerArray, 'body_boxes', LATCHED)
+    latched.publish(body_to_msg(load_body(), 'torso'))
+    heard = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
+    assert heard['exit_code'] == 0, heard
+    assert not bystander.motions
+
+
+@pytest.mark.slow
+def test_an_arm_that_does_not_follow_has_not_arrived(planner, bystander):
+    bystander.stand()
+    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '20')
+    assert (report['exit_code'], report['name'], report['arrived']) == (4, 'SUCCESS', False)
+    assert 'from the end of its motion' in report['sentence']
+    assert report['pointing_error'] > 0.1
+
+
+@pytest.mark.slow
+def test_without_joint_positions_nothing_is_asked_for(planner, bystander):
+    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '5')
+    assert report['exit_code'] == 3
+    assert '/joint_states of joint_1' in report['sentence']
+    assert not bystander.bodies
+
+
+def test_without_a_planner_it_says_so_in_time():
+    begin = time.monotonic()
+    ended = run(1.5, 0.1, 0.3, '--timeout', '0.5', '--ros-args', '-r', '__ns:=/alone')
+    assert ended.returncode == 3
+    assert ended.stdout == ''
+    assert len(ended.stderr.splitlines()) == 1
+    assert '/alone/rrth_planner' in ended.stderr
+    assert time.monotonic() - begin < LONGEST_RUN
+
+
+def test_it_can_be_interrupted(bystander, wait_until):
+    process = subprocess.Popen(
+        [*COMMAND, '1.5', '0.1', '0.3', '--json', '--ros-args', '-r', '__ns:=/alone'],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        # A signal before Python is up would end it without a word.
+        nodes = bystander.get_node_names_and_namespaces
+        wait_until(lambda: ('point_at', '/alone') in nodes(), 120.0)
+        process.send_signal(signal.SIGTERM)
+        words, _ = process.communicate(timeout=60.0)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert json.loads(words)['sentence'] == 'interrupted'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['1', '2'], 'Z'),
+        (['1', 'two', '3'], '"two", expected a coordinate'),
+        (['1', 'nan', '3'], '"nan", expected a coordinate'),
+        (['1', '2', '3', '--timeout', '0'], '--timeout: 0, expected a number > 0'),
+        (['1', '2', '3', '--body', '/nowhere.yaml'], '--body: file /nowhere.yaml'),
+        (['1', '2', '3', '--body', str(resource_path('config/arm.yaml'))], 'no body, expected'),
+        (['1', '2', '3', '--ros-args', '-r', 'nonsense'], '--ros-args'),
+    ],
+)
+def test_wrong_usage_is_said_before_anything_is_waited_for(arguments, words, monkeypatch, capsys):
+    # The handlers of the tests stay.
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    try:
+        code = point_at.main(arguments)
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert words in capsys.readouterr().err
+
+
+def test_wrong_words_for_ros_are_wrong_usage():
+    ended = run('1', '2', '3', '--ros-args', '-r', 'nonsense')
+    assert ended.returncode == 2
+    assert ended.stderr.startswith('point_at: --ros-args: ')
+    assert len(ended.stderr.splitlines()) == 1
+
+
+def test_the_help_names_every_exit_code(monkeypatch, capsys):
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    with pytest.raises(SystemExit) as end:
+        point_at.main(['--help'])
+    assert end.value.code == 0
+    codes = capsys.readouterr().out.split('exit codes:')[1].split('--json')[0].split('\n')
+    assert [line.split()[0] for line in codes if line[2:3].isdigit()] == [
+        '0',
+        '1',
+        '2',
+        '3',
+        '4',
+        '130',
+    ]
+
+
+def test_an_answer_is_read_back():
+    answer = answer_from_text(
+        'SUCCESS (1): 2 waypoints, duration 1.426 s, path length 1.9430 rad, least clearance '
+        '-0.0389 m, planning time 3.90 ms, seed 1043618065; the clock ended the improvement'
+    )
+    assert answer.code is ErrorCode.SUCCESS
+    assert answer.figures == {
+        'waypoints': 2,
+        'duration': 1.426,
+        'path_length': 1.943,
+        'least_clearance': -0.0389,
+        'planning_time_ms': 3.9,
+        'seed': 1043618065,
+    }
+    assert answer_from_text('NO_IK_SOLUTION (-31): no, seed 7').figures == {'seed': 7}
+    for text in ('', 'SUCCESS', 'SUCCESS (2): what'):
+        with pytest.raises(MessageError, match='expected NAME'):
+            answer_from_text(text)
+
+
+def test_a_body_of_either_layout_is_the_same_body():
+    scenes = [
+        scene_of(WearerBody().apply(body_from_file(path, 'torso'), 0.0, 'torso'))
+        for path in (BOXES, MARKERS)
+    ]
+    for one, other in zip(*(scene.boxes for scene in scenes), strict=True):
+        assert one.name.split('/')[0] == other.name.split('/')[0]
+        np.testing.assert_allclose(one.center, other.center)
+        np.testing.assert_allclose(one.size, other.size)
+        np.testing.assert_allclose(one.rotation, other.rotation, atol=1e-12)
+
+
+def test_a_body_replaces_every_box_before():
+    before = WearerBody().apply(body_from_file(MARKERS, 'torso'), 0.0, 'torso')
+    after = before.apply(body_to_msg(load_body(), 'torso'), 0.0, 'torso')
+    assert after.n_boxes == len(load_body().boxes)
+
+
+def test_a_file_that_is_no_body_is_refused_by_name(tmp_path):
+    file = tmp_path / 'boxes.yaml'
+    for text in ('boxes: []', 'markers: 7', 'markers: [{nothing: 1}]', '[]', '}{'):
+        file.write_text(text)
+        with pytest.raises(RrthError, match=os.path.basename(file)):
+            body_from_file(file, 'torso')

@@ -1,0 +1,219 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of all kinds are read as the nodes would, or refused in one sentence."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('mcap')
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # noqa: E402
+from geometry_msgs.msg import PointStamped  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.arm import ArmModel  # noqa: E402
+from rrth_planner.errors import RecordError  # noqa: E402
+from rrth_planner.recording import brakes  # noqa: E402
+from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
+from rrth_planner.ros.recorder import RecordingFile  # noqa: E402
+from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
+from rrth_planner.trajectory import Trajectory  # noqa: E402
+from rrth_planner.viewers.plot import main  # noqa: E402
+from samples import array, box, FOLDED, joints, target, wearer  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
+from trajectory_msgs.msg import JointTrajectory  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
+
+ARM = load_arm()
+BEGIN = 1_800_000_000
+SECOND = 10**9
+TYPES = {
+    'body_boxes': MarkerArray,
+    'target': PointStamped,
+    'joint_states': JointState,
+    'joint_trajectory': JointTrajectory,
+    'diagnostics': DiagnosticArray,
+}
+
+
+def write(path, *items, space=''):
+    """Write messages, each (topic, time since the begin [s], message), to a file."""
+    with RecordingFile(path) as file:
+        for topic, time, msg in items:
+            name = f'/{topic}' if topic == 'diagnostics' else f'{space}/{topic}'
+            if name not in file.counts:
+                file.add_topic(name, TYPES[name.rsplit('/', 1)[-1]])
+            when = BEGIN * SECOND + round(time * SECOND)
+            file.add(name, serialize_message(msg), when, when + 1000)
+    return path
+
+
+def state(time, position=FOLDED, **fields):
+    """Return joint positions with a stamp, [s] since the begin."""
+    msg = joints(position, **fields)
+    msg.header.stamp.sec, msg.header.stamp.nanosec = divmod(
+        BEGIN * SECOND + round(time * SECOND), SECOND
+    )
+    return 'joint_states', time, msg
+
+
+def told(time, speed=0.0, stamp=0.0):
+    """Return a motion."""
+    trajectory = Trajectory(
+        times=[0.0, 1.0],
+        positions=[FOLDED, np.array(FOLDED) + 0.2],
+        velocities=[np.full(4, speed), np.zeros(4)],
+        accelerations=np.zeros((2, 4)),
+    )
+    begin = BEGIN + stamp if stamp else 0.0
+    return (
+        'joint_trajectory',
+        time,
+        joint_trajectory_to_msg(trajectory, ARM.joint_names, '', begin),
+    )
+
+
+def said(time, guard, name='rrth_planner'):
+    """Return diagnostics."""
+    status = DiagnosticStatus(name=f'{name}: planning', hardware_id='rrth_planner')
+    status.values = [KeyValue(key='guard', value=guard)]
+    return 'diagnostics', time, DiagnosticArray(status=[status])
+
+
+STATES = [state(0.1 * k, velocity=[0.1 * k] * 4) for k in range(10)]
+
+
+def read(path, **options):
+    """Return a file's run."""
+    return RecordingReader(path, ARM, 'torso', **options).recording()
+
+
+def test_a_run_is_read_on_one_clock(tmp_path):
+    hat = box('hat')
+    hat.lifetime.nanosec = SECOND // 4
+    path = write(
+        tmp_path / 'run.mcap',
+        *STATES,
+        ('body_boxes', 0.1, wearer()),
+        ('body_boxes', 0.3, array(hat)),
+        ('target', 0.15, target()),
+        told(0.2),
+        told(0.5, speed=0.3, stamp=0.45),
+        said(0.2, 'watches the motion'),
+        said(0.5, 'brakes'),
+        said(0.4, 'no motion', name='elsewhere/rrth_planner'),
+    )
+    run = read(path)
+    np.testing.assert_allclose(run.times, 0.1 * np.arange(10), atol=1e-5)
+    np.testing.assert_array_equal(run.velocities[3], np.full(4, 0.1 * 3))
+    assert [motion.begin for motion in run.told] == pytest.approx([0.2, 0.45], abs=1e-5)
+    assert brakes(run) == (run.told[1],)
+    assert [state for _, state in run.guard] == ['watches the motion', 'brakes']
+    # The hat is there for a quarter of a second.
+    assert [time for time, _ in run.bodies] == pytest.approx([0.1, 0.3, 0.55], abs=1e-5)
+    assert [len(scene.boxes) for _, scene in run.bodies] == [2, 3, 2]
+    np.testing.assert_array_equal(run.targets[0][1], [1.5, 0.1, 0.3])
+
+
+def test_without_velocities_the_change_of_the_positions_counts(tmp_path):
+    nowhere = [float('nan')] * 4
+    path = write(
+        tmp_path / 'run.mcap',
+        *(state(0.1 * k, np.array(FOLDED) + 0.05 * k, velocity=nowhere) for k in range(5)),
+    )
+    np.testing.assert_allclose(read(path).velocities, np.full((5, 4), 0.5), rtol=1e-3)
+
+
+def test_what_the_nodes_would_refuse_is_left_out_and_said(tmp_path, capsys):
+    path = write(
+        tmp_path / 'run.mcap',
+        *STATES,
+        state(2.0, FOLDED[:2]),
+        ('body_boxes', 0.1, wearer()),
+        ('body_boxes', 0.2, array(box('far', frame='map'))),
+        ('target', 0.1, target(x=float('nan'))),
+        ('joint_trajectory', 0.1, JointTrajectory(joint_names=['other'])),
+    )
+    reader = RecordingReader(path, ARM, 'torso')
+    run = reader.recording()
+    assert len(run.times) == 10
+    assert len(run.bodies) == 1
+    assert not run.targets
+    assert not run.told
+    assert set(reader.refused) == {'/joint_states', '/body_boxes', '/target', '/joint_trajectory'}
+    assert main(['recording', str(path), '-o', str(tmp_path / 'run.png')]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 4
+    assert all('bad messages are left out' in line for line in lines)
+
+
+def test_a_file_that_was_never_finished_is_read_as_far_as_it_goes(tmp_path):
+    path = write(tmp_path / 'run.mcap', *(state(0.01 * k) for k in range(5000)))
+    whole, cut = path.read_bytes(), tmp_path / 'cut.mcap'
+    counts = []
+    for share in np.linspace(0.4, 0.95, 24):
+        cut.write_bytes(whole[: int(share * len(whole))])
+        counts.append(len(read(cut).times))
+    assert counts == sorted(counts)
+    assert 500 < counts[0] < counts[-1] <= 5000
+
+
+def test_of_several_runs_one_is_to_be_named(tmp_path):
+    path = tmp_path / 'run.mcap'
+    both = [(f'{side}/{t}', time, msg) for side in ('left', 'right') for t, time, msg in STATES]
+    write(path, *both)
+    with pytest.raises(RecordError, match='expected --namespace with one of /left, /right'):
+        read(path)
+    assert len(read(path, namespace='/left').times) == 10
+    assert len(read(path, namespace='right').times) == 10
+    with pytest.raises(RecordError, match='no joint_states'):
+        read(path, namespace='middle')
+
+
+def test_another_arm_is_not_found(tmp_path):
+    other = ArmModel(
+        joint_names=('a', 'b', 'c', 'd'),
+        **{
+            name: getattr(ARM, name)
+            for name in ('is_prismatic', 'dh', 'bounds', 'radii', 'T_base_mount')
+        },
+    )
+    path = write(tmp_path / 'run.mcap', *STATES)
+    with pytest.raises(RecordError, match='expected a run of this arm'):
+        RecordingReader(path, other, 'torso').recording()
+
+
+def flipped(path):
+    """Return the bytes of a good file with its chunk damaged."""
+    data = bytearray(write(path, *STATES).read_bytes())
+    middle = len(data) // 3
+    data[middle : middle + 40] = bytes(b ^ 0xFF for b in data[middle : middle + 40])
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ('content', 'words'),
+    [
+        (b'', 'expected an MCAP file of a run'),
+        (b'these are no messages, but a letter to somebody else', 'expected an MCAP file'),
+        (flipped, 'expected an MCAP file'),
+        (None, 'No such file'),
+    ],
+)
+def test_a_bad_file_is_refused_in_one_sentence(tmp_path, capsys, content, words):
+    path, output = tmp_path / 'bad.mcap', tmp_path / 'bad.png'
+    if content is not None:
+        path.write_bytes(content(tmp_path / 'good.mcap') if callable(content) else content)
+    assert main(['recording', str(path), '-o', str(output)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f'plot: {path}: ')
+    assert words in line
+    assert not output.exists()
+
+
+def test_a_section_outside_of_the_run_is_refused(tmp_path, capsys):
+    path = write(tmp_path / 'run.mcap', *STATES)
+    assert main(['recording', str(path), '--begin', '7', '-o', str(tmp_path / 'run.png')]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert 'expected times between 0.00 and 0.90' in line

@@ -1,0 +1,242 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Arms from URDF files move as their URDF says; what is no arm is refused in a sentence."""
+
+import numpy as np
+import pytest
+
+yourdfpy = pytest.importorskip('yourdfpy')
+
+from rrth_planner import read_urdf
+from rrth_planner.arm import tool_pose
+from rrth_planner.dh_rows import rows_of_axes
+from rrth_planner.errors import ModelError
+from rrth_planner.oracle import bars, frames
+from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.rotation import pose_matrix
+from rrth_planner.urdf_chain import RAYS, read_chain
+from rrth_planner.urdf_import import import_chain
+from urdf_texts import joint, random_urdf, urdf
+
+TURN = {'axis': {'xyz': '0 0 1'}, 'limit': {'lower': '-1', 'upper': '1'}}
+
+
+def file_of(tmp_path, text):
+    """Return a file with a text."""
+    file = tmp_path / 'arm.urdf'
+    file.write_text(text)
+    return file
+
+
+def imported(tmp_path, rng):
+    """Return a random chain as an arm, worn anywhere."""
+    text, tool = random_urdf(rng)
+    chain = read_chain(file_of(tmp_path, text), 'base', tool, str(rng.choice(list(RAYS))))
+    mount = pose_matrix(rng.uniform(-0.5, 0.5, 3), rng.standard_normal(4))
+    return import_chain(chain, mount, 0.02), yourdfpy.URDF.load(
+        str(tmp_path / 'arm.urdf'), load_meshes=False
+    )
+
+
+def test_any_chain_moves_as_its_urdf_says(tmp_path):
+    rng = np.random.default_rng(3)
+    n_exact = n_sliding = n_parallel = n_meeting = 0
+    for n in range(100):
+        found, model = imported(tmp_path, rng)
+        arm = found.arm
+        for q in rng.uniform(*arm.bounds, (5, arm.dof)):
+            model.update_cfg(dict(zip(arm.joint_names, q.tolist(), strict=True)))
+            T_urdf = found.T_base_link @ model.get_transform(found.chain.tool, 'base')
+            T = tool_pose(arm, q)
+            assert np.abs(T[:3, 2] - T_urdf[:3, :3] @ found.chain.ray).max() < 1e-9
+            begin = T[:3, 3] + found.ray_lead * T[:3, 2]
+            assert np.abs(begin - T_urdf[:3, 3]).max() < 1e-9
+        # What the command prints is this very comparison.
+        assert n % 10 or max(found.deviation()) < 1e-9
+        n_exact += found.ray_lead == 0.0
+        n_sliding += any(arm.is_prismatic)
+        n_parallel += (np.abs(np.sin(arm.dh[1:, 0])) < 1e-12).any()
+        n_meeting += (arm.dh[1:, 1] == 0.0).any()
+    assert min(n_exact, n_sliding, n_parallel, n_meeting) >= 10
+
+
+def test_a_ray_along_the_last_axis_begins_where_the_tool_is(tmp_path):
+    joints = [
+        joint('a', 'revolute', 'base', 'l1', **TURN),
+        joint('b', 'revolute', 'l1', 'l2', **{**TURN, 'axis': {'xyz': '1 0 0'}}),
+        joint('c', 'fixed', 'l2', 'tool', origin={'xyz': '0.1 0.2 0.3'}),
+    ]
+    file = file_of(tmp_path, urdf(joints))
+    assert import_chain(read_chain(file, ray='-x'), np.eye(4), 0.0).ray_lead == 0.0
+    # The line of the ray is nearest to the axis of b at the height of its foot.
+    assert import_chain(read_chain(file, ray='z'), np.eye(4), 0.0).ray_lead == pytest.approx(0.3)
+
+
+def test_the_bars_enclose_the_links(tmp_path):
+    rng = np.random.default_rng(4)
+    share = np.linspace(0.0, 1.0, 41)[:, None]
+    for _ in range(60):
+        found, _ = imported(tmp_path, rng)
+        arm, chain = found.arm, found.chain
+        points = chain.points @ found.T_base_link[:3, :3].T + found.T_base_link[:3, 3]
+        rest, bent = np.zeros(arm.dof), rng.uniform(*arm.bounds)
+        T_rest, T = frames(arm, np.stack([rest, bent]))
+        # What belongs to the mount is not checked, so it encloses what lies on it.
+        mount = np.stack([arm.T_base_mount[:3, 3], T[0, :3, 3]])
+        ends = np.concatenate([bars(arm, bent[None], 1.0)[0], mount[None]])
+        radii = [arm.radii[i] for i in range(arm.dof + 1) for _ in 'ad']
+        radii = [*radii[(1 if arm.is_prismatic[0] else 2) :], arm.radii[:2].max()]
+        is_bar = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 0.0
+        assert len(radii) == len(ends)
+        for i in range(arm.dof):
+            begin, end = (points[i : i + 2] - T_rest[i, :3, 3]) @ T_rest[i, :3, :3]
+            link = (begin + share * (end - begin)) @ T[i, :3, :3].T + T[i, :3, 3]
+            gaps = [
+                _distances(link, *bar) - radius
+                for bar, radius, counts in zip(ends, radii, is_bar, strict=True)
+                if counts
+            ]
+            assert np.min(gaps, axis=0).max() <= -0.02 + 1e-6
+
+
+def _distances(points, begin, end):
+    along = end - begin
+    share = np.clip((points - begin) @ along / (along @ along), 0.0, 1.0)
+    return np.linalg.norm(points - begin - share[:, None] * along, axis=1)
+
+
+def test_angles_written_with_few_digits_are_right_angles(tmp_path):
+    half = {'origin': {'xyz': '0 0.1 0.2', 'rpy': '0 0 0'}}
+    joints = [
+        joint('a', 'revolute', 'base', 'l1', **TURN),
+        joint('b', 'revolute', 'l1', 'l2', **TURN, origin={'xyz': '.3 0 .1', 'rpy': '1.5708 0 0'}),
+        joint('c', 'revolute', 'l2', 'l3', **TURN, origin={'xyz': '.3 0 0', 'rpy': '3.1416 0 0'}),
+        # Two angles that only together are next to nothing.
+        joint('d', 'fixed', 'l3', 'l4', origin={'xyz': '0.2 0 0', 'rpy': '0.5236 0 0'}),
+        joint('e', 'fixed', 'l4', 'l5', origin={'xyz': '0.2 0 0', 'rpy': '-0.523599 0 0'}),
+        joint('f', 'revolute', 'l5', 'l6', **TURN, **half),
+        joint('g', 'fixed', 'l6', 'tool', origin={'xyz': '0 0 0.1', 'rpy': '0 1.5708 0'}),
+    ]  # fmt: skip
+    found = import_chain(read_chain(file_of(tmp_path, urdf(joints))), np.eye(4), 0.01)
+    quarters = found.arm.dh[:, 0] / (0.5 * np.pi)
+    assert np.array_equal(quarters, np.round(quarters))
+    assert np.abs(found.arm.dh[:, [1, 3]]).max() < 1.0
+    far, tilt = found.deviation()
+    assert 0.0 < far < 2e-5
+    assert 0.0 < tilt < 5e-5
+
+
+def test_axes_next_to_parallel_are_told(tmp_path, capsys):
+    joints = [
+        joint('a', 'revolute', 'base', 'l1', **TURN),
+        joint('b', 'revolute', 'l1', 'l2', **TURN, origin={'xyz': '.3 0 0', 'rpy': '0 .002 0'}),
+        joint('c', 'revolute', 'l2', 'l3', **{**TURN, 'axis': {'xyz': '1 0 0'}}),
+        joint('d', 'fixed', 'l3', 'tool', origin={'xyz': '0.2 0 0'}),
+    ]
+    file, arm = file_of(tmp_path, urdf(joints)), tmp_path / 'arm.yaml'
+    assert read_urdf.main([str(file), '--output', str(arm)]) == 0
+    assert 'bars: up to 150.00 m long in an arm of 0.50 m' in capsys.readouterr().out
+    # Made from a xacro file, of which the name of its language is left.
+    chest = resource_path('config/examples/chest_arm.urdf').read_text()
+    named = chest.replace('<robot ', '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    file.write_text(named)
+    assert read_urdf.main([str(file), '--ray', '+x', '--output', str(arm)]) == 0
+    assert 'bars' not in capsys.readouterr().out.replace('straight bars', '')
+
+
+def test_lines_that_are_no_numbers_are_refused():
+    with pytest.raises(ModelError, match='finite'):
+        rows_of_axes(np.full((2, 3), np.nan), np.eye(3)[:2], np.eye(3)[2])
+
+
+LAST = joint('last', 'revolute', 'l1', 'tool', **{**TURN, 'axis': {'xyz': '1 0 0'}})
+CHAINS = {
+    'floating': [joint('a', 'floating', 'base', 'l1'), LAST],
+    'planar': [joint('a', 'planar', 'base', 'l1'), LAST],
+    'moves with "last"': [
+        joint('a', 'revolute', 'base', 'l1', **TURN, mimic={'joint': 'last'}),
+        LAST,
+    ],
+    'no limits': [joint('a', 'revolute', 'base', 'l1', axis={'xyz': '0 0 1'}), LAST],
+    'expected lower < upper': [
+        joint('a', 'prismatic', 'base', 'l1', limit={'lower': '0.2', 'upper': '0.1'}),
+        LAST,
+    ],
+    'not all 0': [
+        joint('a', 'revolute', 'base', 'l1', limit=TURN['limit'], axis={'xyz': '0 0 0'}),
+        LAST,
+    ],
+    'finite numbers': [
+        joint('a', 'revolute', 'base', 'l1', **TURN, origin={'xyz': '0 nan 0'}),
+        LAST,
+    ],
+    'no joint moves': [joint('a', 'fixed', 'base', 'tool')],
+    'give --tool LINK': [LAST, joint('b', 'fixed', 'l1', 'other')],
+    'give --base LINK': [LAST, joint('b', 'fixed', 'base', 'other')],
+    'expected a tree': [LAST, joint('b', 'fixed', 'base', 'tool')],
+}  # fmt: skip
+TEXTS = {
+    'a xacro file': '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro/></robot>',
+    'no URDF': '<sdf version="1.9"/>',
+    'no URDF (.*': 'joints: [1, 2]\n',
+    'no URDF [(].*': '<robot name="a"><link name="b"/><joint name="c" type="revolute"/></robot>',
+    'no URDF [(].*[)]': '',
+    'expected one: give --base': '<robot name="a"/>',
+    **{words: urdf(joints) for words, joints in CHAINS.items()},
+}
+
+
+@pytest.mark.parametrize('words', TEXTS)
+def test_what_is_no_arm_is_refused_in_a_sentence(tmp_path, capsys, words):
+    file, arm = file_of(tmp_path, TEXTS[words]), tmp_path / 'arm.yaml'
+    assert read_urdf.main([str(file), '--output', str(arm)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith('read_urdf: ')
+    assert said.count('\n') == 1
+    assert words.split(' (')[0].split(' [')[0] in said
+    assert not arm.exists()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (['--tool', 'nothing'], "no link of the URDF, expected one of ['torso'"),
+        (['--base', 'lamp', '--tool', 'plate'], 'no chain of joints'),
+        (['--base', 'lamp'], 'no joint moves'),
+        (['--ray', 'up'], 'expected one of +x'),
+        (['--radius', '-1'], 'radius: -1.0, expected a length >= 0'),
+        (['--radius', 'nan'], 'radius: nan'),
+        (['--mount', '0', '0', '0', '0', '0', '0', '0'], 'not all 0'),
+        (['--mount', '0', '0', 'inf', '0', '0', '0', '1'], 'finite'),
+        (['--check', '1', '2'], '--check: 2 values, expected 6, one for each'),
+        # The first joint alone sweeps a cone.
+        (['--tool', 'turret'], 'expected 2: the ray sweeps a surface'),
+    ],
+)
+def test_a_wrong_request_is_refused_in_a_sentence(tmp_path, capsys, arguments, words):
+    file, arm = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'arm.yaml'
+    assert read_urdf.main([str(file), '--output', str(arm), *arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count('\n') == 1
+    assert not arm.exists()
+
+
+def test_files_that_cannot_be_used_are_named(tmp_path, capsys):
+    file, output = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'no' / 'arm.yaml'
+    assert read_urdf.main([str(tmp_path / 'none.urdf'), '--output', str(output)]) == 2
+    assert 'none.urdf: No such file' in capsys.readouterr().err
+    assert read_urdf.main([str(file), '--output', str(output)]) == 2
+    assert 'no/arm.yaml' in capsys.readouterr().err
+
+
+def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
+    file, arm = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'arm.yaml'
+    worn = ['--base', 'plate', '--mount', '-0.2', '0', '0.3', '0', '0', '1', '0', '--ray', '-z']
+    assert read_urdf.main([str(file), '--output', str(arm), *worn, '--check', *'000000']) == 0
+    # Half a turn about z, and then 0.05 m up to the first joint.
+    assert np.allclose(load_arm(arm).T_base_mount[:3, 3], (-0.2, 0.0, 0.35), atol=1e-12)
+    T = tool_pose(load_arm(arm), np.zeros(6))
+    # The lamp's -z is the plate's x: backwards on the wearer.
+    assert np.allclose(T[:3, 2], (-1.0, 0.0, 0.0), atol=1e-4)
+    assert 'tool at' in capsys.readouterr().out
