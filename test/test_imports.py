@@ -37,12 +37,7 @@ OWN = {
 # a command needs takes seconds to load.
 # The report says which requirements it misses before it imports what has them.
 REPORTER = 'rrth_planner.reproduce'
-# The viewer says what it misses before it imports what needs it, and follows the nodes on demand.
-VIEWER, FEED = 'rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'
 LATE = {
-    (VIEWER, FEED),
-    (VIEWER, 'rrth_planner.viewers.viewer_live'),
-    (VIEWER, 'rrth_planner.viewers.viewer_page'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.arrival'),

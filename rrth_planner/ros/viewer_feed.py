@@ -10,6 +10,7 @@ from typing import Any
 
 from geometry_msgs.msg import PointStamped
 import rclpy
+from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -29,6 +30,8 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
+# A target that is not taken after this time is not waited for [s].
+LONGEST_WAY = 1.0
 LATCHED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
@@ -132,6 +135,8 @@ class ViewerFeed(Node):
         self._call()
 
     def _call(self) -> None:
+        # The request takes another way than the target, and must not overtake it.
+        self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
         self._client.call_async(Trigger.Request()).add_done_callback(self._on_answer)
 
     def _on_answer(self, future: Any) -> None:

@@ -150,7 +150,13 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
 
 def _question(options: argparse.Namespace) -> PlanQuestion:
     arm = load_arm(options.arm)
-    settings = load_settings(arm.dof, options.settings, **_changes(options.set))
+    try:
+        settings = load_settings(arm.dof, options.settings, **_changes(options.set))
+    except (TypeError, ValueError) as problem:
+        raise OptionsError(
+            f'--settings {options.settings}, --set {options.set}: {problem}; expected values as '
+            'in config/planner.yaml'
+        ) from problem
     target = example_target('front') if options.target is None else options.target
     return PlanQuestion(
         arm=arm,

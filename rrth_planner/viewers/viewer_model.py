@@ -111,7 +111,6 @@ class ViewerModel:
             )
             if value is not None
         }
-        refused: Answer | None = None
         with self._condition:
             answer: Answer | None = None
             self._n_asked += 1
@@ -124,13 +123,13 @@ class ViewerModel:
             except RrthError as problem:
                 # The page goes on with the last question that was one.
                 self._wanted = False
-                refused = Answer(number=self._n_asked, sentence=str(problem))
+                answer = Answer(number=self._n_asked, sentence=str(problem))
             else:
                 self._wanted = True
                 self._condition.notify_all()
             number = self._n_asked
-        if refused is not None:
-            self._tell(refused)
+        if answer is not None:
+            self._tell(answer)
         return number
 
     def wait(self, number: int, timeout: float) -> Answer:

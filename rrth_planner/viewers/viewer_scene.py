@@ -26,7 +26,7 @@ BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
 # A ray that passes so near to the target points at it [m].
 AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
-CAMERA, LOOK_AT = (-1.35, -1.3, 1.05), (0.22, 0.0, 0.22)
+CAMERA, LOOK_AT = (-1.02, -1.02, 0.92), (0.22, 0.0, 0.26)
 LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
 
 
@@ -132,11 +132,11 @@ class SceneView:
         """Draw where the tool is along the edges of the trees."""
         handles: list[Any] = []
         for k, (tree, colour) in enumerate(zip(trees, TREES, strict=False)):
-            handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.0035)
+            handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.003)
             nodes = tool_pose(self._arm, tree.nodes)[:, :3, 3]
             handles.append(
                 self._scene.add_point_cloud(
-                    f'/tree/nodes_{k}', nodes, colour, point_size=0.011, point_shape='circle'
+                    f'/tree/nodes_{k}', nodes, colour, point_size=0.008, point_shape='circle'
                 )
             )
         self._replace('tree', handles)
@@ -165,7 +165,7 @@ class SceneView:
                     f'/{layer}/corners',
                     corners,
                     colour,
-                    point_size=2.6 * width,
+                    point_size=2.0 * width,
                     point_shape='circle',
                 )
             )
