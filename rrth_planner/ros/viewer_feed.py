@@ -5,11 +5,13 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Lock, Thread
+from threading import Thread
+import time
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -32,6 +34,9 @@ from trajectory_msgs.msg import JointTrajectory
 NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
 # A target that is not taken after this time is not waited for [s].
 LONGEST_WAY = 1.0
+# From an answer to the next request, so that the arm is well under way; how often it is looked
+# whether a plan is wanted [s].
+PAUSE, PERIOD = 0.3, 0.02
 LATCHED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
@@ -73,10 +78,11 @@ class ViewerFeed(Node):
         self._client = self.create_client(Trigger, SERVICE)
         self._motion: Trajectory | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
-        # Of the calls: written by the page's threads and by the node's.
-        self._lock = Lock()
         self._is_asking, self._is_wanted = False, False
-        self._answer = ''
+        self._answer, self._answered = '', -PAUSE
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(PERIOD, self._on_timer, clock=steady)
 
     @property
     def scene(self) -> Scene:
@@ -124,28 +130,26 @@ class ViewerFeed(Node):
             msg.header.stamp = self.get_clock().now().to_msg()
             msg.point.x, msg.point.y, msg.point.z = (float(value) for value in target)
             self._targets.publish(msg)
-        with self._lock:
-            if not self._client.service_is_ready():
-                return
-            # One call at a time: what is asked meanwhile is asked once, afterwards.
-            self._is_wanted = self._is_asking
-            if self._is_asking:
-                return
-            self._is_asking = True
-        self._call()
+        self._is_wanted = True
 
-    def _call(self) -> None:
+    def _on_timer(self) -> None:
+        """Ask for the plan that is wanted, one at a time, and none of an arm about to set off."""
+        is_soon = time.monotonic() < self._answered + PAUSE
+        if (
+            not self._is_wanted
+            or self._is_asking
+            or is_soon
+            or not self._client.service_is_ready()
+        ):
+            return
+        self._is_wanted, self._is_asking = False, True
         # The request takes another way than the target, and must not overtake it.
         self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
         self._client.call_async(Trigger.Request()).add_done_callback(self._on_answer)
 
     def _on_answer(self, future: Any) -> None:
-        with self._lock:
-            self._answer = str(future.result().message)
-            self._is_asking, self._is_wanted = self._is_wanted, False
-            is_asked_again = self._is_asking
-        if is_asked_again:
-            self._call()
+        self._answer = str(future.result().message)
+        self._answered, self._is_asking = time.monotonic(), False
 
     def _on_motion(self, msg: JointTrajectory, *_: int) -> None:
         try:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer's feed follows both nodes in their namespace, and the newest target is planned for."""
+"""The viewer's feed follows both nodes in their namespace, and the newest target counts."""
 
 import numpy as np
 import pytest
