@@ -10,6 +10,7 @@ import time
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
+import numpy as np
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -79,6 +80,7 @@ class ViewerFeed(Node):
         self._motion: Trajectory | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
         self._is_asking, self._is_wanted = False, False
+        self._newest: Array | None = None
         self._answer, self._answered = '', -PAUSE
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -122,14 +124,16 @@ class ViewerFeed(Node):
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
         return '; '.join(filter(None, (self._answer, waiting))) or 'drag the target, or press Plan'
 
+    @property
+    def is_asking(self) -> bool:
+        """Whether an answer is still to come."""
+        return self._is_wanted or self._is_asking
+
     def ask(self, target: Array | None = None) -> None:
         """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
+        # Not published at once: a request would overtake a queue of targets.
         if target is not None:
-            msg = PointStamped()
-            msg.header.frame_id = self._frame
-            msg.header.stamp = self.get_clock().now().to_msg()
-            msg.point.x, msg.point.y, msg.point.z = (float(value) for value in target)
-            self._targets.publish(msg)
+            self._newest = np.array(target, dtype=np.float64)
         self._is_wanted = True
 
     def _on_timer(self) -> None:
@@ -142,10 +146,22 @@ class ViewerFeed(Node):
             or not self._client.service_is_ready()
         ):
             return
-        self._is_wanted, self._is_asking = False, True
+        # In this order, since other threads look.
+        self._is_asking = True
+        self._is_wanted = False
+        target, self._newest = self._newest, None
+        if target is not None:
+            self._publish(target)
         # The request takes another way than the target, and must not overtake it.
         self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
         self._client.call_async(Trigger.Request()).add_done_callback(self._on_answer)
+
+    def _publish(self, target: Array) -> None:
+        msg = PointStamped()
+        msg.header.frame_id = self._frame
+        msg.header.stamp = self.get_clock().now().to_msg()
+        msg.point.x, msg.point.y, msg.point.z = target.tolist()
+        self._targets.publish(msg)
 
     def _on_answer(self, future: Any) -> None:
         self._answer = str(future.result().message)
