@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a soak is judged by: motions by the oracle, memory, answers; nothing of ROS but bytes."""
 
+from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -97,7 +98,7 @@ def states_of(trajectory: Trajectory, period: float) -> Array:
 
 def newest_before(sent: Sequence[int], time: int, n: int) -> list[int]:
     """Return the indices of the last messages sent before a time [ns], the newest first."""
-    newest = int(np.searchsorted(np.asarray(sent), time)) - 1
+    newest = bisect_left(sent, time) - 1
     return list(range(newest, max(-1, newest - n), -1))
 
 

@@ -26,7 +26,7 @@ BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
 # A ray that passes so near to the target points at it [m].
 AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
-CAMERA, LOOK_AT = (-1.02, -1.02, 0.92), (0.22, 0.0, 0.26)
+CAMERA, LOOK_AT = (-1.45, -1.3, 1.15), (0.25, 0.05, 0.24)
 LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
 
 
