@@ -22,7 +22,7 @@ import viser
 # Pictures of a motion that plays, and how long a page at rest may sleep [s].
 FRAME, NAP = 1.0 / 30.0, 0.5
 # Widths of the ways of the tool [m].
-FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.005, 0.006, 0.008
+FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.007, 0.007, 0.010
 
 
 class ViewerPage:

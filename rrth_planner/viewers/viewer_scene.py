@@ -77,9 +77,6 @@ class SceneView:
         self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
         server.scene.set_up_direction('+z')
         server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
-        server.scene.configure_default_lights(cast_shadow=False)
-        # From behind too the wearer is seen in the light.
-        server.scene.add_light_ambient('/light', intensity=0.9)
         server.scene.add_grid(
             '/floor', 6.0, 6.0, position=(0.0, 0.0, -0.87), cell_size=0.25, section_size=1.0
         )
@@ -100,7 +97,7 @@ class SceneView:
         boxes: list[Any] = []
         shells: list[Any] = []
         for k, box in enumerate(scene.boxes):
-            place: dict[str, Any] = {'position': box.center, 'wxyz': wxyz(box.rotation)}
+            place = {'position': box.center, 'wxyz': wxyz(box.rotation)}
             is_skin = any(part in box.name for part in ('head', 'forearm', 'hand'))
             boxes.append(
                 self._scene.add_box(f'/body/{k}', SKIN if is_skin else CLOTH, box.size, **place)
@@ -132,11 +129,11 @@ class SceneView:
         """Draw where the tool is along the edges of the trees."""
         handles: list[Any] = []
         for k, (tree, colour) in enumerate(zip(trees, TREES, strict=False)):
-            handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.003)
+            handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.0035)
             nodes = tool_pose(self._arm, tree.nodes)[:, :3, 3]
             handles.append(
                 self._scene.add_point_cloud(
-                    f'/tree/nodes_{k}', nodes, colour, point_size=0.008, point_shape='circle'
+                    f'/tree/nodes_{k}', nodes, colour, point_size=0.011, point_shape='circle'
                 )
             )
         self._replace('tree', handles)
@@ -165,7 +162,7 @@ class SceneView:
                     f'/{layer}/corners',
                     corners,
                     colour,
-                    point_size=2.0 * width,
+                    point_size=2.6 * width,
                     point_shape='circle',
                 )
             )
