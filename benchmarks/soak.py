@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
     target.parent.mkdir(parents=True, exist_ok=True)
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
-    text = report(plans, guard, _command(options))
+    text = report(plans, guard, _command(options), options.remark)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')
@@ -94,6 +94,9 @@ def _parser() -> argparse.ArgumentParser:
         help=f'held into the way of running motions ({HANDS}; 0: none)',
     )
     parser.add_argument('--minutes', type=float, help='the longest time for each of the two parts')
+    parser.add_argument(
+        '--remark', default='', metavar='TEXT', help='to stand in the report, of the machine say'
+    )
     parser.add_argument(
         '--output', type=Path, help='the report (docs/reliability.md; --quick: in build/)'
     )

@@ -40,6 +40,8 @@ def spinning(*nodes):
 def ros_context() -> Iterator[None]:
     """Have rclpy initialised while the tests of a module run."""
     rclpy = pytest.importorskip('rclpy')
+    # One that a command run in this process has left behind cannot be initialised again.
+    rclpy.utilities.get_default_context(shutting_down=True).try_shutdown()
     rclpy.init()
     yield
     rclpy.try_shutdown()
