@@ -102,6 +102,10 @@ def arm(planner):
 
 @pytest.mark.slow
 def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
+    # Who listens live must be known to the planner before it publishes.
+    wait_until(lambda: bystander.count_publishers('joint_trajectory'), START)
+    wait_until(lambda: bystander.count_subscribers('joint_trajectory') > 1, START)
+    time.sleep(1.0)
     report = report_of(1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START)
     assert report['exit_code'] == 0, report
     assert (report['code'], report['name'], report['arrived']) == (1, 'SUCCESS', True)
