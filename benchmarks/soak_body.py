@@ -5,7 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from threading import Event, RLock, Thread
+from threading import Condition, Event, Thread
 import time
 from typing import Any
 
@@ -95,7 +95,7 @@ class BodyStream:
         """Begin with a wearer without a hand."""
         self.log: list[BodyAt] = []
         self._publish, self._begin = publish, time.monotonic()
-        self._lock, self._end = RLock(), Event()
+        self._lock, self._end = Condition(), Event()
         self._hand = NO_HAND
         self._thread = Thread(target=self._run, daemon=True)
         self.change(wearer)
@@ -117,10 +117,12 @@ class BodyStream:
             self._msg = _message(scene_of_body(BodyAt(0, wearer, 0.0)))
 
     def put(self, hand: tuple[float, float, float, float]) -> BodyAt:
-        """Publish at once a body with a hand, `NO_HAND` to take it away; return what was sent."""
+        """Return the first body with a hand, `NO_HAND` to take it away, once it is sent."""
         with self._lock:
             self._hand = hand
-            return self._tell()
+            n_before = len(self.log)
+            self._lock.wait_for(lambda: len(self.log) > n_before, timeout=1.0)
+            return self.log[n_before]
 
     def _run(self) -> None:
         due = time.monotonic()
@@ -130,7 +132,7 @@ class BodyStream:
             due = max(due + 1.0 / RATE, time.monotonic() - 1.0 / RATE)
             time.sleep(max(0.0, due - time.monotonic()))
 
-    def _tell(self) -> BodyAt:
+    def _tell(self) -> None:
         phase = time.monotonic() - self._begin
         boxes = self._msg.markers[:-1]
         base = _wearer(abs(self._wearer)).boxes
@@ -145,7 +147,7 @@ class BodyStream:
         body = BodyAt(time.time_ns(), self._wearer, phase, self._hand)
         self._publish(self._msg)
         self.log.append(body)
-        return body
+        self._lock.notify_all()
 
 
 def _message(scene: Scene) -> MarkerArray:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.oracle import first_contact
+from rrth_planner.oracle import first_contact, least_clearance
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 
@@ -16,11 +16,14 @@ from benchmarks.soak_body import BodyAt, HAND, scene_of_body
 from benchmarks.soak_judge import COARSE, MARGIN, RAY, SLACK, states_of
 
 BRAKED, WENT_ON = 'braked', 'no brake, none was needed'
+LED_AWAY = 'no brake: the arm was too near when the hand came, and its motion led away'
 MISSED = 'no brake, though the rest of the motion came too near'
 PUT_ON = 'touched: the hand was put right onto the arm'
 TOO_LATE = 'touched: within the distance it takes to brake'
 TOUCHED = 'touched otherwise'
 RAY_ONLY = 'only the pointing ray touched'
+# The hand came between two of the instants at which a motion is looked at [m].
+NEARER = 5e-3
 AGAIN, HELD, NOT_OVER = 'planned again and went on', 'held, and said why', 'not at rest in time'
 
 
@@ -73,10 +76,17 @@ def judge_episode(arm: ArmModel, episode: Episode) -> tuple[str, ...]:
     else:
         q = states_of(episode.motion, COARSE)
         left = q[min(len(q) - 1, round(episode.phase / COARSE)) :]
-        is_free = first_contact(arm, scene, left, RAY, MARGIN - SLACK) is None
-        words.append(WENT_ON if is_free else MISSED)
+        words.append(word_of_going_on(arm, scene, left))
     touch = touch_word(arm, scene, episode)
     return (*words, touch) if touch else tuple(words)
+
+
+def word_of_going_on(arm: ArmModel, scene: Scene, left: Array) -> str:
+    """Return how it is that an arm was not stopped, from what was left of its motion."""
+    if first_contact(arm, scene, left, RAY, MARGIN - SLACK) is None:
+        return WENT_ON
+    gaps = [least_clearance(arm, scene, q[None], RAY) for q in left]
+    return LED_AWAY if min(gaps) > gaps[0] - NEARER and gaps[-1] > MARGIN - SLACK else MISSED
 
 
 def touch_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:

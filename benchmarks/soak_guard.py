@@ -79,7 +79,7 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
         if 'not proven safe either' in line:
             record.said['braking not proven safe'] += 1
         if 'the arm goes on' in line:
-            record.said['going on was less bad'] += 1
+            record.said['going on led away, braking would not'] += 1
         if 'joint_trajectory refused' in line:
             record.said['motions that the playback refused'] += 1
 

@@ -4,12 +4,14 @@
 
 from dataclasses import dataclass
 import functools
+import math
 
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.bernstein import to_bernstein
+from rrth_planner.kernels.arm_clearance import least_along
 from rrth_planner.kernels.pieces import prove_pieces
-from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
+from rrth_planner.trajectory import piece_coefficients, Trajectory
 from rrth_planner.world import World
 
 # Instants at which the least clearance is looked for; a figure for people, not the proof [s].
@@ -116,6 +118,17 @@ def bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
 
 def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) -> float:
     """Return the least distance from the world's boxes from a time on, every 10 ms [m]."""
-    begin = min(begin, trajectory.duration)
-    times = np.append(np.arange(begin, trajectory.duration, CLEARANCE_PERIOD), trajectory.duration)
-    return float(world.clearances(positions_at(trajectory, times)).min(initial=np.inf))
+    if len(trajectory.times) == 1 or begin >= trajectory.duration:
+        return float(world.clearances(trajectory.positions[-1]).min(initial=np.inf))
+    n = math.ceil((trajectory.duration - begin) / CLEARANCE_PERIOD) + 1
+    return float(
+        least_along(
+            piece_coefficients(trajectory),
+            trajectory.times,
+            max(begin, 0.0),
+            n,
+            world.ray_length,
+            world.chain,
+            world.obstacles,
+        )
+    )

@@ -30,7 +30,7 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
     Returns
     -------
     Trajectory
-        From the state at that time to rest, with points no further apart than 25 ms once it
+        From the state at that time to rest, with points no further apart than 50 ms once it
         slows down; the rest of the motion where that ends as soon.
 
     """

@@ -16,7 +16,7 @@ from rrth_planner.kernels.pieces import is_rest_free
 from rrth_planner.leaving import leads_out
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import phase_of, SAME_POSITION
-from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
+from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
@@ -147,6 +147,37 @@ def is_still_free(
         if not certify(between(trajectory, begin, end), world).is_proven:
             return False
     return world.is_valid(q_end, running.reach)
+
+
+def leads_away(
+    running: RunningMotion,
+    phase: float,
+    arm: ArmModel,
+    scene: Scene,
+    *,
+    margin: float,
+    ray_guard_length: float,
+) -> bool:
+    """
+    Return whether the arm is too near to the wearer now, and proven to get away by going on.
+
+    Then it gets no nearer to any box than it is, comes near no other, and ends clear of all of
+    them (`leaving.leads_out`), while an arm that brakes stays. Of a motion whose trouble lies
+    ahead this is False: a stop follows its path, and is never nearer than going on.
+
+    Parameters
+    ----------
+    running, phase, arm, scene, margin, ray_guard_length
+        As for `is_still_free`.
+
+    """
+    trajectory = running.trajectory
+    world = arm_world(arm, scene, margin, ray_guard_length)
+    return (
+        not world.is_valid(positions_at(trajectory, [phase])[0])
+        and world.is_valid(trajectory.positions[-1], max(ray_guard_length, running.reach))
+        and leads_out(trajectory, world, trajectory.duration, phase)
+    )
 
 
 def _is_rest_free(

@@ -5,7 +5,7 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.certificate import certify, derivative_bounds, least_clearance
+from rrth_planner.certificate import certify, CLEARANCE_PERIOD, derivative_bounds, least_clearance
 from rrth_planner.oracle import first_contact
 from rrth_planner.path import Path
 from rrth_planner.scene import Scene
@@ -198,3 +198,18 @@ def test_least_clearance_is_the_least_over_the_motion():
         assert got <= expected + 0.02
     empty = arm_world(arm, Scene(()), 0.0, RAY)
     assert least_clearance(trajectory, empty) == np.inf
+
+
+@examples(50)
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.99))
+def test_least_clearance_is_that_of_its_instants(seed, share):
+    rng = np.random.default_rng(seed)
+    world = wearer_world(margin=0.0)
+    low, high = world.bounds
+    q = rng.uniform(low, high, (2, len(low)))
+    trajectory = parameterize(Path(q), (), limits())
+    begin = share * trajectory.duration
+    n = int(np.ceil((trajectory.duration - begin) / CLEARANCE_PERIOD)) + 1
+    states = sample(trajectory, np.linspace(begin, trajectory.duration, n))[0]
+    expected = world.clearances(states).min()
+    assert least_clearance(trajectory, world, begin) == pytest.approx(expected, abs=1e-9)

@@ -4,6 +4,7 @@
 
 from hypothesis import given, strategies as st
 import numpy as np
+from rrth_planner import oracle
 from rrth_planner.certificate import certify
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.goal import PointingGoal
@@ -13,7 +14,7 @@ from rrth_planner.pipeline import plan_motion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample
-from rrth_planner.underway import between, box_speeds, is_still_free, RunningMotion
+from rrth_planner.underway import between, box_speeds, is_still_free, leads_away, RunningMotion
 from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
@@ -178,3 +179,49 @@ def test_a_reading_tells_how_far_the_motion_is(seed):
         found = running.phase(q, rate * v, taken, taken + 0.01)
         if np.linalg.norm(v) > 0.2:
             assert abs(found - (time + rate * 0.01)) < 0.012
+
+
+def hand_beside(rng, q, gap):
+    """Return the wearer with a hand that a bar of an arm at q is so far from [m]."""
+    for _ in range(100):
+        bars = oracle.bars(table_1_arm(), q[None], 0.0)[0]
+        a, b = bars[rng.integers(len(bars)), :, :3]
+        way = rng.normal(size=3)
+        hand = Box(
+            'hand',
+            a + rng.uniform() * (b - a) + rng.uniform(0.02, 0.3) * way / np.linalg.norm(way),
+            np.full(3, rng.uniform(0.02, 0.1)),
+            np.eye(3),
+        )
+        away = oracle.least_clearance(table_1_arm(), Scene((hand,)), q[None], RAY)
+        if 0.0 < away < gap:
+            return Scene((*wearer().boxes, hand))
+    return None
+
+
+def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
+    rng, told = np.random.default_rng(5), {True: 0, False: 0}
+    arm = table_1_arm()
+    for _ in range(60):
+        motion = random_motion(rng)
+        if motion is None or motion.duration < 0.2:
+            continue
+        phase = rng.uniform(0.0, 0.8) * motion.duration
+        times = np.linspace(phase, motion.duration, 400)
+        q, _, _ = sample(motion, times)
+        scene = hand_beside(rng, q[0], MARGIN)
+        if scene is None:
+            continue
+        running = RunningMotion(trajectory=motion, start_time=0.0)
+        assert not is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+        found = leads_away(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+        told[found] += 1
+        hand = Scene(scene.boxes[-1:])
+        gaps = [oracle.least_clearance(arm, hand, row[None], RAY) for row in q]
+        if found:
+            assert min(gaps) > gaps[0] - 1e-4
+            assert gaps[-1] >= MARGIN - 1e-6
+        # Nearer for a while: going on is no way out.
+        assert not (found and min(gaps) < gaps[0] - 1e-3)
+        assert not leads_away(running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY)
+    assert min(told.values()) >= 5, told

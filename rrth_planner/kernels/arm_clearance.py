@@ -4,11 +4,26 @@
 
 import math
 
-from numba.core.types import float64, void
+from numba.core.types import float64, int64, void
+import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.arm_validity import ENDS_ROOM
-from rrth_planner.kernels.geometry import bar_distance
-from rrth_planner.kernels.jit import BOX_HALF, CHAIN, D, kernel, LANES, MAT, OUT_MAT, REACH, VEC
+from rrth_planner.kernels.following import state_at
+from rrth_planner.kernels.geometry import bar_box_distance, bar_distance
+from rrth_planner.kernels.jit import (
+    BOX_HALF,
+    BOX_OFFSET,
+    CHAIN,
+    CUBE,
+    D,
+    kernel,
+    LANES,
+    MAT,
+    OUT_MAT,
+    OUT_VEC,
+    REACH,
+    VEC,
+)
 
 
 @kernel(void(MAT, float64, CHAIN, MAT, OUT_MAT))
@@ -30,6 +45,52 @@ def clearances(positions, ray_length, chain, boxes, distances):
                         distance = bar_distance(points, 4 * k, boxes, g, j)
                         lane = LANES * (g - first) + j
                         distances[k, lane] = min(distances[k, lane], distance)
+
+
+@kernel(float64(OUT_VEC, int64, MAT, int64, int64, float64))
+def nearer(points, at, boxes, g, j, least):
+    """
+    Return the distance of the bar at points[at] from lane j of group g, where it is less [m].
+
+    Mostly a face of the box already shows that it is not.
+    """
+    start, step, half = np.empty(3), np.empty(3), np.empty(3)
+    gap, radius = -math.inf, points[at + 7]
+    for r in range(3):
+        at_start = at_end = boxes[g, LANES * (BOX_OFFSET + r) + j]
+        for c in range(3):
+            cosine = boxes[g, LANES * (3 * r + c) + j]
+            at_start += cosine * points[at + c]
+            at_end += cosine * points[at + 4 + c]
+        start[r], step[r] = at_start, at_end - at_start
+        half[r] = boxes[g, LANES * (BOX_HALF + r) + j]
+        gap = max(gap, min(at_start, at_end) - half[r], -max(at_start, at_end) - half[r])
+    if gap > 0.0 and gap - radius >= least:
+        return least
+    return min(least, bar_box_distance(start, step, half) - radius)
+
+
+@kernel(float64(CUBE, VEC, float64, int64, float64, CHAIN, MAT))
+def least_along(curves, times, begin, n, ray_length, chain, boxes):
+    """
+    Return the least signed distance of a motion from the boxes, at n >= 2 instants [m].
+
+    curves (m, 6, dof), times (m + 1,): as for `state_at`. The instants are evenly spread, from
+    `begin` [s] to the end, both of them included. Without boxes: infinity.
+    """
+    points = scratch.floats(ENDS_ROOM)
+    q, v = np.empty(curves.shape[2]), np.empty(curves.shape[2])
+    last = times[curves.shape[0]]
+    least = math.inf
+    for i in range(n):
+        state_at(curves, times, begin + (last - begin) * (i / (n - 1)), q, v)
+        n_bars = chain(q, ray_length, points, 0)
+        for k in range(n_bars):
+            for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
+                for j in range(LANES):
+                    if boxes[g, LANES * BOX_HALF + j] > 0.0:
+                        least = nearer(points, 4 * k, boxes, g, j, least)
+    return least
 
 
 @kernel(float64(VEC, CHAIN, MAT, MAT))

@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, OUT_VEC, VEC
 
 # Newton's steps to where the arm is nearest to.
-STEPS = 2
+STEPS = 3
 
 
 @kernel(void(CUBE, VEC, float64, OUT_VEC, OUT_VEC))
@@ -47,7 +47,7 @@ def time_on(curves, times, guess, q, same, slow, latest):
         The time that it would be at if it were exact [s].
     q : array, shape (dof,)
     same : float
-        It is elsewhere where a joint is further than this from where it would be then [rad].
+        It is elsewhere where a joint is further than this from where it is nearest to [rad].
     slow : float
         How late it is cannot be told where no joint is faster than this [rad/s].
     latest : float
@@ -55,10 +55,6 @@ def time_on(curves, times, guess, q, same, slow, latest):
 
     """
     p, v = np.empty_like(q), np.empty_like(q)
-    state_at(curves, times, guess, p, v)
-    for k in range(q.shape[0]):
-        if not abs(p[k] - q[k]) <= same:
-            return math.nan
     at = guess
     for _ in range(STEPS):
         state_at(curves, times, at, p, v)
@@ -70,4 +66,8 @@ def time_on(curves, times, guess, q, same, slow, latest):
         if fastest > slow:
             at += along / square
         at = min(max(at, guess - latest), guess + latest)
+    state_at(curves, times, at, p, v)
+    for k in range(q.shape[0]):
+        if not abs(p[k] - q[k]) <= same:
+            return math.nan
     return at

@@ -12,7 +12,7 @@ from rrth_planner.kernels.way_ahead import derivatives_on, TIME, time_after, WAY
 
 # Points of a stop are no further apart, and no closer [s]: the closer, the more of the jerk
 # between them is rounding, and the further from its place a jump of the jerk that gets no point.
-SPACING, CLOSEST, CLOSEST_FIRST = 0.025, 5e-5, 1e-5
+SPACING, CLOSEST, CLOSEST_FIRST = 0.05, 5e-5, 1e-5
 # Messages carry whole nanoseconds [s].
 TICK = 1e-9
 # Halvings of a phase to find when a stop has come so far.

@@ -20,7 +20,7 @@ from rrth_planner.ros.reporter import Reporter
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import follows
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import box_speeds, is_still_free, RunningMotion
+from rrth_planner.underway import box_speeds, is_still_free, leads_away, RunningMotion
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
@@ -196,22 +196,32 @@ class Guard:
             trajectory=self._stop_of(running, phase),
             start_time=now,
         )
-        warning = ''
-        if len(scene.boxes) and not self._is_free(stopped, parameters, scene):
-            # Whatever it does now may touch: what keeps further away is less bad.
-            world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
-            ahead = least_clearance(running.trajectory, world, phase)
-            braked = least_clearance(stopped.trajectory, world)
-            warning = f'; braking is not proven safe either, least clearance {braked:.4f} m'
-            if ahead > braked:
-                warning += f', going on keeps {ahead:.4f} m and is less bad: the arm goes on'
-                self._warn_once(f'{why}{warning}')
-                self._say(Watch.WATCHING, f'{why}{warning}')
-                return
+        is_safe = not scene.boxes or is_still_free(
+            stopped,
+            0.0,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        )
+        if not is_safe and leads_away(
+            running,
+            phase,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        ):
+            sentence = f'{why}: braking would stay there, going on leads away: the arm goes on'
+            if self._reporter.guard[1] != sentence:
+                self._node.get_logger().error(sentence)
+            self._say(Watch.WATCHING, sentence)
+            return
         self._publishers.publish_motion(stopped.trajectory, parameters, now)
         took = 1e-9 * (time.time_ns() - arrived)
         self._stopped_from = running
         self.running, self.n_brakes = stopped, self.n_brakes + 1
+        warning = '' if is_safe else self._warning(stopped.trajectory, scene)
         sentence = (
             f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
         )
@@ -229,15 +239,12 @@ class Guard:
         else:
             self._say(Watch.HOLDING, sentence)
 
-    def _is_free(self, motion: RunningMotion, parameters: PlannerParameters, scene: Scene) -> bool:
-        return is_still_free(
-            motion,
-            0.0,
-            parameters.arm,
-            scene,
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        )
+    def _warning(self, stop: Trajectory, scene: Scene) -> str:
+        """Return what is to be said of a stop that is not proven free."""
+        parameters = self._parameters
+        world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
+        clearance = least_clearance(stop, world)
+        return f'; braking is not proven safe either, least clearance {clearance:.4f} m'
 
     def hold(self, why: str) -> None:
         """Stay where the arm came to rest, since it cannot go on."""
@@ -245,10 +252,6 @@ class Guard:
             sentence = f'the arm holds where it is: {why}'
             self._say(Watch.HOLDING, sentence)
             self._node.get_logger().warning(sentence)
-
-    def _warn_once(self, sentence: str) -> None:
-        if self._reporter.guard[1] != sentence:
-            self._node.get_logger().error(sentence)
 
     def _say(self, state: Watch, sentence: str) -> None:
         self._state = state

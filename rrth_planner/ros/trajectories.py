@@ -56,8 +56,8 @@ def joint_trajectory_to_msg(
     msg.header.frame_id = frame
     stamp = msg.header.stamp
     stamp.sec, stamp.nanosec = divmod(round(begin * NANOSECONDS), NANOSECONDS)
-    rows = zip(times, trajectory.positions, velocities, accelerations, strict=True)
-    for time, q, v, a in rows:
+    rows = (values.tolist() for values in (trajectory.positions, velocities, accelerations))
+    for time, q, v, a in zip(times, *rows, strict=True):
         # Arrays are taken as they are; lists would be checked number by number.
         point = JointTrajectoryPoint(
             positions=array('d', q), velocities=array('d', v), accelerations=array('d', a)

@@ -57,6 +57,14 @@ def hand_at(motion, time_share, side=0.05):
     return replace(BODY, hand=(*tool.tolist(), side))
 
 
+def hand_behind(motion):
+    """Return a hand right beside the ray, on the side that the motion turns it away from."""
+    T = oracle.frames(ARM, motion.positions)[:, -1]
+    now, later = T[:, :3, 3] + 0.5 * T[:, :3, 2]
+    center = now + 0.045 * (now - later) / np.linalg.norm(now - later)
+    return replace(BODY, hand=(*center.tolist(), 0.05))
+
+
 def plans(**changes):
     """Return a record of plans without a fault."""
     record = PlansRecord(
@@ -191,6 +199,10 @@ def test_contacts_are_told_apart():
     for brake, word in ((far, contacts.TOO_LATE), (swing(q, q), contacts.TOUCHED)):
         found = episode(far, there, published=((1, 2),), followed=(brake,))
         assert contacts.judge_episode(ARM, found)[-1] == word
+    # The ray turns out of a hand that is held beside it.
+    turned = swing(q, q + [0.0, 0.0, 0.6, 0.0])
+    words = contacts.judge_episode(ARM, episode(turned, hand_behind(turned)))
+    assert words[0] == contacts.LED_AWAY
     free = episode(far, BODY)
     assert contacts.judge_episode(ARM, free) == (contacts.WENT_ON,)
 
@@ -212,12 +224,13 @@ def test_what_is_published_is_what_is_judged():
         ),
         2,
     )
-    body = stream.put((1.0, 2.0, 3.0, 0.1))
-    scene = scene_of_body(body)
-    assert sent[0] == [(b.name, 0, b.center[0], b.size[0]) for b in scene.boxes]
-    gone = stream.put(NO_HAND)
+    with stream:
+        body = stream.put((1.0, 2.0, 3.0, 0.1))
+        scene, index = scene_of_body(body), stream.log.index(body)
+        gone = stream.put(NO_HAND)
+    assert sent[index] == [(b.name, 0, b.center[0], b.size[0]) for b in scene.boxes]
     assert len(scene_of_body(gone).boxes) == len(scene.boxes) - 1
-    assert sent[1][-1][:2] == ('hand', 2)
+    assert sent[stream.log.index(gone)][-1][:2] == ('hand', 2)
 
 
 def test_the_command_says_what_is_missing(capsys):
