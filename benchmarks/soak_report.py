@@ -3,6 +3,7 @@
 """The report of a soak, docs/reliability.md: what was seen in, Markdown out."""
 
 from collections.abc import Sequence
+import os
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -54,7 +55,7 @@ def report(
         '# Reliability',
         f'Written by `{command}`; do not edit.\n{made["machine"]} ({made["n_cores"]} cores); '
         f'Python {made["python_version"]}, numpy {made["numpy_version"]}, numba '
-        f'{made["numba_version"]}{commit}.',
+        f'{made["numba_version"]}{commit}. Client and nodes run {scheduling()}.',
         *(
             ['**Interrupted**: what stands here is what had been seen until then.']
             if any(part and part.is_interrupted for part in (plans, guard))
@@ -70,6 +71,15 @@ def report(
     if guard:
         parts += ['## Hands in the way of running motions', _guard_text(guard)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
+
+
+def scheduling() -> str:
+    """Return how the system schedules this process, and those that it starts."""
+    kind, priority = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+    names = {os.SCHED_FIFO: 'SCHED_FIFO', os.SCHED_RR: 'SCHED_RR'}
+    if kind in names:
+        return f'in real time ({names[kind]}, priority {priority})'
+    return f'at ordinary priority (nice {os.nice(0)})'
 
 
 def plan_targets(plans: PlansRecord) -> list[list[str]]:
