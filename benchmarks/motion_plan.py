@@ -11,11 +11,12 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from rrth_planner import pipeline
+from rrth_planner import path_timing
 from rrth_planner.blend import Blend
+from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
-from rrth_planner.pipeline import MotionPlan, plan_motion
+from rrth_planner.pipeline import plan_motion
 from rrth_planner.resources import load_yaml, resource_path
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import MotionLimits, Trajectory
@@ -112,8 +113,8 @@ def _plan(case: Case, limits: MotionLimits, seed: int) -> MotionPlan:
 def watched() -> Iterator[list[Call]]:
     """Note the calls of the steps of the pipeline while the block runs."""
     calls: list[Call] = []
-    originals = {step: getattr(pipeline, step) for step in STEPS}
-    with patch.multiple(pipeline, **{s: _noting(s, f, calls) for s, f in originals.items()}):
+    originals = {step: getattr(path_timing, step) for step in STEPS}
+    with patch.multiple(path_timing, **{s: _noting(s, f, calls) for s, f in originals.items()}):
         yield calls
 
 

@@ -206,6 +206,11 @@ def tool_pose(arm: ArmModel, q: Array) -> Array:
     return pose
 
 
+def reach_to(arm: ArmModel, target: Array, q: Array) -> float:
+    """Return the distance from the tool to a target of the base frame [m]."""
+    return float(np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
+
+
 def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:
     """Return how far the pointing ray passes by a target of the base frame [m]."""
     T = tool_pose(arm, q)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 from rrth_planner import oracle
-from rrth_planner.arm import ArmModel, tool_pose
+from rrth_planner.arm import ArmModel, reach_to
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
 from rrth_planner.escape import beyond
@@ -105,7 +105,7 @@ def verdict_of(
     """
     world = arm_world(arm, scene, margin, ray_guard_length)
     q_end: Array = trajectory.positions[-1]
-    reach = float(np.linalg.norm(goal.target - tool_pose(arm, q_end)[:3, 3]))
+    reach = reach_to(arm, goal.target, q_end)
     opinions = tuple(
         _of_piece(arm, scene, world, trajectory, i) for i in range(len(trajectory.times) - 1)
     )

@@ -19,7 +19,8 @@ from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
-from rrth_planner.pipeline import MotionPlan, plan_motion, warm_up
+from rrth_planner.motion_plan import MotionPlan
+from rrth_planner.pipeline import plan_motion, warm_up
 from rrth_planner.resources import load_arm, load_yaml, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.status import PlanStatus

@@ -157,6 +157,8 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     )
 
 
+# A wearer who holds still makes the same worlds from plan to plan.
+@functools.lru_cache(maxsize=32)
 def grown(world: World, by: float) -> World:
     """Return the same world with every box grown by that much more on every side [m]."""
     return replace(world, obstacles=grown_groups(world.obstacles, by))

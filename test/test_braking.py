@@ -11,7 +11,7 @@ from rrth_planner.braking import brake, certify_braking
 from rrth_planner.certificate import certify
 from rrth_planner.oracle import quintic_states
 from rrth_planner.path import Path
-from rrth_planner.pipeline import first_proven
+from rrth_planner.path_timing import first_proven
 from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import jerks_at, piece_coefficients, sample, Trajectory

@@ -104,7 +104,7 @@ def test_a_module_imports_only_what_its_layer_may(module):
         if name.startswith('rrth_planner.fcl_'):
             may = (
                 '.escape',
-                '.pipeline',
+                '.path_timing',
                 '.fcl_check',
                 '.fcl_shapes',
                 '.opinions',

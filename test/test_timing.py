@@ -8,7 +8,7 @@ import pytest
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.oracle import quintic_states
 from rrth_planner.path import Path
-from rrth_planner.pipeline import first_proven
+from rrth_planner.path_timing import first_proven
 from rrth_planner.scene import Scene
 from rrth_planner.timing import limit_ratio, parameterize
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, sample, Trajectory

@@ -8,7 +8,7 @@ import secrets
 import time
 
 import numpy as np
-from rrth_planner.arm import tool_pose
+from rrth_planner.arm import reach_to
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
 from rrth_planner.escape import beyond
@@ -16,7 +16,8 @@ from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.leaving import box_depths, leads_out
-from rrth_planner.pipeline import MotionPlan, plan_motion
+from rrth_planner.motion_plan import MotionPlan
+from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
@@ -241,7 +242,7 @@ def _check_present(
         parameters.arm, present.scene, parameters.margin, parameters.ray_guard_length
     )
     q_end: Array = trajectory.positions[-1]
-    reach = float(np.linalg.norm(inputs.goal.target - tool_pose(parameters.arm, q_end)[:3, 3]))
+    reach = reach_to(parameters.arm, inputs.goal.target, q_end)
     if not (
         world.is_valid(q_end, reach)
         and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))

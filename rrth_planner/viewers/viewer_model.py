@@ -12,7 +12,8 @@ from typing import Any
 from rrth_planner.arrays import Array
 from rrth_planner.errors import RrthError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.pipeline import MotionPlan, plan_motion
+from rrth_planner.motion_plan import MotionPlan
+from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus

@@ -15,7 +15,7 @@ pytest.importorskip('fcl')
 
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
-from rrth_planner import pipeline  # noqa: E402
+from rrth_planner import path_timing  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
@@ -23,6 +23,7 @@ from rrth_planner.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros import requests, second_opinion  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import scene_of  # noqa: E402
+from rrth_planner.status import PlanStatus  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
@@ -72,7 +73,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     )
     say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(path_timing, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
@@ -145,7 +146,7 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(path_timing, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
@@ -161,7 +162,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(pipeline, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(path_timing, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
@@ -251,7 +252,7 @@ def test_diagnostics_say_everything(start):
 
 
 def test_every_end_of_a_plan_has_a_code_of_its_own_kind():
-    assert set(CODE_OF_STATUS) == set(pipeline.PlanStatus)
+    assert set(CODE_OF_STATUS) == set(PlanStatus)
     assert {code for code in ErrorCode if code not in CODE_OF_STATUS.values()} == {
         # What a request ends with before or after it is planned.
         ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,

@@ -1,0 +1,56 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""How a request for a motion ended."""
+
+from dataclasses import dataclass
+
+from rrth_planner.path import Path
+from rrth_planner.planner import PlanResult
+from rrth_planner.status import PlanStatus
+from rrth_planner.touch import Disagreement
+from rrth_planner.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MotionPlan:
+    """
+    How a request ended.
+
+    Parameters
+    ----------
+    status : PlanStatus
+    sentence : str
+        What happened, with figures and units, for the caller.
+    seed : int
+        Seed that was used; the same seed and inputs give the same trajectory to the bit.
+    planning_time : float
+        From the call to the certified trajectory [s].
+    path : Path or None
+        The shortened path before timing; None unless solved.
+    trajectory : Trajectory or None
+        From rest to rest, certified; None unless solved.
+    clearance : float
+        Least distance of the arm and of the guarded ray from the wearer [m], once out of the
+        boxes that it was in; NaN unless solved.
+    reach : float
+        Distance from the tool to the target at the end [m]; NaN unless solved.
+    disagreement : Disagreement or None
+        The motion that the two judges disagree about, where that is why there is none.
+    escape_time : float
+        Until then the trajectory leads out of boxes that the arm was in [s]; 0: it was in none.
+    search : PlanResult or None
+        How the path was found: the first path, the trees; None unless solved.
+
+    """
+
+    status: PlanStatus
+    sentence: str
+    seed: int
+    planning_time: float
+    path: Path | None = None
+    trajectory: Trajectory | None = None
+    clearance: float = float('nan')
+    reach: float = float('nan')
+    disagreement: Disagreement | None = None
+    escape_time: float = 0.0
+    search: PlanResult | None = None

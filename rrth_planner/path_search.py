@@ -1,0 +1,89 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a wearer and a target to a path: with as much clearance to spare as there is room for."""
+
+from collections.abc import Callable
+from dataclasses import replace
+import time
+
+import numpy as np
+from rrth_planner.aiming import FEW, goal_configurations, GoalSet, MANY, pointing_problem
+from rrth_planner.arm import ArmModel
+from rrth_planner.arrays import Array
+from rrth_planner.goal import PointingGoal
+from rrth_planner.options import TreeOptions
+from rrth_planner.planner import plan, PlanResult
+from rrth_planner.refusal import goal_refusal, Refusal
+from rrth_planner.status import PlanStatus
+from rrth_planner.world import grown, World
+
+# Clearance that the path is planned with on top of the margin, for its rounded corners to spend;
+# in a tight place, next to none [m].
+SPARES = (5e-3, 1e-5)
+
+
+def find_path(
+    arm: ArmModel,
+    goal: PointingGoal,
+    world: World,
+    q_start: Array,
+    options: TreeOptions,
+    seed: int,
+    should_stop: Callable[[], bool],
+    begin: float,
+) -> PlanResult | Refusal:
+    """
+    Return the shortest path found, or why there is none.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    goal : PointingGoal
+    world : World
+        Its boxes grown by the margin.
+    q_start : ndarray, shape (dof,)
+        [rad].
+    options : TreeOptions
+    seed : int
+    should_stop : callable
+        Polled; True cancels.
+    begin : float
+        When the request came, by `time.perf_counter`: its time limit counts from there [s].
+
+    """
+    goals: GoalSet | None = None
+    result: PlanResult | None = None
+    n_samples, is_clocked = 0, False
+    for spare in (*SPARES, 0.0):
+        roomy = grown(world, spare)
+        # Without any to spare only where the start has none: an arm that was in motion.
+        if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
+            continue
+        goals = goal_configurations(arm, goal, roomy, q_start, FEW)
+        if len(goals.q_goals) == 0:
+            goals = goal_configurations(arm, goal, roomy, q_start, MANY)
+        if len(goals.q_goals) == 0:
+            continue
+        # Half of the time for the roomy way, so that the tight one has its chance.
+        share = 0.5 if spare == SPARES[0] else 1.0
+        left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
+        problem = pointing_problem(arm, goal, roomy, q_start, goals)
+        rng = np.random.default_rng(seed)
+        result = plan(problem, replace(options, time_limit=left), rng, should_stop)
+        n_samples += result.n_samples
+        is_clocked |= result.status is PlanStatus.TIMEOUT
+        if result.status in (PlanStatus.SOLVED, PlanStatus.CANCELLED):
+            break
+    if result is None:
+        # The start keeps the smallest spare, so the goals were asked for.
+        assert goals is not None
+        return goal_refusal(world, goals)
+    if result.status is PlanStatus.SOLVED:
+        return replace(result, is_reproducible=result.is_reproducible and not is_clocked)
+    elapsed = time.perf_counter() - begin
+    sentence = {
+        PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
+        PlanStatus.CANCELLED: 'the plan was cancelled',
+        PlanStatus.SAMPLE_LIMIT: 'the free postures that aim at the target were not reached',
+    }[result.status]
+    return Refusal(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')

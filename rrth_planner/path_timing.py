@@ -1,0 +1,147 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""From a path to a motion in time that both judges agree about."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from rrth_planner.arm import ArmModel, reach_to
+from rrth_planner.blend import Blend, round_corners
+from rrth_planner.certificate import certify
+from rrth_planner.escape import beyond, Escape
+from rrth_planner.fcl_check import first_touch, touch_on_way_out
+from rrth_planner.goal import PointingGoal
+from rrth_planner.leaving import box_depths
+from rrth_planner.path import Path
+from rrth_planner.refusal import Refusal
+from rrth_planner.scene import Scene
+from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import joined, Lead, reserved
+from rrth_planner.timing import parameterize, TooFastError
+from rrth_planner.touch import Disagreement
+from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.world import grown, World
+
+# Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
+# has other intervals, does not fail for a hair [m].
+HAIR = 2e-6
+# Sizes of the first blend of an arm that moves, as shares of what is free.
+FIRST_SHARES = (0.5, 0.2, 0.0)
+
+
+def time_path(
+    arm: ArmModel,
+    scene: Scene,
+    goal: PointingGoal,
+    world: World,
+    path: Path,
+    limits: MotionLimits,
+    margin: float,
+    lead: Lead | None,
+    escape: Escape | None,
+) -> Trajectory | Disagreement | Refusal:
+    """
+    Return the timed path once both judges agree that it is free, with stops if need be.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame, as the second judge sees him.
+    goal : PointingGoal
+    world : World
+        The same, grown by the margin [m].
+    path : Path
+        Proven free.
+    limits : MotionLimits
+    margin : float
+        [m].
+    lead : Lead or None
+        What comes before the path.
+    escape : Escape or None
+        The lead, where it leads out of boxes that the arm was in.
+
+    """
+    if lead is not None and lead.speed > 0.0:
+        path = _straight_on(lead, path)
+    rounded = round_corners(path, grown(world, HAIR), limits)
+    choices = [rounded]
+    if lead is not None and lead.speed > 0.0 and rounded:
+        # The arm must be slow enough where the first blend begins: a smaller one begins later.
+        choices += [
+            (replace(rounded[0], half_length=share * rounded[0].half_length), *rounded[1:])
+            for share in FIRST_SHARES
+        ]
+    if any(blend.half_length > 0.0 for blend in rounded):
+        choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
+    escape_time = 0.0 if escape is None else escape.trajectory.duration
+    trajectory = first_proven(path, choices, limits, world, lead, escape_time)
+    if trajectory is None:
+        return Refusal(
+            PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
+        )
+    reach = reach_to(arm, goal.target, path.waypoints[-1])
+    touch = None
+    if escape is not None:
+        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        touch = touch_on_way_out(
+            arm, scene, depths, trajectory, escape_time, margin, world.ray_length
+        )
+    if touch is not None:
+        return Disagreement(trajectory, touch, escape_time)
+    touch = first_touch(
+        arm, scene, beyond(trajectory, escape_time), margin, world.ray_length, reach
+    )
+    if touch is not None:
+        later = replace(touch, time=escape_time + touch.time)
+        return Disagreement(trajectory, later, escape_time)
+    return trajectory
+
+
+def first_proven(
+    path: Path,
+    choices: Sequence[tuple[Blend, ...]],
+    limits: MotionLimits,
+    world: World,
+    lead: Lead | None = None,
+    escape_time: float = 0.0,
+) -> Trajectory | None:
+    """
+    Return the fastest trajectory along a path that is proven free, or None.
+
+    Parameters
+    ----------
+    path : Path
+    choices : sequence of tuple of Blend
+        Ways to take the corners.
+    limits : MotionLimits
+    world : World
+    lead : Lead, optional
+        What comes before the path, whose first edge is then followed from its speed on.
+    escape_time : float
+        Until then the lead is proven to lead out of the world's boxes [s].
+
+    """
+    # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
+    if lead is None:
+        timed = [parameterize(path, blends, limits) for blends in choices]
+    else:
+        timed = []
+        for blends in choices:
+            with suppress(TooFastError):
+                within = reserved(limits) if lead.speed > 0.0 else limits
+                rest = parameterize(path, blends, within, lead.speed)
+                timed.append(joined(lead.trajectory, rest))
+    for trajectory in sorted(timed, key=lambda trajectory: trajectory.duration):
+        if certify(trajectory, world, escape_time).is_proven:
+            return trajectory
+    return None
+
+
+def _straight_on(lead: Lead, path: Path) -> Path:
+    """Return the path from the end of the lead-in over where the arm would stop."""
+    begin = lead.trajectory.positions[-1]
+    rest = path.waypoints if path.length > 0.0 else path.waypoints[:1]
+    return Path(np.concatenate([begin[None], rest]))
