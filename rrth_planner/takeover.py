@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.braking import brake
 from rrth_planner.kernels.speeds import ramp_time
-from rrth_planner.trajectory import MotionLimits, positions_at, sample, Trajectory
+from rrth_planner.trajectory import MotionLimits, sample, Trajectory
 
 # An arm that moves no faster is at rest [rad/s].
 REST_SPEED = 0.01
@@ -152,11 +152,6 @@ def after(trajectory: Trajectory, index: int) -> Trajectory:
         velocities=trajectory.velocities[index:],
         accelerations=trajectory.accelerations[index:],
     )
-
-
-def follows(trajectory: Trajectory, time: float, q: Array) -> bool:
-    """Return whether an arm at q is where a trajectory is at a time [s]."""
-    return bool(np.abs(positions_at(trajectory, [time])[0] - q).max() <= SAME_POSITION)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

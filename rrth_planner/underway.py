@@ -1,76 +1,25 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that an arm was told to follow: how far it is, and what is proven of the rest."""
+"""What is left of a motion that runs, held against the wearer as he is seen now."""
 
-from dataclasses import dataclass
 from itertools import pairwise
-import math
 
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import tree_depth
 from rrth_planner.certificate import bounds_of, certify, FINENESS
-from rrth_planner.kernels.following import time_on
 from rrth_planner.kernels.pieces import is_rest_free
 from rrth_planner.leaving import leads_out
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import phase_of, SAME_POSITION
 from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
-# How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
-SLOW, LATEST = 0.05, 0.05
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RunningMotion:
-    """
-    A motion and when it began.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    start_time : float
-        [s].
-    reach : float
-        How much of the pointing ray must be clear at the end [m].
-    escape_time : float
-        Until then the motion may lead out of the wearer [s].
-
-    """
-
-    trajectory: Trajectory
-    start_time: float
-    reach: float = 0.0
-    escape_time: float = 0.0
-
-    def phase(self, q: Array, v: Array, taken: float, now: float) -> float | None:
-        """
-        Return the time within the motion that the arm is at now [s]; None where it is elsewhere.
-
-        Parameters
-        ----------
-        q, v : ndarray, shape (dof,)
-            A reading of the arm [rad, rad/s].
-        taken, now : float
-            When it was read, and now [s].
-
-        """
-        # The arm began when it heard of the motion: a little late, which at 4 rad/s^2 is more than
-        # a controller lets a motion that takes over be off in velocity.
-        motion, guess = self.trajectory, taken - self.start_time
-        if len(motion.times) > 1:
-            curves = piece_coefficients(motion)
-            at = time_on(curves, motion.times, guess, q, SAME_POSITION, SLOW, LATEST)
-            if math.isfinite(at):
-                return float(at) + now - taken
-        found = phase_of(q, v, self.trajectory)
-        return None if found is None else found[0] + found[1] * (now - taken)
 
 
 def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:

@@ -14,12 +14,13 @@ from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch, first_contact
 from rrth_planner.path import Path
 from rrth_planner.reach import bar_ends
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import MotionState, Takeover
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import positions_at, sample
-from rrth_planner.underway import is_still_free, RunningMotion
+from rrth_planner.underway import is_still_free
 from rrth_planner.world import arm_world
 from worlds import (
     examples,

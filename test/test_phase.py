@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.trajectory import sample, Trajectory
-from rrth_planner.underway import RunningMotion
 
 
 def _swing():
@@ -23,13 +23,33 @@ def _swing():
 def test_an_arm_that_began_late_is_found_where_it_is(late, at):
     motion = _swing()
     running = RunningMotion(trajectory=motion, start_time=10.0)
-    q, v, _ = (values[0] for values in sample(motion, [at]))
+    q, _, _ = (values[0] for values in sample(motion, [at]))
     taken = 10.0 + at + late
-    phase = running.phase(q, v, taken, taken + 0.004)
+    phase = running.phase(q, taken, taken + 0.004)
     # Within 0.05 ms: with 4 rad/s^2 that is 0.0002 rad/s.
     assert phase == pytest.approx(at + 0.004, abs=5e-5)
 
 
 def test_an_arm_at_rest_is_where_the_time_says():
     running = RunningMotion(trajectory=_swing(), start_time=10.0)
-    assert running.phase(np.zeros(4), np.zeros(4), 10.01, 10.02) == pytest.approx(0.02)
+    assert running.phase(np.zeros(4), 10.01, 10.02) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize('late', [0.03, 0.2, 0.4])
+@pytest.mark.parametrize('beside', [0.0, 0.01, 0.05])
+def test_an_arm_that_lags_or_sags_is_where_it_is_nearest_to(late, beside):
+    motion = _swing()
+    running = RunningMotion(trajectory=motion, start_time=10.0)
+    q = sample(motion, [0.5])[0][0] + beside * np.array([0.6, 0.8, 0.0, 0.0])
+    phase = running.phase(q, 10.5 + late, 10.5 + late)
+    path = sample(motion, np.linspace(0.0, 1.0, 20001))[0]
+    nearest = np.linalg.norm(path - q, axis=1).argmin() / 20000
+    assert phase == pytest.approx(nearest, abs=3e-3)
+
+
+def test_an_arm_that_is_elsewhere_is_nowhere_on_its_motion():
+    running = RunningMotion(trajectory=_swing(), start_time=10.0)
+    assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 10.5, 10.5) is None
+    assert running.phase(np.full(4, np.nan), 10.5, 10.5) is None
+    # It may still be on its way there.
+    assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 9.8, 9.9) == pytest.approx(-0.1)

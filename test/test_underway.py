@@ -11,10 +11,11 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import frames, quintic_states
 from rrth_planner.pipeline import plan_motion
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample
-from rrth_planner.underway import between, box_speeds, is_still_free, leads_away, RunningMotion
+from rrth_planner.underway import between, box_speeds, is_still_free, leads_away
 from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,

@@ -17,20 +17,18 @@ from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
+from rrth_planner.ros.sight import goes_on, out_of_sight, Pace
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import follows
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import box_speeds, is_still_free, leads_away, RunningMotion
+from rrth_planner.underway import box_speeds, is_still_free, leads_away
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
-# An arm that is not on its stop after this time is told again [s].
-PATIENCE = 0.05
-# An arm that stands still so long after the begin of a motion does not follow it [s].
-LATE = 0.25
-# An arm that is that long after the end of its motion is taken to have arrived [s].
+# An arm that stands still that long after the end of its motion is taken to have arrived [s].
 GRACE = 0.5
+ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
 
 
 class Watch(Enum):
@@ -71,16 +69,21 @@ class Guard:
         self.running: RunningMotion | None = None
         self._goal: PointingGoal | None = None
         self._state = Watch.IDLE
-        # Motions that were planned before a brake are of no use after it.
-        self.n_brakes = 0
+        # Motions that were planned before a brake are of no use after it, nor is a plan for what
+        # was stopped once another motion has begun.
+        self.n_brakes, self.n_begun = 0, 0
         self._stopped_from: RunningMotion | None = None
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
         self._before: tuple[Scene, float] | None = None
+        self._pace = Pace()
+        # When the arm was last where its motion leads [s].
+        self._seen = 0.0
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
         # Has a stop that was published as free judged once more; set by the owner.
-        self.judge: Callable[[Trajectory, Scene, PointingGoal], None] = lambda *_: None
+        self.judge: Callable[[Trajectory, Scene, PointingGoal, PlannerParameters], None]
+        self.judge = lambda *_: None
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
@@ -91,6 +94,7 @@ class Guard:
         """Watch a motion from now on by the parameters of its plan; the lock is held."""
         self._parameters = parameters
         self.running, self._goal, self._stopped_from = running, goal, None
+        self.n_begun, self._seen = self.n_begun + 1, self._now()
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body(time.time_ns())
@@ -121,7 +125,7 @@ class Guard:
                 return
             assert self.running is not None
             if not scene.boxes:
-                self._stop(phase, now, scene, 'the body is empty', arrived)
+                self._stop(scene, 'the body is empty', arrived)
             elif not is_still_free(
                 self.running,
                 phase,
@@ -131,39 +135,36 @@ class Guard:
                 ray_guard_length=parameters.ray_guard_length,
                 speeds=speeds,
             ):
-                self._stop(phase, now, scene, 'the wearer moved into the way', arrived)
+                self._stop(scene, 'the wearer moved into the way', arrived)
             else:
                 self._reporter.recertified(time.perf_counter() - begin)
 
     def _on_timer(self) -> None:
-        """Stop an arm whose wearer is not seen any more, or that goes on for all that."""
+        """Stop an arm that nobody sees any more, or whose wearer, or that goes on for all that."""
         if self._state is Watch.IDLE:
             return
         with self._lock:
-            now, timeout = self._now(), self._reporter.parameters.body_timeout
+            now = self._now()
             self._insist(now)
-            age, phase = self._heard.body.age(now), self._phase(now)
-            if phase is None or self._state is not Watch.WATCHING or not 0.0 < timeout < age:
+            if self._phase(now) is None or self._state is not Watch.WATCHING:
                 return
-            scene = scene_of(self._heard.body.value.at(now))
-            why = f'the body is {age:.3f} s old, expected at most {timeout:g} s (body_timeout)'
-            self._stop(phase, now, scene, why, time.time_ns())
+            why = out_of_sight(self._heard, self._reporter.parameters, now)
+            if why:
+                self._stop(scene_of(self._heard.body.value.at(now)), why, time.time_ns())
 
     def _insist(self, now: float) -> None:
-        """Stop the arm again where it is seen to go on with the motion it was to stop."""
+        """Stop the arm again where it goes on along the motion that it was to stop."""
         stop, before, reading = self.running, self._stopped_from, self._heard.joints.value
         if stop is None or before is None or reading is None:
             return
-        elapsed = reading.taken - stop.start_time
-        if elapsed < PATIENCE or follows(stop.trajectory, elapsed, reading.positions):
+        if not goes_on(reading, before, stop):
             return
-        self._stopped_from = None
-        phase = before.phase(reading.positions, reading.velocities, reading.taken, now)
+        phase = before.phase(reading.positions, reading.taken, now)
         if phase is None or phase >= before.trajectory.duration:
+            self._stopped_from = None
             return
-        stop = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
-        self._stopped_from, self.running = before, stop
-        self._publishers.publish_motion(stop.trajectory, self._parameters, now)
+        self.running = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
+        self._publishers.publish_motion(self.running.trajectory, self._parameters, now)
         self._node.get_logger().error('the arm did not stop as it was told: it is told again')
 
     def _phase(self, now: float) -> float | None:
@@ -171,31 +172,33 @@ class Guard:
         running, reading = self.running, self._heard.joints.value
         if running is None or reading is None:
             return None
-        late = now - running.start_time - running.trajectory.duration
-        if late > GRACE and not self._is_moving():
-            self.running = None
-            if self._state is not Watch.HOLDING:
+        is_moving = self._pace.is_moving(reading, now)
+        if now - running.start_time - running.trajectory.duration > GRACE and not is_moving:
+            self.running = self._stopped_from = None
+            if self._state is Watch.BRAKING and not self._reporter.parameters.replan:
+                self._say(Watch.HOLDING, self._reporter.guard[1])
+            elif self._state is not Watch.HOLDING:
                 self._say(Watch.IDLE, '')
             return None
-        if reading.taken - running.start_time > LATE and not self._is_moving():
-            # Nobody follows the motion, or it is over.
-            return None
-        return running.phase(reading.positions, reading.velocities, reading.taken, now)
+        phase = running.phase(reading.positions, reading.taken, now)
+        if phase is not None:
+            self._seen = now
+        elif abs(now - self._seen) > GRACE and self._reporter.guard[1] != ELSEWHERE:
+            self._node.get_logger().error(ELSEWHERE)
+            self._say(self._state, ELSEWHERE)
+        return phase
 
-    def _is_moving(self) -> bool:
-        reading = self._heard.joints.value
-        return bool(reading is not None and abs(reading.velocities).max() > 0.0)
-
-    def _stop(self, phase: float, now: float, scene: Scene, why: str, arrived: int) -> None:
+    def _stop(self, scene: Scene, why: str, arrived: int) -> None:
         """Publish the braking trajectory from where the arm is; the lock is held."""
+        # Anew: what was looked at since then may have taken its time.
+        now = self._now()
+        phase = self._phase(now)
         running, parameters, goal = self.running, self._parameters, self._goal
-        assert running is not None
-        if phase >= running.trajectory.duration:
+        if running is None or phase is None or phase >= running.trajectory.duration:
             return
-        stopped = RunningMotion(
-            trajectory=self._stop_of(running, phase),
-            start_time=now,
-        )
+        # Of a motion that takes over a little later the stop begins then.
+        start = max(now, running.start_time)
+        stopped = RunningMotion(trajectory=self._stop_of(running, phase), start_time=start)
         is_safe = not scene.boxes or is_still_free(
             stopped,
             0.0,
@@ -217,7 +220,7 @@ class Guard:
                 self._node.get_logger().error(sentence)
             self._say(Watch.WATCHING, sentence)
             return
-        self._publishers.publish_motion(stopped.trajectory, parameters, now)
+        self._publishers.publish_motion(stopped.trajectory, parameters, start)
         took = 1e-9 * (time.time_ns() - arrived)
         self._stopped_from = running
         self.running, self.n_brakes = stopped, self.n_brakes + 1
@@ -233,11 +236,9 @@ class Guard:
         else:
             self._node.get_logger().warning(sentence)
         if not warning and goal is not None and len(scene.boxes):
-            self.judge(stopped.trajectory, scene, goal)
+            self.judge(stopped.trajectory, scene, goal, parameters)
         if self._reporter.parameters.replan and goal is not None:
             self.plan_again(goal, stopped.trajectory.duration)
-        else:
-            self._say(Watch.HOLDING, sentence)
 
     def _warning(self, stop: Trajectory, scene: Scene) -> str:
         """Return what is to be said of a stop that is not proven free."""
@@ -249,6 +250,9 @@ class Guard:
     def hold(self, why: str) -> None:
         """Stay where the arm came to rest, since it cannot go on."""
         with self._lock:
+            if self._state is Watch.WATCHING:
+                # Another motion has begun since then.
+                return
             sentence = f'the arm holds where it is: {why}'
             self._say(Watch.HOLDING, sentence)
             self._node.get_logger().warning(sentence)

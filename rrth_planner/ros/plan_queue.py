@@ -24,10 +24,10 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.ros.second_opinion import incident_of_stop
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import RunningMotion
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,11 +241,12 @@ class PlanQueue:
 
     def _plan_again(self, goal: PointingGoal, wait: float) -> None:
         """Plan for a goal once more as soon as the arm, which brakes, rests."""
-        ticket = _Ticket()
+        ticket, n_begun = _Ticket(), self.guard.n_begun
 
         def work() -> None:
             self._wait_for_rest(ticket, wait)
-            if ticket.is_cancelled:
+            if ticket.is_cancelled or self.guard.n_begun != n_begun:
+                # Whoever asked for the motion that has begun since then wants that one.
                 return
             response = self._work(goal, time.perf_counter(), ticket)
             response.conclude()
@@ -256,9 +257,10 @@ class PlanQueue:
             self._open.add(ticket)
         self.prepare(work)
 
-    def _judge(self, stop: Trajectory, scene: Scene, goal: PointingGoal) -> None:
+    def _judge(
+        self, stop: Trajectory, scene: Scene, goal: PointingGoal, parameters: PlannerParameters
+    ) -> None:
         """Have the second judge look at a stop that was published."""
-        parameters = self._reporter.parameters
 
         def work() -> None:
             incident = incident_of_stop(stop, scene, goal, parameters)

@@ -1,8 +1,8 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the guard does where a stop is not proven free: it brakes, unless going on leads away."""
+"""What the guard does with arms that lag, lie or do not hear, and with stops that touch."""
 
-from collections import deque
+from dataclasses import replace
 from threading import RLock
 import time
 from types import SimpleNamespace
@@ -18,21 +18,24 @@ from rrth_planner import oracle  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.guard import Guard, Watch  # noqa: E402
+from rrth_planner.ros.inputs import Inputs  # noqa: E402
+from rrth_planner.ros.joints import JointReading  # noqa: E402
 from rrth_planner.ros.messages import WearerBody  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
+from rrth_planner.running_motion import RunningMotion  # noqa: E402
 from rrth_planner.scene import Box  # noqa: E402
 from rrth_planner.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.underway import RunningMotion  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ARM = worlds.table_1_arm()
 # How far the motion has come [s].
 PHASE = 0.5
+FAR = Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3))
 
 
 class Watched:
-    """A guard of a motion that runs, and what it publishes."""
+    """A guard of a motion that runs, on a clock of its own, and what it publishes."""
 
     def __init__(self, node):
         """Let the pointing ray turn in the free."""
@@ -44,36 +47,44 @@ class Watched:
             velocities=still,
             accelerations=still,
         )
-        self.published, self.said = [], deque()
-        parameters = declare_parameters(node)
+        self.now = 100.0 + PHASE
+        self.published, self.said = [], []
         self.reporter = SimpleNamespace(
-            parameters=parameters,
+            parameters=replace(declare_parameters(node), replan=False),
             guard=('', ''),
             publish_soon=lambda: None,
             recertified=lambda took: self.said.append('free'),
             braked=lambda took: self.said.append('braked'),
         )
-        self.heard = SimpleNamespace(
-            body=SimpleNamespace(value=WearerBody(), age=lambda now: 0.0),
-            joints=SimpleNamespace(value=None),
-        )
+        self.heard = Inputs('body', 'target', 'joints')
         publishers = SimpleNamespace(
-            publish_motion=lambda trajectory, *_: self.published.append(trajectory)
+            publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin))
         )
         self.guard = Guard(node, self.heard, self.reporter, publishers, RLock())
-        now = node.get_clock().now().nanoseconds * 1e-9
-        q, v, _ = (row[0] for row in sample(self.motion, [PHASE]))
-        self.heard.joints.value = SimpleNamespace(
-            positions=q, velocities=v, taken=now, received=now
-        )
-        self.guard.running = RunningMotion(trajectory=self.motion, start_time=now - PHASE)
-        self.guard._goal = PointingGoal(np.ones(3))
-        self.guard._state = Watch.WATCHING
+        self.guard._now = lambda: self.now
+        self.see(FAR)
+        self.read(*self.on_time(PHASE))
+        self.begin()
+        self.said.clear()
 
-    def see(self, *boxes):
+    def begin(self):
+        """Let a motion begin."""
+        running = RunningMotion(trajectory=self.motion, start_time=100.0)
+        self.guard.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters)
+
+    def on_time(self, phase):
+        """Return positions and velocities of an arm that follows."""
+        return tuple(row[0] for row in sample(self.motion, [phase])[:2])
+
+    def read(self, q, v):
+        """Let joint states come."""
+        reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
+        self.heard.joints.value, self.heard.joints.received = reading, self.now
+
+    def see(self, *boxes, expires=float('inf')):
         """Let a body come."""
-        parts = tuple(((box.name, 0), BodyPart((box,))) for box in boxes)
-        self.heard.body.value = WearerBody(parts)
+        parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
+        self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
         self.guard.on_body(time.time_ns())
 
     def hand(self, ahead, away):
@@ -82,6 +93,14 @@ class Watched:
         tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]
         onward = (next_tip - tip) / np.linalg.norm(next_tip - tip)
         return Box('hand', tip - away * onward, np.full(3, 0.05), np.eye(3))
+
+    def run(self, seconds, arm):
+        """Let time pass; arm: which positions and velocities it has at a time after PHASE [s]."""
+        for k in range(1, int(round(seconds / 0.01)) + 1):
+            self.now = 100.0 + PHASE + 0.01 * k
+            self.read(*arm(0.01 * k))
+            if k % 2 == 0:
+                self.guard._on_timer()
 
 
 @pytest.fixture
@@ -93,16 +112,16 @@ def watched():
 
 
 def test_an_arm_that_has_its_way_goes_on(watched):
-    watched.see(Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3)))
+    watched.see(FAR)
     assert watched.published == []
-    assert list(watched.said) == ['free']
+    assert watched.said == ['free']
 
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
 def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead):
     watched.see(watched.hand(ahead, 0.0))
-    (stop,) = watched.published
-    assert list(watched.said) == ['braked']
+    ((stop, _),) = watched.published
+    assert watched.said == ['braked']
     assert not stop.velocities[-1].any()
     sentence = watched.reporter.guard[1]
     assert 'the arm brakes' in sentence
@@ -118,3 +137,107 @@ def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(watched):
     # But not into something else.
     watched.see(watched.hand(0.0, 0.045), watched.hand(0.6, 0.0))
     assert len(watched.published) == 1
+
+
+# What an arm may say of itself when it was told to be at q with the velocity v.
+ARMS = {
+    'ideal': lambda q, v: (q, v),
+    'beside its path': lambda q, v: (q + [0.0, 0.0025, 0.0, 0.0], v),
+    'far beside its path': lambda q, v: (q + [0.0, 0.05, 0.0, 0.0], v),
+    'no velocities': lambda q, v: (q, 0.0 * v),
+    'one velocity that is none': lambda q, v: (q, v + [0.0, 0.0, 0.0, np.nan]),
+}
+
+
+@pytest.mark.parametrize('late', [0.0, 0.06])
+@pytest.mark.parametrize('arm', ARMS)
+def test_every_arm_is_braked(watched, arm, late):
+    watched.read(*ARMS[arm](*watched.on_time(PHASE - late)))
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, begin),) = watched.published
+    assert begin == watched.now
+    # From where it is, not from where it should be.
+    q = watched.on_time(PHASE - late)[0]
+    assert np.abs(stop.positions[0] - q).max() < 5e-3
+
+
+def test_an_arm_that_has_not_begun_is_held(watched):
+    watched.read(watched.motion.positions[0], np.zeros(4))
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, _),) = watched.published
+    assert np.abs(stop.positions - watched.motion.positions[0]).max() < 5e-3
+
+
+def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
+    watched.now = 100.0 - 0.2
+    watched.read(watched.motion.positions[0] + 0.5, np.full(4, 1.0))
+    watched.begin()
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, begin),) = watched.published
+    assert begin == 100.0
+    assert np.allclose(stop.positions[0], watched.motion.positions[0])
+
+
+@pytest.mark.parametrize(
+    ('setting', 'why'),
+    [
+        ({'body_timeout': 0.2}, 'body_timeout'),
+        ({'joint_timeout': 0.05}, 'joint_timeout'),
+        ({}, 'lifetime'),
+    ],
+)
+@pytest.mark.parametrize('arm', ARMS)
+def test_what_is_not_seen_any_more_stops_the_arm(watched, setting, why, arm):
+    watched.reporter.parameters = replace(watched.reporter.parameters, **setting)
+    watched.see(FAR, expires=watched.now + (0.1 if why == 'lifetime' else 10.0))
+    watched.read(*ARMS[arm](*watched.on_time(PHASE)))
+    watched.guard._on_timer()
+    assert watched.published == []
+    watched.now += 0.3
+    if why != 'joint_timeout':
+        watched.read(*ARMS[arm](*watched.on_time(PHASE + 0.3)))
+    watched.guard._on_timer()
+    assert len(watched.published) == 1
+    assert why in watched.reporter.guard[1]
+
+
+@pytest.mark.parametrize('late', [0.0, 0.004, 0.03, 0.09])
+@pytest.mark.parametrize('beside', [0.0, 0.005])
+def test_an_arm_that_obeys_is_told_once(watched, late, beside):
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, _),) = watched.published
+
+    def obeys(after):
+        if after < late:
+            q, v = watched.on_time(PHASE + after - late)
+        else:
+            q, v, _ = (row[0] for row in sample(stop, [after - late]))
+        return q + beside, v
+
+    watched.run(1.5, obeys)
+    assert len(watched.published) == 1
+    assert watched.guard._state is Watch.HOLDING
+
+
+def test_an_arm_that_goes_on_is_told_again(watched):
+    watched.see(watched.hand(0.8, 0.0))
+    watched.run(0.6, lambda after: watched.on_time(PHASE + after))
+    assert 2 <= len(watched.published) <= 4
+    for stop, begin in watched.published[1:]:
+        # From where it is then.
+        assert np.allclose(stop.positions[0], watched.on_time(begin - 100.0)[0], atol=1e-4)
+
+
+def test_an_arm_that_is_elsewhere_is_said_aloud(watched):
+    watched.run(0.8, lambda after: (watched.motion.positions[0] + 0.5, np.full(4, 0.2)))
+    assert watched.published == []
+    assert 'nothing is guarded' in watched.reporter.guard[1]
+
+
+def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched):
+    watched.guard.hold('no way to the goal before')
+    assert watched.guard._state is Watch.WATCHING
+    watched.see(watched.hand(0.6, 0.0))
+    assert len(watched.published) == 1
+    watched.guard.hold('no way to the goal')
+    assert watched.guard._state is Watch.HOLDING
