@@ -122,14 +122,14 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     guard = planner._queue.guard
     stop = emergency_stop(guard.running.trajectory, 0.3, planner._reporter.parameters.limits)
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
-    guard.judge(stop, scene, goal)
-    guard.judge(stop, scene, goal)
+    guard.judge(stop, scene, goal, planner._reporter.parameters)
+    guard.judge(stop, scene, goal, planner._reporter.parameters)
     with monkeypatch.context() as patch:
         # What agrees leaves nothing behind.
         planner._queue._worker.submit(lambda: None).result(30.0)
         assert not list(tmp_path.iterdir())
         patch.setattr(second_opinion, 'first_touch', lambda *_: TOUCH)
-        guard.judge(stop, scene, goal)
+        guard.judge(stop, scene, goal, planner._reporter.parameters)
         planner._queue._worker.submit(lambda: None).result(30.0)
     (file,) = tmp_path.iterdir()
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
