@@ -17,6 +17,8 @@ SHARE = 0.45
 SHRINK, SMALLEST = 0.6, 1e-3
 # A corner that hardly turns needs hardly a blend, but one it needs [rad].
 ENOUGH = 0.01
+# What a length is divided by at least.
+TINY = 1e-300
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -88,7 +90,8 @@ def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend
     """
     q = path.waypoints
     lengths = np.linalg.norm(np.diff(q, axis=0), axis=1)
-    directions = np.diff(q, axis=0) / lengths[:, None]
+    # An arm that stays where it is goes in no direction.
+    directions = np.diff(q, axis=0) / np.maximum(lengths, TINY)[:, None]
     blends = []
     for i in range(1, len(q) - 1):
         room = SHARE * min(lengths[i - 1], lengths[i])

@@ -21,7 +21,7 @@ GAP = 1e-6
 PARALLEL = 1e-12
 
 
-def box_depths(world: World, q: Array) -> Array:
+def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Array:
     """
     Return how deep the bars are in the grown boxes, (n_bars, m) [m]; < 0: apart.
 
@@ -33,6 +33,8 @@ def box_depths(world: World, q: Array) -> Array:
     world : World
     q : ndarray, shape (n, dof) or (dof,)
         Of n configurations the result is (n, n_bars, m) [rad].
+    ray_lengths : ndarray, shape (n,), optional
+        Of the pointing ray in each of them; without, the world's [m].
 
     """
     rows = world.obstacles[(len(world.obstacles) - 1) // LANES :].reshape(-1, BOX_ROWS, LANES)
@@ -40,8 +42,9 @@ def box_depths(world: World, q: Array) -> Array:
     axes = rows[:BOX_OFFSET].T.reshape(-1, 3, 3)
     n_bars = len(world.bar_names)
     points = np.empty((len(np.atleast_2d(q)), n_bars + 1, 4))
+    rays = np.full(len(points), world.ray_length) if ray_lengths is None else ray_lengths
     for i, one in enumerate(np.atleast_2d(q)):
-        world.chain(np.ascontiguousarray(one), world.ray_length, points[i].reshape(-1), 0)
+        world.chain(np.ascontiguousarray(one), float(rays[i]), points[i].reshape(-1), 0)
     local = np.einsum('mij,nkj->nkmi', axes, points[:, :, :3]) + rows[BOX_OFFSET:BOX_HALF].T
     middle, f = 0.5 * (local[:, 1:] + local[:, :-1]), 0.5 * (local[:, 1:] - local[:, :-1])
     half = rows[BOX_HALF:].T + points[:, 1:, None, 3:]

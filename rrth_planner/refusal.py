@@ -11,6 +11,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
 from rrth_planner.goal import PointingGoal
+from rrth_planner.leaving import box_depths
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import Lead
@@ -161,12 +162,16 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
         )
     pairs: Counter[tuple[str, str]] = Counter()
     least: dict[tuple[str, str], float] = {}
-    for q, reach in zip(goals.q_blocked, goals.blocked_reaches, strict=True):
-        distances = world.clearances(q, max(reach, world.ray_length))
-        for bar, box in np.argwhere(distances < 0.0):
+    reaches = np.maximum(goals.blocked_reaches, world.ray_length)
+    for depths in box_depths(world, goals.q_blocked, reaches):
+        # A link may be two bars: it counts once.
+        found: dict[tuple[str, str], float] = {}
+        for bar, box in np.argwhere(depths > 0.0):
             pair = (world.bar_names[bar], world.box_names[box])
-            pairs[pair] += 1
-            least[pair] = min(least.get(pair, np.inf), float(-distances[bar, box]))
+            found[pair] = max(found.get(pair, 0.0), float(depths[bar, box]))
+        pairs.update(found.keys())
+        for pair, depth in found.items():
+            least[pair] = min(least.get(pair, np.inf), depth)
     blame = 'with next to no clearance'
     if pairs:
         (bar, box), count = pairs.most_common(1)[0]

@@ -138,6 +138,12 @@ def test_with_nothing_in_the_way_every_corner_is_rounded_as_far_as_full_speed_ne
         assert is_whole or blend.top_speed(bounds) == pytest.approx(top, rel=1e-6)
 
 
+def test_a_path_that_goes_nowhere_has_no_corner():
+    q = np.zeros((2, 4))
+    with np.errstate(all='raise'):
+        assert round_corners(Path(q), wearer_world(), limits()) == ()
+
+
 def test_a_path_of_two_points_has_no_corner():
     assert round_corners(Path(np.eye(2, 4)), wearer_world(), limits()) == ()
 

@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a body and a target to a motion: what is solved is safe, what is refused had to be."""
 
+from dataclasses import replace
+import re
+
 import numpy as np
 import pytest
-from rrth_planner.aiming import target_in_mount
+from rrth_planner.aiming import GoalSet, target_in_mount
 from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.pointing import aim
+from rrth_planner.leaving import box_depths
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import first_contact
+from rrth_planner.refusal import goal_refusal
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.trajectory import sample
@@ -142,6 +147,24 @@ def test_a_target_in_the_wearer_is_refused_by_name():
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'is 0.0100 m from box "torso"' in plan.sentence
     assert 'margin of 0.02 m: 0.0100 m deep' in plan.sentence
+
+
+def test_a_share_of_postures_is_no_more_than_all_of_them():
+    # Bars of one link have one name: a box round all of the arm counts once for each.
+    box = Box('everywhere', np.zeros(3), np.full(3, 5.0), np.eye(3))
+    world = arm_world(table_1_arm(), Scene((box,)), MARGIN, RAY)
+    world = replace(world, bar_names=('link 3', 'link 3', 'link 3'))
+    q = np.random.default_rng(3).uniform(*table_1_arm().bounds, (40, 4))
+    goals = GoalSet(
+        q_goals=q[:0], n_bent=0, n_aiming=40, q_blocked=q, blocked_reaches=np.full(40, 2.0)
+    )
+    refusal = goal_refusal(world, goals)
+    (share,) = re.findall(r'\((\d+) %\)', refusal.sentence)
+    assert share == '100'
+    # What the proof says, not a distance that may be greater; of both bars the deeper.
+    depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
+    (deep,) = re.findall(r'at least (\d\.\d+) m deep', refusal.sentence)
+    assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
 
 
 def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_and_box():
