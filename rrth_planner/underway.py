@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is left of a motion that runs, held against the wearer as he is seen now."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from rrth_planner.kernels.pieces import is_rest_free
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
+from rrth_planner.takeover import joined
 from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
@@ -49,6 +51,30 @@ def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
         velocities=v,
         accelerations=a,
     )
+
+
+def taken_over(
+    before: RunningMotion, phase: float, after: RunningMotion, now: float
+) -> RunningMotion:
+    """
+    Return a motion that begins a little later, with what the arm does until then before it.
+
+    Parameters
+    ----------
+    before : RunningMotion
+        That the arm follows until then.
+    phase, now : float
+        The time within it that the arm has come to, and the time by which that is so [s].
+    after : RunningMotion
+        That takes over; returned as it is where nothing is known of the way to it.
+
+    """
+    end = phase + after.start_time - now
+    is_known = phase >= 0.0 and phase + CLOSEST < end <= before.trajectory.duration
+    if not is_known or len(after.trajectory.times) == 1:
+        return after
+    way = between(before.trajectory, phase, end)
+    return replace(after, trajectory=joined(way, after.trajectory), start_time=now)
 
 
 def is_still_free(

@@ -15,7 +15,7 @@ from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample
-from rrth_planner.underway import between, box_speeds, is_still_free, leads_away
+from rrth_planner.underway import between, box_speeds, is_still_free, leads_away, taken_over
 from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
@@ -226,3 +226,20 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         assert not (found and min(gaps) < gaps[0] - 1e-3)
         assert not leads_away(running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY)
     assert min(told.values()) >= 5, told
+
+
+def test_a_motion_that_takes_over_is_known_from_now_on():
+    rng = np.random.default_rng(12)
+    motion = random_motion(rng)
+    before = RunningMotion(trajectory=motion, start_time=100.0)
+    later = between(motion, 0.5 * motion.duration, motion.duration)
+    after = RunningMotion(trajectory=later, start_time=100.0 + 0.5 * motion.duration)
+    # The arm is a little late.
+    whole = taken_over(before, 0.3 * motion.duration - 0.002, after, 100.0 + 0.3 * motion.duration)
+    assert whole.start_time == 100.0 + 0.3 * motion.duration
+    times = np.linspace(0.0, 0.7 * motion.duration - 0.01, 50)
+    q, _, _ = sample(whole.trajectory, times)
+    expected, _, _ = sample(motion, 0.3 * motion.duration + times)
+    assert np.abs(q - expected).max() < 0.01
+    # Nothing is known of an arm whose motion is over before.
+    assert taken_over(before, 0.9 * motion.duration, after, 100.0) is after

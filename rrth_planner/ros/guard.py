@@ -21,7 +21,7 @@ from rrth_planner.ros.sight import goes_on, out_of_sight, Pace
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import box_speeds, is_still_free, leads_away
+from rrth_planner.underway import box_speeds, is_still_free, leads_away, taken_over
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
@@ -92,9 +92,14 @@ class Guard:
         self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
     ) -> None:
         """Watch a motion from now on by the parameters of its plan; the lock is held."""
+        now = self._now()
+        if self.running is not None and now < running.start_time:
+            phase = self._phase(now)
+            if self.running is not None and phase is not None:
+                running = taken_over(self.running, phase, running, now)
         self._parameters = parameters
         self.running, self._goal, self._stopped_from = running, goal, None
-        self.n_begun, self._seen = self.n_begun + 1, self._now()
+        self.n_begun, self._seen = self.n_begun + 1, now
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body(time.time_ns())

@@ -178,6 +178,27 @@ def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
     assert np.allclose(stop.positions[0], watched.motion.positions[0])
 
 
+def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
+    turned = sample(watched.motion, [PHASE + 0.2])
+    later = Trajectory(
+        times=[0.0, 1.0],
+        positions=[turned[0][0], turned[0][0] + [0.0, 0.0, 0.1, 0.3]],
+        velocities=[turned[1][0], np.zeros(4)],
+        accelerations=[turned[2][0], np.zeros(4)],
+    )
+    running = RunningMotion(trajectory=later, start_time=watched.now + 0.2)
+    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
+    watched.now += 0.02
+    watched.read(*watched.on_time(PHASE + 0.02))
+    watched.see(FAR)
+    assert watched.published == []
+    # In the way of the old motion, before the new one begins.
+    watched.see(watched.hand(0.15, 0.0))
+    ((stop, begin),) = watched.published
+    assert begin == watched.now
+    assert np.allclose(stop.positions[0], watched.on_time(PHASE + 0.02)[0], atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ('setting', 'why'),
     [
