@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, OptionsError
+from rrth_planner.errors import MessageError, OptionsError, RrthError
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
@@ -207,6 +207,9 @@ def following(
     except (ParameterException, RuntimeError) as problem:
         rclpy.try_shutdown()
         raise OptionsError(f'--live: {problem}') from problem
+    except RrthError:
+        rclpy.try_shutdown()
+        raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     thread = Thread(target=_spin, args=(executor,), name='viewer feed', daemon=True)

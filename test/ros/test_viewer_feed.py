@@ -62,3 +62,6 @@ def test_a_bad_parameter_is_one_sentence():
         following(None, None, ['--ros-args', '-p', 'margin:=-1.0']),
     ):
         pass
+    # Nothing is left behind that would be in the way of a good one.
+    with following(None, None, LEFT):
+        pass
