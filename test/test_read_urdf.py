@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms from URDF files move as their URDF says; what is no arm is refused in a sentence."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -228,6 +231,26 @@ def test_files_that_cannot_be_used_are_named(tmp_path, capsys):
     assert 'none.urdf: No such file' in capsys.readouterr().err
     assert read_urdf.main([str(file), '--output', str(output)]) == 2
     assert 'no/arm.yaml' in capsys.readouterr().err
+
+
+WITHOUT = """
+import sys
+for name in {names}:
+    sys.modules[name] = None
+from rrth_planner.read_urdf import main
+sys.exit(main(['arm.urdf', '--output', 'arm.yaml']))
+"""
+
+
+@pytest.mark.parametrize('names', [('yourdfpy',), ('yourdfpy', 'trimesh')])
+def test_what_is_not_installed_is_named(names):
+    ended = subprocess.run(
+        [sys.executable, '-c', WITHOUT.format(names=names)], capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f'read_urdf: {", ".join(names)}: not installed, expected')
+    assert f'pip install {" ".join(names)}' in line
 
 
 def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
