@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer's model without a browser: what is asked last is answered, and refusals are said."""
 
+from argparse import Namespace
 from dataclasses import replace
+import socket
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -18,7 +21,7 @@ from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.result import Tree
 from rrth_planner.settings import load_settings
-from rrth_planner.viewers.viewer import main
+from rrth_planner.viewers.viewer import _served, main
 from rrth_planner.viewers.viewer_examples import (
     BODIES,
     example_body,
@@ -254,6 +257,47 @@ def test_a_motion_plays_to_its_end_and_again():
     assert (again.time, again.is_playing) == (0.0, True)
     assert player.moved(9.0).time == 2.0
     assert ended.moved(1.0).loaded(4.0).time == 2.0
+
+
+def can_listen_on(host):
+    """Return whether this machine has an address."""
+    try:
+        socket.create_server((host, 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ('host', 'page'),
+    [
+        ('127.0.0.1', 'http://127.0.0.1:'),
+        ('0.0.0.0', 'http://localhost:'),
+        ('localhost', 'http://localhost:'),
+        ('::', 'http://localhost:'),
+        ('::1', 'http://[::1]:'),
+    ],
+)
+def test_a_page_is_served_on_addresses_of_both_kinds(host, page, capsys):
+    if ':' in host and not can_listen_on(host):
+        pytest.skip('this machine has no such address')
+    options = Namespace(host=host, port=0, open=False, screenshot=None)
+    with _served(options) as (_, url):
+        assert url.startswith(page)
+        if host != '::':
+            # Which of the two kinds the name stands for is the matter of the machine.
+            with urlopen(url, timeout=WAIT) as answer:
+                assert answer.status == 200
+    assert f'The viewer is at {url}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('host', ['no.such.host.invalid', '203.0.113.7', '2001:db8::1', '.'])
+def test_a_host_that_is_none_of_this_machine_is_one_sentence(host, capsys):
+    assert main(['--host', host, '--no-open']) == 1
+    said = capsys.readouterr().err
+    assert f'--host {host} --port 8081: ' in said
+    assert 'expected an address of this machine' in said
+    assert said.count('\n') == 1
 
 
 def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):
