@@ -5,7 +5,6 @@
 import argparse
 from collections.abc import Sequence
 import json
-import math
 from pathlib import Path
 import sys
 from typing import Any
@@ -141,8 +140,7 @@ def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
             'waypoints': len(plan.path.waypoints),
             'duration_s': plan.trajectory.duration,
             'length_rad': plan.path.length,
-            # No box: nothing to keep clear of.
-            'clearance_m': plan.clearance if math.isfinite(plan.clearance) else None,
+            'clearance_m': plan.clearance,
             'reach_m': plan.reach,
             'escape_time_s': plan.escape_time,
             'end': _tool(arm, plan.trajectory.positions[-1]),
