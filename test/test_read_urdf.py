@@ -263,3 +263,14 @@ def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
     # The lamp's -z is the plate's x: backwards on the wearer.
     assert np.allclose(T[:3, 2], (-1.0, 0.0, 0.0), atol=1e-4)
     assert 'tool at' in capsys.readouterr().out
+
+
+def test_an_interrupt_is_a_sentence(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(read_urdf, 'import_chain', interrupted)
+    file = resource_path('config/examples/chest_arm.urdf')
+    assert read_urdf.main([str(file), '--output', str(tmp_path / 'arm.yaml')]) == 130
+    assert capsys.readouterr().err == 'read_urdf: interrupted\n'
+    assert not list(tmp_path.iterdir())
