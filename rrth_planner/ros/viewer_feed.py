@@ -18,7 +18,6 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rrth_planner.arrays import Array
@@ -27,6 +26,7 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
 from rrth_planner.ros.parameters import declare_parameters
+from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import OpenSubscription
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
@@ -39,11 +39,6 @@ LONGEST_WAY = 1.0
 # From an answer to the next request, so that the arm is well under way; how often it is looked
 # whether a plan is wanted [s].
 PAUSE, PERIOD = 0.3, 0.02
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 
 
 class ViewerFeed(Node):

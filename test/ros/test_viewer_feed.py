@@ -19,7 +19,8 @@ from rrth_planner.errors import RrthError
 from rrth_planner.resources import load_arm
 from rrth_planner.ros.planner_node import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode
-from rrth_planner.ros.viewer_feed import following, LATCHED, SERVICE, ViewerFeed
+from rrth_planner.ros.profiles import LATCHED
+from rrth_planner.ros.viewer_feed import following, SERVICE, ViewerFeed
 from samples import wearer
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
