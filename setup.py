@@ -29,7 +29,7 @@ setup(
     extras_require={
         'node': ['python-fcl', 'matplotlib'],
         'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
-        'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'tqdm', 'matplotlib'],
+        'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'trimesh', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },
     # The kernels' compiled cache is kept by source file, so these must be real files.

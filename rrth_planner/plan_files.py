@@ -5,7 +5,6 @@
 import argparse
 from collections.abc import Sequence
 import json
-import math
 from pathlib import Path
 import sys
 from typing import Any
@@ -25,7 +24,7 @@ from rrth_planner.resources import load_arm, load_yaml, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.status import PlanStatus
 
-SOLVED, REFUSED, WRONG = 0, 1, 2
+SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 2**31
 DESCRIPTION = """\
 Plan one motion that ends with the arm's pointing ray on a target and touches the wearer nowhere,
@@ -36,6 +35,7 @@ EPILOG = """\
 exit codes: 0  solved: figures on standard output, the motion in the file of --output
             1  refused: why, in one sentence on standard error
             2  wrong usage or input: what, on standard error
+          130  interrupted
 
 A motion is points in time [s] with position, velocity and acceleration of each joint; between two
 of them each joint follows the quintic that fits both. A file whose name ends in .csv has a header
@@ -56,6 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (RrthError, OSError) as problem:
         print(f'plan: {one_line(str(problem))}', file=sys.stderr)
         return WRONG
+    except KeyboardInterrupt:
+        print('plan: interrupted', file=sys.stderr)
+        return INTERRUPTED
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -141,8 +144,7 @@ def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
             'waypoints': len(plan.path.waypoints),
             'duration_s': plan.trajectory.duration,
             'length_rad': plan.path.length,
-            # No box: nothing to keep clear of.
-            'clearance_m': plan.clearance if math.isfinite(plan.clearance) else None,
+            'clearance_m': plan.clearance,
             'reach_m': plan.reach,
             'escape_time_s': plan.escape_time,
             'end': _tool(arm, plan.trajectory.positions[-1]),

@@ -32,6 +32,7 @@ fingers, are left out.
 
 exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (why, is printed)
+          130  interrupted
 
 example:    ./run exec read_urdf config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
                 --output my_arm.yaml --check 0 -0.5 1 0 0.3 0
@@ -51,6 +52,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (RrthError, OSError) as problem:
         print(f'read_urdf: {one_line(str(problem))}', file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print('read_urdf: interrupted', file=sys.stderr)
+        return 130
     return 0
 
 

@@ -130,7 +130,8 @@ def told_at(recording: Recording, times: Array) -> tuple[Array, Array]:
 
 def at(changes: Sequence[tuple[float, Any]], time: float) -> Any:
     """Return what was the case at a time [s], from (since, what) in order; None: nothing yet."""
-    i = bisect_right([since for since, _ in changes], time)
+    # Without a list of the times: there may be thousands, and this is asked as often.
+    i = bisect_right(changes, time, key=lambda change: change[0])
     return changes[i - 1][1] if i else None
 
 

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The serial chain between two links of a URDF."""
 
+from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 import logging
 import math
 from pathlib import Path
@@ -12,9 +14,13 @@ from xml.etree import ElementTree
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.errors import ModelError
-import trimesh.transformations as transformations
-import yourdfpy
 
+# An installation by colcon does not bring them, which is said when a file is to be read.
+with suppress(ImportError):
+    from trimesh import transformations
+    import yourdfpy
+
+TOOLS = ('yourdfpy', 'trimesh')
 RAYS = {
     sign + axis: value * np.eye(3)[k]
     for sign, value in (('+', 1.0), ('-', -1.0), ('', 1.0))
@@ -111,9 +117,16 @@ def read_chain(
     Raises
     ------
     ModelError
-        The file is no URDF, or there is no chain of joints that an arm may have.
+        The file is no URDF, or there is no chain of joints that an arm may have; what reads it is
+        not installed.
 
     """
+    missing = [name for name in TOOLS if find_spec(name) is None]
+    if missing:
+        raise ModelError(
+            f'{", ".join(missing)}: not installed, expected what requirements/tools.txt lists '
+            f'(pip install {" ".join(missing)})'
+        )
     if ray not in RAYS:
         raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
     model = _load(Path(path))

@@ -124,3 +124,12 @@ def test_wrong_usage_ends_with_2(arguments, capsys):
         plan_files.main(arguments)
     assert end.value.code == 2
     assert 'usage: plan' in capsys.readouterr().err
+
+
+def test_an_interrupt_is_a_sentence(monkeypatch, capsys):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plan_files, 'plan_motion', interrupted)
+    assert plan_files.main(TARGET) == 130
+    assert sentence(capsys.readouterr().err) == 'plan: interrupted'

@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture of motions renders, and its axes say what they show."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 pytest.importorskip('matplotlib')
 
+from matplotlib.figure import Figure  # noqa: E402
 from rrth_planner.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.trajectory import MotionLimits, Trajectory  # noqa: E402
-from rrth_planner.viewers.arm_view import arm_points  # noqa: E402
+from rrth_planner.viewers.arm_view import arm_points, draw_way  # noqa: E402
 from rrth_planner.viewers.plots import Motion, motion_figure  # noqa: E402
 
 ARM = load_arm()
@@ -67,6 +70,17 @@ def test_the_picture_is_not_blank():
     left, right = np.array_split(pixels, 2, axis=1)
     assert left.std() > 5.0
     assert right.std() > 5.0
+
+
+@pytest.mark.parametrize('n', [2, 3, 40])
+def test_a_way_is_drawn_by_as_many_postures_as_are_given(n):
+    axes = Figure().add_subplot(projection='3d')
+    q = np.linspace(FOLDED, FOLDED - 0.4, n)
+    draw_way(axes, ARM, Scene(()), q, q, None, 1.0, towards=np.array([0.6, -0.6, 0.5]))
+    # Nothing hides a piece of a line; the path of the tool, and two rays, are lines too.
+    assert len(axes.collections) == n + 3
+    colours = [lines.get_edgecolor()[0, :3] for lines in axes.collections[: n - 2]]
+    assert all(a[0] < b[0] for a, b in pairwise(colours))
 
 
 def test_the_drawn_arm_goes_from_the_mount_through_all_frames():

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms from URDF files move as their URDF says; what is no arm is refused in a sentence."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -230,6 +233,26 @@ def test_files_that_cannot_be_used_are_named(tmp_path, capsys):
     assert 'no/arm.yaml' in capsys.readouterr().err
 
 
+WITHOUT = """
+import sys
+for name in {names}:
+    sys.modules[name] = None
+from rrth_planner.read_urdf import main
+sys.exit(main(['arm.urdf', '--output', 'arm.yaml']))
+"""
+
+
+@pytest.mark.parametrize('names', [('yourdfpy',), ('yourdfpy', 'trimesh')])
+def test_what_is_not_installed_is_named(names):
+    ended = subprocess.run(
+        [sys.executable, '-c', WITHOUT.format(names=names)], capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f'read_urdf: {", ".join(names)}: not installed, expected')
+    assert f'pip install {" ".join(names)}' in line
+
+
 def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
     file, arm = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'arm.yaml'
     worn = ['--base', 'plate', '--mount', '-0.2', '0', '0.3', '0', '0', '1', '0', '--ray', '-z']
@@ -240,3 +263,14 @@ def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
     # The lamp's -z is the plate's x: backwards on the wearer.
     assert np.allclose(T[:3, 2], (-1.0, 0.0, 0.0), atol=1e-4)
     assert 'tool at' in capsys.readouterr().out
+
+
+def test_an_interrupt_is_a_sentence(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(read_urdf, 'import_chain', interrupted)
+    file = resource_path('config/examples/chest_arm.urdf')
+    assert read_urdf.main([str(file), '--output', str(tmp_path / 'arm.yaml')]) == 130
+    assert capsys.readouterr().err == 'read_urdf: interrupted\n'
+    assert not list(tmp_path.iterdir())

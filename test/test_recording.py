@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded run as values: what counts when, and how far the arm was from the wearer."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from rrth_planner.errors import RecordError
@@ -95,6 +97,30 @@ def test_a_brake_begins_in_motion_while_the_guard_brakes():
 def test_what_was_the_case_is_what_came_last():
     changes = [(1.0, 'a'), (2.0, 'b')]
     assert [at(changes, t) for t in (0.5, 1.0, 1.9, 2.0, 9.0)] == [None, 'a', 'a', 'b', 'b']
+    assert at([], 1.0) is None
+
+
+class Counted(Sequence):
+    """A sequence that counts how often it is looked into."""
+
+    def __init__(self, items):
+        """Begin at 0."""
+        self._items, self.n_looks = items, 0
+
+    def __len__(self):
+        """Return how many items there are."""
+        return len(self._items)
+
+    def __getitem__(self, index):
+        """Return an item."""
+        self.n_looks += 1
+        return self._items[index]
+
+
+def test_of_many_changes_few_are_looked_at():
+    changes = Counted([(float(k), k) for k in range(20_000)])
+    assert at(changes, 12_345.5) == 12_345
+    assert changes.n_looks < 20
 
 
 def test_a_section_keeps_its_times_and_what_led_to_it():

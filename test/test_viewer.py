@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer's model without a browser: what is asked last is answered, and refusals are said."""
 
+from argparse import Namespace
 from dataclasses import replace
+import socket
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -18,7 +21,7 @@ from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.result import Tree
 from rrth_planner.settings import load_settings
-from rrth_planner.viewers.viewer import main
+from rrth_planner.viewers.viewer import _served, main
 from rrth_planner.viewers.viewer_examples import (
     BODIES,
     example_body,
@@ -134,6 +137,69 @@ def test_an_example_body_is_that_of_the_messages():
         np.testing.assert_allclose(numbers, scene_of(body).numbers, atol=1e-12)
 
 
+MARKERS = """
+markers:
+  - {ns: old, id: 7, type: 1, pose: POSE, scale: SIZE}
+  - {action: 3}
+  - {header: {frame_id: torso}, ns: torso, id: 0, type: 1, pose: POSE, scale: SIZE}
+  - {ns: hat, id: 0, type: 1, pose: POSE, scale: SIZE}
+  - ns: arms
+    id: 0
+    type: 6
+    pose: {position: {x: 0.1, y: 0.2, z: 0.3}, orientation: TURN}
+    scale: SIZE
+    points: [{x: 0.1, y: 0.0, z: -0.2}, {x: 0.4, y: -0.5, z: 0.6}]
+  - {ns: hat, id: 0, action: 2}
+  - LAST
+"""
+VALUES = {
+    'POSE': '{position: {x: 0, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}',
+    'SIZE': '{x: 0.3, y: 0.2, z: 0.1}',
+    'TURN': '{x: 0.5, y: -0.5, z: 0.1, w: 0.7}',
+}
+
+
+def message(folder, last):
+    """Return a file with a body: a torso, a list of arms, and one more marker."""
+    text = MARKERS
+    for name, value in {**VALUES, 'LAST': last}.items():
+        text = text.replace(name, value)
+    file = folder / 'body.yaml'
+    file.write_text(text)
+    return file
+
+
+def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
+    file = message(tmp_path, '{ns: arms, id: 9, action: 2}')
+    scene = load_wearer(file)
+    assert [box.name for box in scene.boxes] == ['torso', 'arms[0]', 'arms[1]']
+    pytest.importorskip('rclpy')
+    from rrth_planner.ros.message_files import message_from_file
+    from rrth_planner.ros.messages import scene_of, WearerBody
+    from visualization_msgs.msg import MarkerArray
+
+    body = WearerBody().apply(message_from_file(file, MarkerArray), 0.0, 'torso')
+    np.testing.assert_allclose(scene.numbers, scene_of(body).numbers, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('head', 'words'),
+    [
+        ('{header: {frame_id: head}, ns: head, type: 1}', 'frame "head", expected "torso" or an'),
+        ('{ns: head, type: 2}', r'type 2, expected 1 \(CUBE\) or 6 \(CUBE_LIST\)'),
+        ('{ns: head, action: 1}', r'action 1, expected 0 \(ADD\), 2'),
+        (
+            '{ns: head, type: 6, scale: {x: 1, y: 1, z: 1}, points: [], pose: {position: '
+            '{x: 0, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}}',
+            '0 points, orientation',
+        ),
+    ],
+)
+def test_what_is_no_box_of_the_wearer_is_refused_and_not_left_out(tmp_path, head, words):
+    with pytest.raises(SceneError, match=f'body.yaml: marker 6.*{words}'):
+        load_wearer(message(tmp_path, head))
+
+
 def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
     with pytest.raises(SceneError, match='body_bad.yaml'):
         load_wearer(resource_path('msg_examples/body_bad.yaml'))
@@ -191,6 +257,47 @@ def test_a_motion_plays_to_its_end_and_again():
     assert (again.time, again.is_playing) == (0.0, True)
     assert player.moved(9.0).time == 2.0
     assert ended.moved(1.0).loaded(4.0).time == 2.0
+
+
+def can_listen_on(host):
+    """Return whether this machine has an address."""
+    try:
+        socket.create_server((host, 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize(
+    ('host', 'page'),
+    [
+        ('127.0.0.1', 'http://127.0.0.1:'),
+        ('0.0.0.0', 'http://localhost:'),
+        ('localhost', 'http://localhost:'),
+        ('::', 'http://localhost:'),
+        ('::1', 'http://[::1]:'),
+    ],
+)
+def test_a_page_is_served_on_addresses_of_both_kinds(host, page, capsys):
+    if ':' in host and not can_listen_on(host):
+        pytest.skip('this machine has no such address')
+    options = Namespace(host=host, port=0, open=False, screenshot=None)
+    with _served(options) as (_, url):
+        assert url.startswith(page)
+        if host != '::':
+            # Which of the two kinds the name stands for is the matter of the machine.
+            with urlopen(url, timeout=WAIT) as answer:
+                assert answer.status == 200
+    assert f'The viewer is at {url}' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('host', ['no.such.host.invalid', '203.0.113.7', '2001:db8::1', '.'])
+def test_a_host_that_is_none_of_this_machine_is_one_sentence(host, capsys):
+    assert main(['--host', host, '--no-open']) == 1
+    said = capsys.readouterr().err
+    assert f'--host {host} --port 8081: ' in said
+    assert 'expected an address of this machine' in said
+    assert said.count('\n') == 1
 
 
 def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):

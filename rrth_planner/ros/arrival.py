@@ -2,16 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Follow an arm to the end of what it was told, with a bar that shows how far it is."""
 
+from collections.abc import Sequence
+from contextlib import suppress
 import time
 from typing import Any
 
 import numpy as np
 from rrth_planner.arm import ArmModel, pointing_error
 from rrth_planner.arrays import Array
+from rrth_planner.errors import MessageError
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from rrth_planner.trajectory import positions_at, Trajectory
 from tqdm import tqdm  # type: ignore[import-untyped]
+from trajectory_msgs.msg import JointTrajectory
 
 # A motion that ends so far past its target was planned for another one [m].
 AIMS_ELSEWHERE = 1e-3
@@ -30,7 +34,7 @@ def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> T
 
     def is_heard() -> bool:
         # What an earlier request left on the latched topic may come first.
-        motions = [joint_trajectory_from_msg(msg, arm.joint_names) for msg in client.told]
+        motions = _motions_of(client.told, arm)
         found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
         return bool(found)
 
@@ -91,10 +95,10 @@ def _follow(
     while present - begin <= motion.duration + client.timeout:
         client.take_messages(0.02)
         present = time.monotonic()
-        if len(client.told) > n_told:
+        newer, n_told = _motions_of(client.told[n_told:], arm), len(client.told)
+        if newer:
             # The wearer moved, and the planner stopped the arm or sent it another way.
-            n_told, begin, arrived_at = len(client.told), present, None
-            motion = joint_trajectory_from_msg(client.told[-1], arm.joint_names)
+            motion, begin, arrived_at = newer[-1], present, None
             bar.reset(total=round(motion.duration, 2))
         q = client.positions(arm.joint_names)
         bar.n = max(bar.n, _time_along(motion, q))
@@ -107,6 +111,15 @@ def _follow(
         if present - arrived_at >= SETTLED and _aims_at(arm, motion, target):
             return
     raise NotInTimeError(_why(client, arm, motion, target, tolerance))
+
+
+def _motions_of(told: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
+    """Return the motions of this arm; the topic may carry another machine's, or nonsense."""
+    motions = []
+    for msg in told:
+        with suppress(MessageError):
+            motions.append(joint_trajectory_from_msg(msg, arm.joint_names))
+    return motions
 
 
 def _time_along(motion: Trajectory, q: Array) -> float:

@@ -7,8 +7,7 @@ from rrth_planner.arm import pointing_error
 from rrth_planner.errors import MessageError
 from rrth_planner.pipeline import warm_up
 from rrth_planner.ros.answers import Answer, answer_from_text
-from rrth_planner.ros.error_codes import answer, ErrorCode
-from rrth_planner.ros.frames import FrameError
+from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.messages import WearerBody
@@ -59,9 +58,8 @@ def plan_without_moving(
     try:
         goal = listener.goal(target)
     except MessageError as problem:
-        is_frame = isinstance(problem, FrameError)
-        name = 'FRAME_TRANSFORM_FAILURE' if is_frame else 'INVALID_GOAL_CONSTRAINTS'
-        return Answer(ErrorCode[name], str(problem), {}), None
+        code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+        return Answer(code, str(problem), {}), None
 
     def now() -> float:
         return client.get_clock().now().nanoseconds * 1e-9

@@ -4,7 +4,8 @@
 
 from enum import IntEnum
 
-from rrth_planner.errors import one_line
+from rrth_planner.errors import MessageError, one_line
+from rrth_planner.ros.frames import FrameError
 from rrth_planner.status import PlanStatus
 
 
@@ -40,6 +41,11 @@ CODE_OF_STATUS = {
     PlanStatus.GOAL_UNREACHABLE: ErrorCode.NO_IK_SOLUTION,
     PlanStatus.NOT_CERTIFIED: ErrorCode.FAILURE,
 }
+
+
+def code_of_refusal(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
+    """Return what a refused message comes to: its frame is at fault, or else something other."""
+    return ErrorCode.FRAME_TRANSFORM_FAILURE if isinstance(problem, FrameError) else otherwise
 
 
 def answer(code: ErrorCode, sentence: str) -> str:

@@ -11,8 +11,8 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.error_codes import ErrorCode
-from rrth_planner.ros.messages import FrameError, JointReading, scene_of, WearerBody
+from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
+from rrth_planner.ros.messages import JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED, Takeover, takeover
@@ -207,13 +207,9 @@ class Inputs:
         refusal = self.target.refusal
         if self.target.is_last_refused and refusal is not None:
             # Pointing at the target before it is not what was asked for.
-            code = (
-                ErrorCode.FRAME_TRANSFORM_FAILURE
-                if isinstance(refusal, FrameError)
-                else ErrorCode.INVALID_GOAL_CONSTRAINTS
-            )
             raise RequestError(
-                code, f'the last message on {self.target.topic} was refused: {refusal}'
+                code_of_refusal(refusal, ErrorCode.INVALID_GOAL_CONSTRAINTS),
+                f'the last message on {self.target.topic} was refused: {refusal}',
             )
         return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
 
@@ -226,9 +222,8 @@ def _require(heard: Input[Any], what: str, expected: str) -> Any:
             ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
             f'no {what} yet on {heard.topic}, expected {expected}',
         )
-    is_frame = isinstance(heard.refusal, FrameError)
     raise RequestError(
-        ErrorCode.FRAME_TRANSFORM_FAILURE if is_frame else ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+        code_of_refusal(heard.refusal, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
         f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} refused messages: '
         f'{heard.refusal}',
     )

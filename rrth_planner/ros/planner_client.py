@@ -11,21 +11,17 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import ReliabilityPolicy
 from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
+from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.ros.joints import configuration_from_msg
+from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import OpenSubscription
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
 # Between two requests of a planner that has not heard everything yet [s].
 PAUSE = 0.3
@@ -171,9 +167,13 @@ class PlannerClient(Node):
             self.take_messages()
 
     def _on_state(self, msg: JointState, *_: int) -> None:
-        if set(self._joint_names) <= set(msg.name):
-            self.state = msg
-            self.seen.append(msg)
+        try:
+            configuration_from_msg(msg, self._joint_names)
+        except MessageError:
+            # Of other joints, or nonsense: the arm is where it was seen last.
+            return
+        self.state = msg
+        self.seen.append(msg)
 
     def _on_motion(self, msg: JointTrajectory) -> None:
         self.told.append(msg)

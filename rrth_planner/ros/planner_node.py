@@ -22,8 +22,7 @@ from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
 from rrth_planner.kernels.jit import cache_folder, is_compiled
-from rrth_planner.ros.error_codes import answer, ErrorCode
-from rrth_planner.ros.frames import FrameError
+from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.parameters import current_parameters, declare_parameters
 from std_srvs.srv import Trigger
 
@@ -126,12 +125,7 @@ class PlannerNode(Node):
                 PointStamped(header=request.goal.header, point=request.goal.pose.position)
             )
         except MessageError as problem:
-            is_frame = isinstance(problem, FrameError)
-            code = (
-                ErrorCode.FRAME_TRANSFORM_FAILURE
-                if is_frame
-                else ErrorCode.INVALID_GOAL_CONSTRAINTS
-            )
+            code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
             self._reporter.refuse(code, f'request of get_plan: {problem}')
             return response
         found = await self._queue.respond(goal)

@@ -4,22 +4,17 @@
 
 from nav_msgs.msg import Path
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rrth_planner.arrays import Array
 from rrth_planner.ros.markers import plan_markers
 from rrth_planner.ros.messages import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 TOOL_PATH_POSES = 25
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 
 
 class PlanPublishers:

@@ -78,8 +78,7 @@ class RecordingReader:
     ) -> None:
         """Read the file."""
         self._path, self._arm, self._base_frame = path, arm, base_frame
-        self.refused: dict[str, str] = {}
-        topics, self._begin = _read(path)
+        topics, self._begin, self.refused = _read(path)
         self._topics = {role: self._topic(topics, role, namespace) for role in TYPES}
         self._heard = {
             role: [] if topic is None else sorted(topics[topic], key=lambda heard: heard.received)
@@ -209,9 +208,10 @@ class RecordingReader:
         return sorted(said[ours[0]]) if ours else []
 
 
-def _read(path: Path) -> tuple[dict[str, list[Heard]], int]:
-    """Return the messages of a run by topic, and when the first of all came [ns]."""
+def _read(path: Path) -> tuple[dict[str, list[Heard]], int, dict[str, str]]:
+    """Return a run by topic, when its first message came [ns], and why messages are left out."""
     topics: dict[str, list[Heard]] = {}
+    refused: dict[str, str] = {}
     factory, begin = DecoderFactory(), 0
     try:
         with path.open('rb') as file:
@@ -224,8 +224,17 @@ def _read(path: Path) -> tuple[dict[str, list[Heard]], int]:
                 decode = factory.decoder_for(channel.message_encoding, schema)
                 if schema is None or decode is None or TYPES.get(role) != schema.name:
                     continue
-                heard = Heard(decode(message.data), message.publish_time, message.log_time)
-                topics.setdefault(channel.topic, []).append(heard)
+                heard = topics.setdefault(channel.topic, [])
+                try:
+                    msg = decode(message.data)
+                except Exception as problem:
+                    # Whoever published it may have sent anything: those after it count.
+                    refused[channel.topic] = (
+                        f'{len(message.data)} bytes ({problem or type(problem).__name__}), '
+                        f'expected a {schema.name}'
+                    )
+                    continue
+                heard.append(Heard(msg, message.publish_time, message.log_time))
     except OSError as problem:
         raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
     except (EndOfFile, struct.error):
@@ -240,4 +249,4 @@ def _read(path: Path) -> tuple[dict[str, list[Heard]], int]:
         raise RecordError(
             f'{path}: none of {", ".join(TYPES)} in it, expected an MCAP file of a run'
         )
-    return topics, begin
+    return topics, begin, refused

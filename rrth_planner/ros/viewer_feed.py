@@ -5,7 +5,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 import time
 from typing import Any
 
@@ -18,14 +18,15 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, OptionsError
+from rrth_planner.errors import MessageError, one_line, OptionsError, RrthError
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
 from rrth_planner.ros.parameters import declare_parameters
+from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import OpenSubscription
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
@@ -38,11 +39,6 @@ LONGEST_WAY = 1.0
 # From an answer to the next request, so that the arm is well under way; how often it is looked
 # whether a plan is wanted [s].
 PAUSE, PERIOD = 0.3, 0.02
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
 
 
 class ViewerFeed(Node):
@@ -79,8 +75,11 @@ class ViewerFeed(Node):
         self._client = self.create_client(Trigger, SERVICE)
         self._motion: Trajectory | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
+        # Of what the page's threads ask for and the executor's takes: never half of it.
+        self._lock = Lock()
         self._is_asking, self._is_wanted = False, False
         self._newest: Array | None = None
+        self._asked: Future | None = None
         self._answer, self._answered = '', -PAUSE
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -127,34 +126,36 @@ class ViewerFeed(Node):
     @property
     def is_asking(self) -> bool:
         """Whether an answer is still to come."""
-        return self._is_wanted or self._is_asking
+        with self._lock:
+            return self._is_wanted or self._is_asking
 
     def ask(self, target: Array | None = None) -> None:
         """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
         # Not published at once: a request would overtake a queue of targets.
-        if target is not None:
-            self._newest = np.array(target, dtype=np.float64)
-        self._is_wanted = True
+        newest = None if target is None else np.array(target, dtype=np.float64)
+        with self._lock:
+            self._newest = self._newest if newest is None else newest
+            self._is_wanted = True
 
     def _on_timer(self) -> None:
         """Ask for the plan that is wanted, one at a time, and none of an arm about to set off."""
+        is_ready = self._client.service_is_ready()
+        if self._asked is not None and not is_ready:
+            # Of a planner that is gone no answer will come.
+            self._client.remove_pending_request(self._asked)
+            self._conclude('the planner has ended without an answer')
         is_soon = time.monotonic() < self._answered + PAUSE
-        if (
-            not self._is_wanted
-            or self._is_asking
-            or is_soon
-            or not self._client.service_is_ready()
-        ):
-            return
-        # In this order, since other threads look.
-        self._is_asking = True
-        self._is_wanted = False
-        target, self._newest = self._newest, None
+        with self._lock:
+            if not self._is_wanted or self._is_asking or is_soon or not is_ready:
+                return
+            self._is_asking, self._is_wanted = True, False
+            target, self._newest = self._newest, None
         if target is not None:
             self._publish(target)
         # The request takes another way than the target, and must not overtake it.
         self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
-        self._client.call_async(Trigger.Request()).add_done_callback(self._on_answer)
+        self._asked = self._client.call_async(Trigger.Request())
+        self._asked.add_done_callback(self._on_answer)
 
     def _publish(self, target: Array) -> None:
         msg = PointStamped()
@@ -163,9 +164,18 @@ class ViewerFeed(Node):
         msg.point.x, msg.point.y, msg.point.z = target.tolist()
         self._targets.publish(msg)
 
-    def _on_answer(self, future: Any) -> None:
-        self._answer = str(future.result().message)
-        self._answered, self._is_asking = time.monotonic(), False
+    def _on_answer(self, future: Future) -> None:
+        problem = future.exception()
+        if problem is None:
+            self._conclude(str(future.result().message))
+        else:
+            self._conclude(f'no answer of the planner: {one_line(str(problem))}')
+
+    def _conclude(self, answer: str) -> None:
+        """Keep what came of a request; the next one may follow."""
+        self._answer, self._answered, self._asked = answer, time.monotonic(), None
+        with self._lock:
+            self._is_asking = False
 
     def _on_motion(self, msg: JointTrajectory, *_: int) -> None:
         try:
@@ -207,6 +217,9 @@ def following(
     except (ParameterException, RuntimeError) as problem:
         rclpy.try_shutdown()
         raise OptionsError(f'--live: {problem}') from problem
+    except RrthError:
+        rclpy.try_shutdown()
+        raise
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     thread = Thread(target=_spin, args=(executor,), name='viewer feed', daemon=True)

@@ -88,7 +88,7 @@ def draw_way(
     scene : Scene
         The wearer in the base frame.
     q : ndarray, shape (n, dof)
-        What is drawn as postures, from start to goal [rad].
+        What is drawn as postures, from start to goal, n >= 2 [rad].
     q_dense : ndarray, shape (m, dof)
         What the tool's path is drawn through [rad].
     target : ndarray, shape (3,), or None
@@ -118,7 +118,7 @@ def draw_way(
     _frame(axes, scene, np.concatenate([*postures, ray, first_ray]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)
-    blend = np.linspace(0.0, 1.0, N_POSTURES)[:, None]
+    blend = np.linspace(0.0, 1.0, len(postures))[:, None]
     colours = (1.0 - blend) * to_rgb(START) + blend * to_rgb(GOAL)
     for posture, colour in zip(postures[1:-1], colours[1:-1], strict=True):
         _draw_line(axes, scene, towards, posture, colour, 1.6, 0.30)

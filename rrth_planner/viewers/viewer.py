@@ -196,8 +196,7 @@ def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
     # It draws a box round its address, whether verbose or not.
     with redirect_stdout(StringIO()):
         server = viser.ViserServer(host=options.host, port=port, verbose=False)
-    host = 'localhost' if options.host in ('0.0.0.0', '::') else options.host
-    url = f'http://{host}:{server.get_port()}'
+    url = f'http://{_host_of_page(options.host)}:{server.get_port()}'
     print(f'The viewer is at {url} (Ctrl-C ends it).', flush=True)
     has_display = any(os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY'))
     is_wanted = has_display and options.screenshot is None
@@ -213,13 +212,24 @@ def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
 def _free_port(host: str, port: int) -> int:
     """Return the port, for 0 one that is free, or raise OptionsError where it is taken."""
     try:
-        with socket.create_server((host, port)) as listener:
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        families = [family for family, *_ in found]
+        # A name may have addresses of both kinds, and a machine only one of them.
+        family = socket.AF_INET if socket.AF_INET in families else families[0]
+        with socket.create_server((host, port), family=family) as listener:
             return int(listener.getsockname()[1])
-    except (OSError, OverflowError) as problem:
+    except (OSError, OverflowError, UnicodeError) as problem:
         raise OptionsError(
             f'--host {host} --port {port}: {problem}; expected an address of this machine and a '
             'port that is free'
         ) from problem
+
+
+def _host_of_page(host: str) -> str:
+    """Return what stands for a host in the address of a page."""
+    if host in ('0.0.0.0', '::'):
+        return 'localhost'
+    return f'[{host}]' if ':' in host else host
 
 
 def _end(*_: Any) -> NoReturn:

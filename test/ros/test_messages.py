@@ -15,7 +15,12 @@ from rrth_planner.arm import tool_pose  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import bodies, edits  # noqa: E402
-from rrth_planner.ros.error_codes import answer, CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.ros.error_codes import (  # noqa: E402
+    answer,
+    code_of_refusal,
+    CODE_OF_STATUS,
+    ErrorCode,
+)
 from rrth_planner.ros.messages import (  # noqa: E402
     configuration_from_msg,
     FrameError,
@@ -371,3 +376,9 @@ def test_the_tool_path_runs_from_the_first_to_the_last_pose():
 def test_each_status_has_a_code():
     assert set(CODE_OF_STATUS) == set(PlanStatus)
     assert answer(ErrorCode.TIMED_OUT, 'too late') == 'TIMED_OUT (-6): too late'
+
+
+def test_a_frame_at_fault_is_told_from_other_refusals():
+    for other in (ErrorCode.INVALID_GOAL_CONSTRAINTS, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA):
+        assert code_of_refusal(MessageError('x'), other) is other
+        assert code_of_refusal(FrameError('x'), other) is ErrorCode.FRAME_TRANSFORM_FAILURE

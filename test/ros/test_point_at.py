@@ -24,11 +24,18 @@ from rrth_planner.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.resources import load_arm, resource_path  # noqa: E402
 from rrth_planner.ros import point_at  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
+from rrth_planner.ros.arrival import announced_motion, follow  # noqa: E402
 from rrth_planner.ros.body_messages import body_from_file, body_to_msg  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
-from rrth_planner.ros.messages import scene_of, WearerBody  # noqa: E402
-from samples import joints  # noqa: E402
+from rrth_planner.ros.messages import (  # noqa: E402
+    joint_trajectory_to_msg,
+    scene_of,
+    WearerBody,
+)
+from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient  # noqa: E402
+from rrth_planner.trajectory import Trajectory  # noqa: E402
+from samples import FOLDED, joints  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
@@ -257,6 +264,59 @@ def test_the_help_names_every_exit_code(monkeypatch, capsys):
         '4',
         '130',
     ]
+
+
+@pytest.fixture
+def client(ros_context):
+    """Give a client that nobody answers."""
+    client = PlannerClient('point_at', 0.5)
+    yield client
+    client.destroy_node()
+
+
+def turn(to, duration):
+    """Return a motion from rest to rest, and its message."""
+    motion = Trajectory(
+        times=[0.0, duration],
+        positions=[FOLDED, to],
+        velocities=np.zeros((2, 4)),
+        accelerations=np.zeros((2, 4)),
+    )
+    return motion, joint_trajectory_to_msg(motion, load_arm().joint_names, '', 0.0)
+
+
+def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
+    arm = load_arm()
+    first, message = turn(np.array(FOLDED) + 0.1, 0.1)
+    second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
+    other = JointTrajectory(joint_names=['wheel'])
+    client.told = [other]
+    with pytest.raises(NotInTimeError, match='joint_trajectory: nothing for'):
+        announced_motion(client, arm, 0.1)
+    client.told = [other, message, other]
+    assert announced_motion(client, arm, 0.1).positions.tolist() == first.positions.tolist()
+    # Afterwards the planner sends the arm elsewhere, and the other machine is told something.
+    came = iter([[], [other], [newer, other]])
+
+    def take_messages(_):
+        time.sleep(0.02)
+        client.told += next(came, [])
+        ours = [msg for msg in client.told if msg.points][-1]
+        client._on_state(joints(ours.points[-1].positions))
+        client._on_state(joints(FOLDED[:2]))
+
+    client.take_messages = take_messages
+    follow(client, arm, first, None, 1e-3)
+    assert client.positions(arm.joint_names).tolist() == second.positions[-1].tolist()
+
+
+def test_joint_positions_that_are_none_do_not_count(client):
+    client._joint_names = load_arm().joint_names
+    client._on_state(joints(FOLDED))
+    for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
+        client._on_state(bad)
+    assert client.positions(client._joint_names).tolist() == FOLDED
+    assert len(client.seen) == 1
 
 
 def test_an_answer_is_read_back():

@@ -38,14 +38,15 @@ TYPES = {
 
 
 def write(path, *items, space=''):
-    """Write messages, each (topic, time since the begin [s], message), to a file."""
+    """Write messages, each (topic, time since the begin [s], message or bytes), to a file."""
     with RecordingFile(path) as file:
         for topic, time, msg in items:
             name = f'/{topic}' if topic == 'diagnostics' else f'{space}/{topic}'
             if name not in file.counts:
                 file.add_topic(name, TYPES[name.rsplit('/', 1)[-1]])
             when = BEGIN * SECOND + round(time * SECOND)
-            file.add(name, serialize_message(msg), when, when + 1000)
+            data = msg if isinstance(msg, bytes) else serialize_message(msg)
+            file.add(name, data, when, when + 1000)
     return path
 
 
@@ -146,6 +147,19 @@ def test_what_the_nodes_would_refuse_is_left_out_and_said(tmp_path, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4
     assert all('bad messages are left out' in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    'garbage', [b'', b'ab', b'nothing that a driver would say', b'\x00\x01\x00\x00' + b'\xff' * 40]
+)
+def test_a_message_that_cannot_be_read_costs_no_other(tmp_path, garbage):
+    path = write(tmp_path / 'run.mcap', *STATES[:2], ('joint_states', 0.15, garbage), *STATES[2:])
+    reader = RecordingReader(path, ARM, 'torso')
+    assert len(reader.recording().times) == len(STATES)
+    assert set(reader.refused) == {'/joint_states'}
+    (sentence,) = reader.refused.values()
+    assert sentence.startswith(f'{len(garbage)} bytes')
+    assert sentence.endswith('expected a sensor_msgs/msg/JointState')
 
 
 def test_a_file_that_was_never_finished_is_read_as_far_as_it_goes(tmp_path):

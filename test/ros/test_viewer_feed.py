@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer's feed follows both nodes in their namespace, and the newest target counts."""
 
+from threading import Thread
 import time
 
 import numpy as np
@@ -11,13 +12,17 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from conftest import spinning, wait_until
+from rclpy.node import Node
+from rclpy.task import Future
 from rrth_planner.arm import pointing_error
 from rrth_planner.errors import RrthError
 from rrth_planner.resources import load_arm
 from rrth_planner.ros.planner_node import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode
-from rrth_planner.ros.viewer_feed import following, LATCHED
+from rrth_planner.ros.profiles import LATCHED
+from rrth_planner.ros.viewer_feed import following, SERVICE, ViewerFeed
 from samples import wearer
+from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 LEFT = ['--ros-args', '-r', '__ns:=/left']
@@ -62,3 +67,86 @@ def test_a_bad_parameter_is_one_sentence():
         following(None, None, ['--ros-args', '-p', 'margin:=-1.0']),
     ):
         pass
+    # Nothing is left behind that would be in the way of a good one.
+    with following(None, None, LEFT):
+        pass
+
+
+class Planner(Node):
+    """Offers the planner's service, and says the same at once or never anything."""
+
+    def __init__(self, does_answer):
+        """Offer it."""
+        super().__init__('planner', namespace='left')
+        self._does_answer, self.n_asked = does_answer, 0
+        self.create_service(Trigger, SERVICE, self._on_request)
+
+    async def _on_request(self, _, response):
+        self.n_asked += 1
+        if not self._does_answer:
+            await Future()
+        response.message = 'SUCCESS (1): so it is'
+        return response
+
+
+def test_a_planner_that_ends_while_it_is_asked_leaves_the_next_one_to_be_asked():
+    with following(None, None, LEFT) as feed:
+        first = Planner(does_answer=False)
+        with spinning(first):
+            feed.ask()
+            wait_until(lambda: first.n_asked)
+            assert feed.is_asking
+        first.destroy_node()
+        wait_until(lambda: not feed.is_asking)
+        assert 'ended without an answer' in feed.said
+        assert f'waiting for {feed.resolve_topic_name("body_boxes")}' in feed.said
+        second = Planner(does_answer=True)
+        with spinning(second):
+            feed.ask()
+            wait_until(lambda: feed.said.startswith('SUCCESS'))
+            wait_until(lambda: not feed.is_asking)
+        second.destroy_node()
+
+
+def test_a_request_that_fails_is_said_and_the_next_one_is_made(ros_context):
+    feed = ViewerFeed()
+    feed._is_asking = True
+    future = Future()
+    future.set_exception(RuntimeError('no way\nout'))
+    feed._on_answer(future)
+    assert not feed.is_asking
+    assert feed.said.startswith('no answer of the planner: no way out')
+    feed.destroy_node()
+
+
+class SlowFeed(ViewerFeed):
+    """A feed that another thread asks for something just when it takes what it was asked for."""
+
+    asker = None
+
+    @property
+    def _newest(self):
+        newest, asker, self.asker = self._kept, self.asker, None
+        if asker is not None:
+            asker.start()
+            # As long as it takes, unless it has to wait.
+            asker.join(0.5)
+        return newest
+
+    @_newest.setter
+    def _newest(self, newest):
+        self._kept = newest
+
+
+def test_no_target_is_lost_between_two_threads(ros_context):
+    planner, feed = Planner(does_answer=True), SlowFeed(namespace='left')
+    with spinning(planner):
+        wait_until(feed._client.service_is_ready)
+        feed.ask(TARGETS[0])
+        feed.asker = asker = Thread(target=feed.ask, args=(TARGETS[1],))
+        feed._on_timer()
+        asker.join()
+        assert feed.is_asking
+        np.testing.assert_array_equal(feed._newest, TARGETS[1])
+    feed.destroy_node()
+    planner.destroy_node()
