@@ -74,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # What compiling and loading takes is not planning time.
     if not is_compiled():
-        print('plan: compiling the planner, takes up to a minute', file=sys.stderr, flush=True)
+        print('plan: compiling the planner, takes a minute or two', file=sys.stderr, flush=True)
         if cache_folder() is not None:
             compile_kernels()
     warm_up(arm, settings.options)

@@ -112,7 +112,7 @@ def _run_planning(options: argparse.Namespace) -> None:
     question = _question(options)
     if not is_compiled():
         how_often = 'at every start' if cache_folder() is None else 'once for this machine'
-        print(f'Compiling the planner, {how_often}: takes up to a minute.', flush=True)
+        print(f'Compiling the planner, {how_often}: takes a minute or two.', flush=True)
         if cache_folder() is not None:
             compile_kernels()
     warm_up(question.arm, question.options)
