@@ -123,6 +123,7 @@ def _run_planning(options: argparse.Namespace) -> None:
                 page.run()
             else:
                 page.model.wait(1, question.options.time_limit + 60.0)
+                page.show_end()
                 page.draw()
                 save_picture(url, options.screenshot)
         finally:
@@ -221,7 +222,7 @@ def _free_port(host: str, port: int) -> int:
     except (OSError, OverflowError, UnicodeError) as problem:
         raise OptionsError(
             f'--host {host} --port {port}: {problem}; expected an address of this machine and a '
-            'port that is free'
+            'port that is free (--port 0: any that is)'
         ) from problem
 
 
