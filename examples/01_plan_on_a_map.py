@@ -14,8 +14,7 @@ file = sys.argv[1] if len(sys.argv) > 1 else resource_path('config/maps/spiral.y
 box_map = map_from_mapping(load_yaml(file), str(file))
 options = RRTHOptions(step_size=10.0, corner_spacing=0.05, club_radius=10.0)
 result = plan(map_problem(box_map), options, np.random.default_rng(seed=0))
-waypoints = [] if result.path is None else result.path.waypoints.round(1).tolist()
-
 print(f'{box_map.name}: {result.status.value} after {result.n_samples} draws')
 if result.path is not None:
+    waypoints = result.path.waypoints.round(1).tolist()
     print(f'length {result.path.length:.2f} in map units, by way of {waypoints}')

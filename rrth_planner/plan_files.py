@@ -37,6 +37,9 @@ exit codes: 0  solved: figures on standard output, the motion in the file of --o
             2  wrong usage or input: what, on standard error
           130  interrupted
 
+`ray from` is where the pointing ray begins, the origin of the arm's `tool` row; the tool may be
+further out on the same line, as `read_urdf` says of an arm that it has read.
+
 A motion is points in time [s] with position, velocity and acceleration of each joint; between two
 of them each joint follows the quintic that fits both. A file whose name ends in .csv has a header
 and a line a point, .yaml says the same as YAML. Without --period there are as few points as fix
@@ -71,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # What compiling and loading takes is not planning time.
     if not is_compiled():
-        print('plan: compiling the planner, takes up to a minute', file=sys.stderr, flush=True)
+        print('plan: compiling the planner, takes a minute or two', file=sys.stderr, flush=True)
         if cache_folder() is not None:
             compile_kernels()
     warm_up(arm, settings.options)
@@ -137,7 +140,7 @@ def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
     figures: dict[str, Any] = {
         'status': plan.status.value,
         'sentence': plan.sentence,
-        'start': _tool(arm, q_start),
+        'start': _ray(arm, q_start),
     }
     if plan.path is not None and plan.trajectory is not None:
         figures |= {
@@ -147,15 +150,15 @@ def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
             'clearance_m': plan.clearance,
             'reach_m': plan.reach,
             'escape_time_s': plan.escape_time,
-            'end': _tool(arm, plan.trajectory.positions[-1]),
+            'end': _ray(arm, plan.trajectory.positions[-1]),
         }
     return figures | {'planning_time_s': plan.planning_time, 'seed': plan.seed}
 
 
-def _tool(arm: ArmModel, q: Array) -> dict[str, list[float]]:
-    """Return a configuration, and where the tool is and points there."""
+def _ray(arm: ArmModel, q: Array) -> dict[str, list[float]]:
+    """Return a configuration, and where the pointing ray begins and leads there."""
     T = tool_pose(arm, q)
-    return {'q': q.tolist(), 'tool_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
+    return {'q': q.tolist(), 'ray_from_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
 
 
 def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
@@ -171,7 +174,7 @@ def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
         found = figures[label]
         lines += [
             f'{label:15}{_listed(found["q"])}',
-            f'  tool at      {_listed(found["tool_m"])} m, ray along {_listed(found["ray"])}',
+            f'  ray from     {_listed(found["ray_from_m"])} m along {_listed(found["ray"])}',
         ]
     if figures['escape_time_s'] > 0.0:
         lines.append(f'leaves boxes   until {figures["escape_time_s"]:.3f} s')

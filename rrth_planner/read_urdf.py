@@ -118,9 +118,14 @@ def _report(found: ImportedArm) -> list[str]:
         lines.append(
             f"ray: begins {abs(found.ray_lead):.4f} m {where} the tool's origin, on the same line"
         )
-    if np.isfinite(chain.velocities).all():
-        speeds = ', '.join(f'{speed:g}' for speed in chain.velocities)
-        lines.append(f'max_velocity of the URDF, for the settings: [{speeds}]')
+    given = np.isfinite(chain.velocities)
+    if given.any():
+        speeds = ', '.join(f'{v:g}' if v < np.inf else '?' for v in chain.velocities)
+        unsaid = ', '.join(
+            name for name, has in zip(arm.joint_names, given, strict=True) if not has
+        )
+        note = f'; it gives none for {unsaid}: write one in place of each ?' if unsaid else ''
+        lines.append(f'max_velocity of the URDF, for the settings: [{speeds}]{note}')
     far, tilt = found.deviation()
     lines.append(f'differs from the URDF by at most {far:.1e} m and {tilt:.1e} rad')
     return lines

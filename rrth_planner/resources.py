@@ -58,12 +58,26 @@ def load_arm(path: str | Path | None = None) -> ArmModel:
 
     """
     file = Path(path) if path else resource_path('config/arm.yaml')
+    if _begins_as_xml(file):
+        raise ModelError(
+            f'file {file}: XML, as a URDF is, expected an arm laid out as config/arm.yaml; '
+            'read_urdf writes one from a URDF'
+        )
     try:
         return arm_from_mapping(load_yaml(file))
     except ModelError as problem:
         if str(file) in str(problem):
             raise
         raise ModelError(f'file {file}: {problem}') from problem
+
+
+def _begins_as_xml(path: Path) -> bool:
+    try:
+        with path.open('rb') as file:
+            return file.read(100).removeprefix(b'\xef\xbb\xbf').lstrip().startswith(b'<')
+    except OSError:
+        # What cannot be read is said by what reads it.
+        return False
 
 
 def _share_folders() -> list[Path]:

@@ -184,6 +184,13 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
     links = [link.name for link in model.robot.links]
     above = {joint.child: joint for joint in model.robot.joints}
     parents = {joint.parent for joint in model.robot.joints}
+    for joint in model.robot.joints:
+        for which, link in (('parent', joint.parent), ('child', joint.child)):
+            if link not in links:
+                raise ModelError(
+                    f'joint "{joint.name}": its {which} link "{link}" is not declared, expected '
+                    f'one of {links}'
+                )
     if len(above) < len(model.robot.joints):
         raise ModelError('URDF: two joints lead to the same link, expected a tree of links')
     if base is None:

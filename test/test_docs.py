@@ -15,6 +15,8 @@ IMAGE = re.compile(r'!\[[^\]]*\]\(([^)\s]+)\)')
 LINK = re.compile(r'(?<!!)\[[^\]]*\]\(([^)\s]+)\)')
 # A command in backticks, as one would type it.
 COMMAND = re.compile(r'`((?:\./run|python -m|ros2) [^`]+)`')
+# A snippet, and the example that the line before it names.
+SNIPPET = re.compile(r'^([^\n]*)\n\n```python\n(.*?)^```', re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r'^```.*?^```', re.MULTILINE | re.DOTALL)
 pytestmark = pytest.mark.skipif(
     not (ROOT / 'docs').is_dir(), reason='the documents are not installed'
@@ -92,6 +94,18 @@ def test_links_lead_somewhere(page):
         if fragment:
             headings = re.findall(r'^#+ (.*)$', prose(target), re.MULTILINE)
             assert fragment in map(anchor, headings), f'{page.name}: no heading for {link}'
+
+
+def test_snippets_of_the_readme_are_in_the_examples_that_it_names():
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    snippets = SNIPPET.findall(text)
+    assert len(snippets) == text.count('```python') > 0
+    for before, snippet in snippets:
+        (name,) = re.findall(r'`(examples/\w+\.py)`', before)
+        example = (ROOT / name).read_text(encoding='utf-8')
+        assert snippet in example, f'README.md quotes what {name} does not have'
+        # Complete: all that it needs, it imports.
+        assert example.split('"""')[2].strip().startswith(snippet.split('\n')[0])
 
 
 def spoken():

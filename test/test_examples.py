@@ -15,6 +15,7 @@ TOLD = {
     '01_plan_on_a_map': 'spiral: solved',
     '02_plan_on_the_arm': 'aim at the target; solved',
     '03_compare_planners': 'RRT-H',
+    '04_a_motion_round_the_wearer': 'solved: 2 waypoints, duration',
 }
 
 

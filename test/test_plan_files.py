@@ -64,6 +64,21 @@ def test_figures_as_json(capsys):
     assert 'torso' in streams.err
 
 
+def test_the_ray_is_printed_from_where_it_begins(capsys):
+    # The lamp of this arm is 0.04 m further out.
+    arm = ['--arm', str(resource_path('config/examples/chest_arm.yaml'))]
+    body = ['--body', str(resource_path('config/examples/seated_body.yaml'))]
+    asked = [*arm, *body, '--target', '1', '0.5', '0', '--seed', '1']
+    assert plan_files.main(asked) == 0
+    said = capsys.readouterr().out
+    assert '\n  ray from     0.6700 0.0000 0.1200 m along 1.0000 0.0000 0.0000\n' in said
+    assert 'tool at' not in said
+    assert plan_files.main([*asked, '--json']) == 0
+    start = json.loads(capsys.readouterr().out)['start']
+    np.testing.assert_allclose(start['ray_from_m'], (0.67, 0.0, 0.12), atol=1e-5)
+    np.testing.assert_allclose(start['ray'], (1.0, 0.0, 0.0), atol=1e-5)
+
+
 def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
     file = tmp_path / 'motion.csv'
     assert plan_files.main(['--target', '0', '0', '0.1', '--output', str(file)]) == 1
@@ -86,6 +101,7 @@ def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
         (['--output', 'motion.csv', '--period', '0'], 'period: 0.0, expected'),
         (['--period', '0.1'], '--period: without --output'),
         (['--arm', 'none.yaml'], 'none.yaml'),
+        (['--arm', str(resource_path('config/examples/chest_arm.urdf'))], 'read_urdf writes one'),
         (['--body', 'none.yaml'], 'none.yaml'),
         (['--settings', 'none.yaml'], 'none.yaml'),
     ],

@@ -9,13 +9,21 @@ import pytest
 
 pytest.importorskip('matplotlib')
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
+from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rrth_planner.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.trajectory import MotionLimits, Trajectory  # noqa: E402
 from rrth_planner.viewers.arm_view import arm_points, draw_way  # noqa: E402
-from rrth_planner.viewers.plots import Motion, motion_figure  # noqa: E402
+from rrth_planner.viewers.plots import (  # noqa: E402
+    draw_limits,
+    JOINT_COLOURS,
+    LIMIT,
+    Motion,
+    motion_figure,
+)
 
 ARM = load_arm()
 LIMITS = MotionLimits(velocity=[1.5] * 4, acceleration=[4.0] * 4, jerk=[40.0] * 4)
@@ -62,6 +70,28 @@ def test_each_motion_has_a_view_and_two_plots_whose_axes_carry_units(n_motions):
         assert 'lamp' in position.get_title(loc='left')
         names = [text.get_text() for text in position.get_legend().get_texts()]
         assert names == ['joint 1', 'joint 2', 'joint 3', 'joint 4', 'limits']
+
+
+def test_limits_have_the_colours_of_their_joints():
+    axes = Figure().add_subplot()
+    draw_limits(axes, np.array([[-1.0, -2.0, -2.0], [3.0, 3.0, 3.0]]))
+    found = {}
+    for line in axes.lines:
+        found.setdefault(line.get_ydata()[0], []).append(line.get_color())
+    one, two, three = JOINT_COLOURS[:3]
+    assert found == {-2.0: [two, three], -1.0: [one], 3.0: [LIMIT]}
+
+
+def test_dashes_of_joints_with_the_same_limit_take_turns():
+    figure = Figure(figsize=(5.0, 1.0), dpi=300)
+    canvas, axes = FigureCanvasAgg(figure), figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.set_ylim(-1.0, 3.0)
+    draw_limits(axes, np.array([[1.0, 2.0, 2.0], [0.0, 2.0, 2.0]]))
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3] / 255.0
+    for colour in JOINT_COLOURS[:3]:
+        assert (np.abs(pixels - to_rgb(colour)).max(axis=2) < 0.2).sum() > 50, colour
 
 
 def test_the_picture_is_not_blank():

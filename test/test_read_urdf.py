@@ -147,6 +147,33 @@ def test_axes_next_to_parallel_are_told(tmp_path, capsys):
     assert 'bars' not in capsys.readouterr().out.replace('straight bars', '')
 
 
+def test_a_joint_without_velocity_is_named(tmp_path, capsys):
+    chest = resource_path('config/examples/chest_arm.urdf').read_text()
+    output, said = ['--ray', '+x', '--output', str(tmp_path / 'arm.yaml')], []
+    for text in (chest.replace(' velocity="1.6"', '', 1), chest.replace(' velocity="', ' v="')):
+        assert read_urdf.main([str(file_of(tmp_path, text)), *output]) == 0
+        said.append([line for line in capsys.readouterr().out.split('\n') if 'max_vel' in line])
+    ((line,), none) = said
+    assert '[?, 1.6, 1.6, 2.4, 2.4, 2.4]; it gives none for turn: write one' in line
+    assert none == []
+
+
+@pytest.mark.parametrize(
+    ('which', 'left'),
+    [('child', 'l1'), ('parent', 'base'), ('child', 'tool')],
+)
+def test_a_link_that_is_not_declared_is_named(tmp_path, capsys, which, left):
+    joints = [joint('a', 'revolute', 'base', 'l1', **TURN), LAST]
+    text = urdf(joints).replace(f'<link name="{left}" />', '')
+    assert text != urdf(joints)
+    arguments = [str(file_of(tmp_path, text)), '--output', str(tmp_path / 'arm.yaml')]
+    assert read_urdf.main(arguments) == 2
+    said = capsys.readouterr().err
+    name = 'last' if left == 'tool' else 'a'
+    assert f'joint "{name}": its {which} link "{left}" is not declared, expected one of' in said
+    assert said.count('\n') == 1
+
+
 def test_lines_that_are_no_numbers_are_refused():
     with pytest.raises(ModelError, match='finite'):
         rows_of_axes(np.full((2, 3), np.nan), np.eye(3)[:2], np.eye(3)[2])

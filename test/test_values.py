@@ -277,6 +277,15 @@ def test_the_paper_arm_is_the_one_in_the_package():
         assert np.array_equal(getattr(packaged, name), getattr(own, name)), name
 
 
+@pytest.mark.parametrize('before', ['', '\ufeff', '\n <!-- an arm: -->\n'])
+def test_a_urdf_is_no_arm_file_and_is_sent_to_read_urdf(tmp_path, before):
+    resources = pytest.importorskip('rrth_planner.resources', exc_type=ImportError)
+    file = tmp_path / 'arm.yaml'
+    file.write_text(f'{before}<robot name="a"><link name="b"/></robot>', encoding='utf-8')
+    words = (f'file {file}: XML, as a URDF is', 'read_urdf writes one')
+    refuses(ModelError, lambda: resources.load_arm(file), *words)
+
+
 @examples(300)
 @given(parts=st.tuples(*[st.floats(-1.0, 1.0)] * 4))
 def test_a_quaternion_comes_back_from_its_rotation(parts):

@@ -247,7 +247,7 @@ def test_a_bar_along_z_joins_two_points():
 
 def test_a_motion_plays_to_its_end_and_again():
     player = Player().loaded(2.0)
-    assert player.time == 2.0
+    assert player.time == 0.0
     player = player.toggled()
     assert (player.time, player.is_playing) == (0.0, True)
     assert replace(player, speed=0.5).advanced(1.0).time == 0.5
@@ -257,6 +257,19 @@ def test_a_motion_plays_to_its_end_and_again():
     assert (again.time, again.is_playing) == (0.0, True)
     assert player.moved(9.0).time == 2.0
     assert ended.moved(1.0).loaded(4.0).time == 2.0
+
+
+def test_another_target_shows_where_the_arm_comes_to():
+    opened = Player().loaded(2.0)
+    aimed = opened.aimed()
+    assert (opened.time, aimed.time, aimed.loaded(3.0).time) == (0.0, 2.0, 3.0)
+    # Also after a refusal, which has no motion.
+    assert aimed.loaded(0.0).aimed().loaded(3.0).time == 3.0
+    assert Player().aimed().loaded(3.0).time == 3.0
+    halfway = opened.moved(1.0)
+    assert halfway.aimed() == halfway
+    playing = opened.toggled()
+    assert playing.aimed() == playing
 
 
 def can_listen_on(host):
@@ -297,6 +310,16 @@ def test_a_host_that_is_none_of_this_machine_is_one_sentence(host, capsys):
     said = capsys.readouterr().err
     assert f'--host {host} --port 8081: ' in said
     assert 'expected an address of this machine' in said
+    assert said.count('\n') == 1
+
+
+def test_a_port_that_is_taken_is_one_sentence(capsys):
+    with socket.create_server(('127.0.0.1', 0)) as listener:
+        port = listener.getsockname()[1]
+        assert main(['--port', str(port), '--no-open']) == 1
+    said = capsys.readouterr().err
+    assert f'--port {port}: ' in said
+    assert '--port 0: any that is' in said
     assert said.count('\n') == 1
 
 

@@ -93,7 +93,7 @@ def _run(options: argparse.Namespace) -> None:
 
     domain = os.environ['ROS_DOMAIN_ID']
     print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
-    print('Only the first time, compiling the planner may take a minute.', flush=True)
+    print('Only the first time, compiling the planner may take a minute or two.', flush=True)
     with ExitStack() as stack:
         children = [
             stack.enter_context(

@@ -63,7 +63,7 @@ def motion_figure(
     motions : sequence of Motion
         At least one; each has a row.
     limits : MotionLimits
-        Drawn as dashed lines.
+        Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float
         How much of the pointing ray was guarded in motion [m].
 
@@ -115,10 +115,8 @@ def _draw_curves(
         velocity.plot(times, v[:, i], color=colour, lw=2.0)
     unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
     position.plot([], [], color=LIMIT, lw=1.0, ls=DASHES, label='limits')
-    for value in np.unique(arm.bounds.round(6)):
-        _draw_limit(position, float(value))
-    for value in np.unique(np.concatenate([-limits.velocity, limits.velocity]).round(6)):
-        _draw_limit(velocity, float(value))
+    draw_limits(position, arm.bounds)
+    draw_limits(velocity, np.stack([-limits.velocity, limits.velocity]))
     position.set_ylabel(f'position [{unit}]')
     velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
     velocity.set_xlabel('time [s]')
@@ -143,5 +141,26 @@ def _draw_curves(
             axes.spines[side].set_visible(False)
 
 
-def _draw_limit(axes: Any, value: float) -> None:
-    axes.axhline(value, color=LIMIT, lw=1.0, ls=DASHES, alpha=0.75)
+def draw_limits(axes: Any, limits: Array) -> None:
+    """
+    Draw each joint's limits in its colour, dash by dash where several have it, grey where all do.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    limits : ndarray, shape (n, dof)
+        A row a limit, such as the lower and the upper ones.
+
+    """
+    rounded, dof = np.round(limits, 6), limits.shape[1]
+    on, off = DASHES[1]
+    for value in np.unique(rounded):
+        joints = np.flatnonzero((rounded == value).any(axis=0))
+        if len(joints) == dof:
+            axes.axhline(float(value), color=LIMIT, lw=1.0, ls=DASHES, alpha=0.75)
+            continue
+        gap = (on + off) * len(joints) - on
+        for turn, joint in enumerate(joints):
+            colour = JOINT_COLOURS[joint % len(JOINT_COLOURS)]
+            style = (turn * (on + off), (on, gap))
+            axes.axhline(float(value), color=colour, lw=1.2, ls=style, alpha=0.9)

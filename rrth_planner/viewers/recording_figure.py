@@ -17,7 +17,7 @@ from rrth_planner.scene import Scene
 from rrth_planner.settings import PlanSettings
 from rrth_planner.viewers.arm_view import arm_points, draw_way, N_POSTURES, STOP
 from rrth_planner.viewers.line_of_sight import best_view
-from rrth_planner.viewers.plots import DASHES, JOINT_COLOURS, LIMIT, TIME_STEP
+from rrth_planner.viewers.plots import DASHES, draw_limits, JOINT_COLOURS, LIMIT, TIME_STEP
 
 SIZE = (14.0, 8.6)
 # Of the view of the arm: its width over its height.
@@ -191,8 +191,7 @@ def _draw_joints(
     unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
     position.set_ylabel(f'position [{unit}]')
     velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
-    for value in np.unique(np.concatenate([s * settings.limits.velocity for s in (-1, 1)])):
-        velocity.axhline(float(value), color=LIMIT, lw=1.0, ls=DASHES, alpha=0.75)
+    draw_limits(velocity, np.stack([-settings.limits.velocity, settings.limits.velocity]))
     low, high = position.get_ylim()
     position.set_ylim(low - 0.2 * (high - low), high)
     position.legend(

@@ -112,7 +112,7 @@ def _run_planning(options: argparse.Namespace) -> None:
     question = _question(options)
     if not is_compiled():
         how_often = 'at every start' if cache_folder() is None else 'once for this machine'
-        print(f'Compiling the planner, {how_often}: takes up to a minute.', flush=True)
+        print(f'Compiling the planner, {how_often}: takes a minute or two.', flush=True)
         if cache_folder() is not None:
             compile_kernels()
     warm_up(question.arm, question.options)
@@ -123,6 +123,7 @@ def _run_planning(options: argparse.Namespace) -> None:
                 page.run()
             else:
                 page.model.wait(1, question.options.time_limit + 60.0)
+                page.show_end()
                 page.draw()
                 save_picture(url, options.screenshot)
         finally:
@@ -221,7 +222,7 @@ def _free_port(host: str, port: int) -> int:
     except (OSError, OverflowError, UnicodeError) as problem:
         raise OptionsError(
             f'--host {host} --port {port}: {problem}; expected an address of this machine and a '
-            'port that is free'
+            'port that is free (--port 0: any that is)'
         ) from problem
 
 

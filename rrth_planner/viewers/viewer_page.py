@@ -94,6 +94,10 @@ class ViewerPage:
         self.panel.play.label = 'Pause' if player.is_playing else 'Play'
         self.panel.time.value = round(player.time, 3)
 
+    def show_end(self) -> None:
+        """Show where the motion comes to."""
+        self._play(Player.at_end)
+
     def close(self) -> None:
         """End the thread that plans."""
         self.model.close()
@@ -161,6 +165,7 @@ class ViewerPage:
         target = np.asarray(self.view.target.position, dtype=np.float64)
         self.panel.target.value = tuple(target.round(4).tolist())
         self.panel.target_example.value = OWN
+        self._play(Player.aimed)
         self.model.ask(target=target)
 
     def _on_numbers(self) -> None:
@@ -175,6 +180,7 @@ class ViewerPage:
 
     def _aim(self, target: Any) -> None:
         self.view.target.position = target
+        self._play(Player.aimed)
         self.model.ask(target=target)
 
     def _on_body_example(self) -> None:

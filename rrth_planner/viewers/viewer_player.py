@@ -14,6 +14,8 @@ class Player:
     ----------
     duration, time : float
         Of the motion, and within it [s].
+    share : float
+        How far along the last motion was left, where there is none now [-].
     speed : float
         How much faster than the clock, > 0 [-].
     is_playing, is_repeating : bool
@@ -22,6 +24,7 @@ class Player:
 
     duration: float = 0.0
     time: float = 0.0
+    share: float = 0.0
     speed: float = 1.0
     is_playing: bool = False
     is_repeating: bool = False
@@ -48,8 +51,16 @@ class Player:
         """Return it at another time of the motion [s]."""
         return replace(self, time=min(max(0.0, time), self.duration))
 
+    def at_end(self) -> 'Player':
+        """Return it at the end of the motion, or of the next one where there is none."""
+        return replace(self, time=self.duration, share=1.0)
+
+    def aimed(self) -> 'Player':
+        """Return it for another target: from the begin it goes to where the arm points."""
+        return self if self.is_playing or self.time > 0.0 else self.at_end()
+
     def loaded(self, duration: float) -> 'Player':
         """Return it in another motion [s]: at its begin when playing, else as far along."""
-        share = self.time / self.duration if self.duration > 0.0 else 1.0
+        share = self.time / self.duration if self.duration > 0.0 else self.share
         time = 0.0 if self.is_playing else share * duration
-        return replace(self, duration=duration, time=time)
+        return replace(self, duration=duration, time=time, share=share)
