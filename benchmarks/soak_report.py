@@ -33,9 +33,7 @@ METHOD = """\
   before the planner's own time of publication, or from the one before it, which may have been
   on its way.
 - **Memory** is the resident set of the node every 20 plans; growth is the most after the first
-  tenth of the samples less what it was then. What rclpy 7.1.6 keeps of each message that is
-  published (a bare node keeps 0.1 to 0.4 kB of a path, of markers, of a trajectory) makes
-  0.6 kB a plan.
+  tenth of the samples less what it was then.
 - **Hands**: planner and playback run as processes. While a motion runs a cube appears where a
   bar of the arm or its ray is about to come, 0.05 s to 1.5 s ahead. The arm's joint states are
   judged against the boxes without any margin until the arm rests. The time from the body to the
