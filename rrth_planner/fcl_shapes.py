@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.reach import bar_ends, bar_names
-from rrth_planner.scene import Scene
+from rrth_planner.scene import Box, Scene
 
 # Bars become capsules this thin, and their radius is taken off the distance: of thick ones the
 # library overestimates it by up to half a millimetre. Then it is good to a few micrometres, rarely
@@ -18,15 +18,42 @@ from rrth_planner.scene import Scene
 THINNEST, DOUBT = 1e-6, 1e-3
 
 
+class _Shape:
+    """
+    A shape and its object, which are used again by whoever needs one next.
+
+    python-fcl 0.7 does not free an object wholly: the counter of its shared pointer stays.
+    """
+
+    def __init__(self, geometry: fcl.CollisionGeometry) -> None:
+        self.geometry, self.item = geometry, fcl.CollisionObject(geometry)
+
+
+# Appending and popping are whole steps, whatever the threads.
+_spare_boxes: list[_Shape] = []
+_spare_capsules: list[_Shape] = []
+
+
+def _box(box: Box) -> _Shape:
+    try:
+        shape = _spare_boxes.pop()
+    except IndexError:
+        shape = _Shape(fcl.Box(1.0, 1.0, 1.0))
+    shape.geometry.side = box.size
+    shape.geometry.computeLocalAABB()
+    shape.item.setTransform(fcl.Transform(box.rotation, box.center))
+    return shape
+
+
 class Boxes:
     """The boxes of a scene as objects of the library."""
 
     def __init__(self, scene: Scene) -> None:
         self.names = [box.name for box in scene.boxes]
-        self._objects = [
-            fcl.CollisionObject(fcl.Box(*box.size), fcl.Transform(box.rotation, box.center))
-            for box in scene.boxes
-        ]
+        self._shapes = [_box(box) for box in scene.boxes]
+
+    def __del__(self) -> None:
+        _spare_boxes.extend(self._shapes)
 
     def nearest(self, item: fcl.CollisionObject, bounds: Array) -> tuple[float, int]:
         """
@@ -39,7 +66,7 @@ class Boxes:
         for j in np.argsort(bounds).tolist():
             if bounds[j] - DOUBT >= least:
                 break
-            bounds[j] = distance = fcl.distance(item, self._objects[j], _REQUEST, _RESULT)
+            bounds[j] = distance = fcl.distance(item, self._shapes[j].item, _REQUEST, _RESULT)
             if distance < least:
                 least, nearest = distance, j
         return least, nearest
@@ -65,8 +92,14 @@ class Bar:
         is_sliding = end == 'd' and not self._is_ray and arm.is_prismatic[row]
         self._slide = row if is_sliding else None
         self._radius = float(arm.radii[row])
-        self._length = math.nan
-        self._shape(abs(self._offset))
+        try:
+            self._capsule = _spare_capsules.pop()
+        except IndexError:
+            self._capsule = _Shape(fcl.Capsule(THINNEST, 1.0))
+        self._stretch(self._offset)
+
+    def __del__(self) -> None:
+        _spare_capsules.append(self._capsule)
 
     def nearest(self, boxes: Boxes, bounds: Array, q: Array, poses: Array) -> tuple[float, int]:
         """
@@ -78,16 +111,16 @@ class Bar:
         offset = self._offset
         if self._slide is not None:
             offset += float(q[self._slide])
-            self._shape(abs(offset))
+            self._stretch(offset)
         # A capsule lies along its own z, centred.
         rotation = pose[:3, [1, 2, 0]] if self._is_a else pose[:3, :3]
         ahead = 0.5 * offset if self._is_a or self._is_ray else -0.5 * offset
-        self._capsule.setRotation(rotation)
-        self._capsule.setTranslation(pose[:3, 3] + ahead * rotation[:, 2])
-        distance, box = boxes.nearest(self._capsule, bounds)
+        item = self._capsule.item
+        item.setRotation(rotation)
+        item.setTranslation(pose[:3, 3] + ahead * rotation[:, 2])
+        distance, box = boxes.nearest(item, bounds)
         return distance + THINNEST - self._radius, box
 
-    def _shape(self, length: float) -> None:
-        if length != self._length:
-            self._length = length
-            self._capsule = fcl.CollisionObject(fcl.Capsule(THINNEST, length))
+    def _stretch(self, offset: float) -> None:
+        self._capsule.geometry.lz = abs(offset)
+        self._capsule.geometry.computeLocalAABB()

@@ -19,6 +19,7 @@ from worlds import (
 )
 
 fcl_check = pytest.importorskip('rrth_planner.fcl_check', exc_type=ImportError)
+fcl_shapes = pytest.importorskip('rrth_planner.fcl_shapes', exc_type=ImportError)
 
 
 def straight(q_from, q_to, duration=1.0):
@@ -220,3 +221,28 @@ def test_nothing_touches_where_there_is_nothing():
     arm = table_1_arm()
     trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))
     assert fcl_check.first_touch(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
+
+
+def test_objects_of_the_library_are_used_again(monkeypatch):
+    rng = np.random.default_rng(26)
+    arm = table_1_arm()
+    bodies = [random_boxes(rng, 1 + i) for i in range(12)]
+    q_from, q_to = np.array([-1.5, -0.8, 0.0, 0.5]), np.array([1.5, -1.6, 0.6, 0.5])
+    made, new = [], fcl_shapes.fcl.CollisionObject
+
+    def counted(*arguments):
+        made.append(arguments)
+        return new(*arguments)
+
+    def look():
+        motion = straight(q_from, q_to)
+        touches = [fcl_check.first_touch(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies]
+        return [touch and (touch.time, touch.distance, touch.bar, touch.box) for touch in touches]
+
+    before = look()
+    monkeypatch.setattr(fcl_shapes.fcl, 'CollisionObject', counted)
+    assert look() == before
+    # Each that is deleted would leave some bytes behind.
+    assert not made
+    assert any(before)
+    assert not all(before)
