@@ -9,7 +9,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.bernstein import first_outside, to_bernstein
 from rrth_planner.errors import MessageError, OptionsError
-from rrth_planner.playback import Playback
+from rrth_planner.playback import at_present, Playback
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # Planned limits may be touched; a motion is refused when it goes further than this beyond them.
@@ -67,6 +67,9 @@ def accept(
     """
     Return what the arm does when a new motion replaces the present one.
 
+    Until a motion begins that begins later, the arm goes on with what it does now; one that has
+    not begun when another comes never does.
+
     Parameters
     ----------
     playback : Playback
@@ -82,14 +85,20 @@ def accept(
     Raises
     ------
     MessageError
-        The new motion is not at the present state now, leaves limits somewhere, or ends more
-        than an hour ahead. Within `start_tolerance` the arm steps onto it.
+        The new motion is not where the arm is now, or will be when it begins, leaves limits
+        somewhere, or ends more than an hour ahead. Within `start_tolerance` the arm steps onto it.
 
     """
-    new = Playback(trajectory=trajectory, start_time=start_time, time_scale=rules.time_scale)
+    before = at_present(playback, time)
+    new = Playback(
+        trajectory=trajectory,
+        start_time=start_time,
+        time_scale=rules.time_scale,
+        before=before if start_time > time else None,
+    )
     # Numbers that overflow become infinite or NaN, which every comparison below refuses.
     with np.errstate(all='ignore'):
-        _check_start(playback, new, arm, rules, time)
+        _check_start(before, new, arm, rules, max(time, start_time))
         _check_limits(new, arm, rules)
         ahead = new.end_time - time
     if not ahead <= LONGEST_WAIT:
@@ -102,7 +111,7 @@ def accept(
 def _check_start(
     playback: Playback, new: Playback, arm: ArmModel, rules: PlaybackRules, time: float
 ) -> None:
-    """Raise MessageError where a motion is not at the present state now."""
+    """Raise MessageError where a motion is not where the arm is when it is taken over [s]."""
     q, v, _ = playback.state_at(time)
     q_new, v_new, _ = new.state_at(time)
     for what, unit, wanted, present in (

@@ -4,6 +4,7 @@
 
 import functools
 import math
+from typing import ClassVar
 
 import fcl
 import numpy as np
@@ -29,31 +30,28 @@ class _Shape:
         self.geometry, self.item = geometry, fcl.CollisionObject(geometry)
 
 
-# Appending and popping are whole steps, whatever the threads.
-_spare_boxes: list[_Shape] = []
-_spare_capsules: list[_Shape] = []
-
-
-def _box(box: Box) -> _Shape:
-    try:
-        shape = _spare_boxes.pop()
-    except IndexError:
-        shape = _Shape(fcl.Box(1.0, 1.0, 1.0))
-    shape.geometry.side = box.size
-    shape.geometry.computeLocalAABB()
-    shape.item.setTransform(fcl.Transform(box.rotation, box.center))
-    return shape
-
-
 class Boxes:
     """The boxes of a scene as objects of the library."""
 
+    # To append and to pop are whole steps, whatever the threads.
+    _spare: ClassVar[list[_Shape]] = []
+
     def __init__(self, scene: Scene) -> None:
         self.names = [box.name for box in scene.boxes]
-        self._shapes = [_box(box) for box in scene.boxes]
+        self._shapes = [self._placed(box) for box in scene.boxes]
 
     def __del__(self) -> None:
-        _spare_boxes.extend(self._shapes)
+        self._spare.extend(self._shapes)
+
+    def _placed(self, box: Box) -> _Shape:
+        try:
+            shape = self._spare.pop()
+        except IndexError:
+            shape = _Shape(fcl.Box(1.0, 1.0, 1.0))
+        shape.geometry.side = box.size
+        shape.geometry.computeLocalAABB()
+        shape.item.setTransform(fcl.Transform(box.rotation, box.center))
+        return shape
 
     def nearest(self, item: fcl.CollisionObject, bounds: Array) -> tuple[float, int]:
         """
@@ -81,6 +79,8 @@ boxes_of = functools.lru_cache(maxsize=8)(Boxes)
 class Bar:
     """One bar of an arm as a capsule, which a look puts in its place."""
 
+    _spare: ClassVar[list[_Shape]] = []
+
     def __init__(self, arm: ArmModel, k: int, ray_length: float) -> None:
         self.k, self.name = k, bar_names(arm)[k]
         row, end = bar_ends(arm)[k]
@@ -93,13 +93,13 @@ class Bar:
         self._slide = row if is_sliding else None
         self._radius = float(arm.radii[row])
         try:
-            self._capsule = _spare_capsules.pop()
+            self._capsule = self._spare.pop()
         except IndexError:
             self._capsule = _Shape(fcl.Capsule(THINNEST, 1.0))
         self._stretch(self._offset)
 
     def __del__(self) -> None:
-        _spare_capsules.append(self._capsule)
+        self._spare.append(self._capsule)
 
     def nearest(self, boxes: Boxes, bounds: Array, q: Array, poses: Array) -> tuple[float, int]:
         """

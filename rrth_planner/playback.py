@@ -26,7 +26,9 @@ class Playback:
     trajectory : Trajectory
         A single point is an arm that stands still.
     start_time : float
-        When the motion begins; before, the arm stands at its first point [s].
+        When the motion begins [s].
+    before : Playback or None
+        What the arm does until then; None: it stands at the first point.
     time_scale : float
         Seconds of the motion per second of the clock [-].
     brake_time : float
@@ -38,6 +40,7 @@ class Playback:
     trajectory: Trajectory
     start_time: float
     time_scale: float
+    before: 'Playback | None' = None
     brake_time: float = float('inf')
     brake: RateProfile | None = None
 
@@ -68,10 +71,16 @@ class Playback:
             Positions [rad], velocities [rad/s], accelerations [rad/s^2].
 
         """
-        phase, rate, slope = self.phase(np.atleast_1d(times))
+        t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        phase, rate, slope = self.phase(t)
         q, v, a = sample(self.trajectory, phase)
         rate, slope = rate[:, None], slope[:, None]
-        return q, v * rate, a * rate**2 + v * slope
+        states = q, v * rate, a * rate**2 + v * slope
+        is_early = t < self.start_time
+        if self.before is not None and is_early.any():
+            for values, earlier in zip(states, self.before.states_at(t[is_early]), strict=True):
+                values[is_early] = earlier
+        return states
 
     def state_at(self, time: float) -> tuple[Array, Array, Array]:
         """Return positions, velocities, accelerations at one time, each of shape (dof,)."""
@@ -87,6 +96,13 @@ def standing(q: ArrayLike) -> Playback:
         times=np.zeros(1), positions=positions, velocities=still, accelerations=still
     )
     return Playback(trajectory=point, start_time=0.0, time_scale=1.0)
+
+
+def at_present(playback: Playback, time: float) -> Playback:
+    """Return what an arm does now, without a motion that only begins after a time [s]."""
+    if playback.before is None:
+        return playback
+    return playback.before if time < playback.start_time else replace(playback, before=None)
 
 
 def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
@@ -105,6 +121,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
         Now [s].
 
     """
+    playback = at_present(playback, time)
     if playback.brake is not None or time >= playback.end_time:
         return playback
     if time <= playback.start_time:

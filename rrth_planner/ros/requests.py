@@ -36,6 +36,8 @@ START_TOLERANCE = 1e-3
 # How far ahead a motion begins that takes over from one that runs: that long its plan may take,
 # and once more with more time [s].
 LEADS = (0.05, 0.25)
+# So long before it begins such a motion is told, so that the arm has it in time [s].
+EARLY = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +108,7 @@ def plan_request(
     Return the outcome of a request that begins now.
 
     A motion for an arm that moves begins with the state that the arm is going to be in shortly,
-    and this returns when that time has come.
+    and this returns not long before.
 
     Parameters
     ----------
@@ -196,13 +198,14 @@ def _question(
 def _wait_for(
     start: Start | None, clock: Callable[[], float], should_stop: Callable[[], bool]
 ) -> None:
-    """Return when a motion is to begin; at once for an arm at rest."""
+    """Return when a motion is to be told; at once for an arm at rest."""
     # A simulated clock may stand still.
     end = time.monotonic() + 2 * LEADS[-1]
-    while start is not None and clock() < start.time and time.monotonic() < end:
-        if should_stop():
+    while start is not None and time.monotonic() < end and not should_stop():
+        left = start.time - EARLY - clock()
+        if left <= 0.0:
             return
-        time.sleep(min(1e-3, max(1e-5, start.time - clock())))
+        time.sleep(min(1e-3, max(1e-5, left)))
 
 
 def _check_present(

@@ -92,7 +92,8 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, spi
     assert (np.abs(v) <= 1.01 * limits.velocity).all()
     assert (np.abs(np.diff(v, axis=0)) <= 1.01 * limits.acceleration * step + 5e-3).all()
     jump = np.diff(q, axis=0) - 0.5 * step * (v[1:] + v[:-1])
-    assert np.abs(jump).max() < 2e-3
+    # Where the busy machine lost messages the steps are long; the velocity bends within them.
+    assert (np.abs(jump) <= 1e-3 + limits.jerk * step**3 / 12.0).all()
     last = [t for t, (_, answer) in zip(TARGETS * ROUNDS, answers, strict=True) if answer.success]
     tool = oracle.frames(worlds.table_1_arm(), q[-1:])[0, -1]
     past = last[-1] - tool[:3, 3]
