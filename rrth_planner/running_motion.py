@@ -8,8 +8,8 @@ import math
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.kernels.following import time_on
-from rrth_planner.takeover import SAME_POSITION
-from rrth_planner.trajectory import piece_coefficients, positions_at, Trajectory
+from rrth_planner.takeover import REST_SPEED, SAME_POSITION
+from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
 
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
 SLOW, LATEST = 0.05, 0.05
@@ -17,6 +17,12 @@ SLOW, LATEST = 0.05, 0.05
 ELSEWHERE = 0.1
 # Places of a motion at which an arm is looked for [s].
 SPACING = 5e-3
+# An arm that is so near to where its motion is now is on time [rad].
+ON_TIME = 5e-4
+# For so long after its begin a motion has hardly left the place where it begins [s].
+BEGINNING = 0.05
+# Instants that are looked at to tell whether it moves soon.
+N_SOON = 9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -77,6 +83,19 @@ class RunningMotion:
             nearest = float(near[np.abs(near - guess).argmin()])
             at = self._near(nearest, q, math.inf)
         return float(at) + now - taken
+
+    def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
+        """Return whether an arm was where the motion is at that time, and as fast [rad, s]."""
+        since = taken - self.start_time
+        if not BEGINNING <= since <= self.trajectory.duration:
+            return False
+        wanted, pace, _ = (values[0] for values in sample(self.trajectory, [since]))
+        return bool(np.abs(wanted - q).max() <= ON_TIME and np.abs(pace - v).max() <= REST_SPEED)
+
+    def will_move(self, time: float, span: float) -> bool:
+        """Return whether the motion moves soon after a time [s], within a span [s]."""
+        since = time - self.start_time + np.linspace(0.0, span, N_SOON)
+        return bool((np.abs(sample(self.trajectory, since)[1]) > REST_SPEED).any())
 
     def _near(self, guess: float, q: Array, same: float) -> float:
         motion = self.trajectory

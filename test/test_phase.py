@@ -53,3 +53,35 @@ def test_an_arm_that_is_elsewhere_is_nowhere_on_its_motion():
     assert running.phase(np.full(4, np.nan), 10.5, 10.5) is None
     # It may still be on its way there.
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 9.8, 9.9) == pytest.approx(-0.1)
+
+
+def _two_swings():
+    """Return a motion that rests at 1 s, in its middle."""
+    still = np.zeros((3, 4))
+    corner = [0.4, -0.3, 0.2, 0.1]
+    return Trajectory(
+        times=[0.0, 1.0, 2.0],
+        positions=[np.zeros(4), corner, [0.1, -0.3, 0.4, 0.1]],
+        velocities=still,
+        accelerations=still,
+    )
+
+
+@pytest.mark.parametrize(
+    ('at', 'goes_on'), [(0.4, True), (0.99, True), (1.01, True), (1.98, False), (2.0, False)]
+)
+def test_an_arm_is_on_time_where_its_motion_is(at, goes_on):
+    motion = _two_swings()
+    running = RunningMotion(trajectory=motion, start_time=10.0)
+    q, v, _ = (values[0] for values in sample(motion, [at]))
+    assert running.is_on_time(q, v, 10.0 + at)
+    assert not running.is_on_time(q + [0.0, 0.001, 0.0, 0.0], v, 10.0 + at)
+    assert not running.is_on_time(q, v + [0.0, 0.02, 0.0, 0.0], 10.0 + at)
+    assert not running.is_on_time(q, np.full(4, np.nan), 10.0 + at)
+    assert running.will_move(10.0 + at, 0.05) == goes_on
+
+
+def test_an_arm_that_never_began_is_not_on_time():
+    running = RunningMotion(trajectory=_two_swings(), start_time=10.0)
+    for since in (-0.1, 0.0, 0.02, 0.049, 0.06, 0.5, 1.0, 3.0):
+        assert not running.is_on_time(np.zeros(4), np.zeros(4), 10.0 + since)

@@ -14,9 +14,9 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
 from rrth_planner.ros.messages import JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED, Takeover, takeover
-from rrth_planner.trajectory import Trajectory
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].
@@ -103,7 +103,16 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
 
-    def ahead(self, running: Trajectory | None, time: float, arm: ArmModel) -> Takeover:
+    def pauses(self, running: RunningMotion | None, now: float, span: float) -> bool:
+        """Return whether the arm rests within its motion, to go on in less than a span [s]."""
+        return (
+            running is not None
+            and not self.is_moving(now)
+            and self._is_on_time(running)
+            and running.will_move(now, span)
+        )
+
+    def ahead(self, running: RunningMotion | None, time: float, arm: ArmModel) -> Takeover:
         """Return what an arm that moves will do at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
@@ -111,9 +120,19 @@ class PlanInputs:
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
+        phase = None
+        if running is not None and not self.is_moving(joints.taken) and self._is_on_time(running):
+            # No velocity tells how far an arm has come that rests for a moment.
+            phase = joints.taken - running.start_time
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
-            found = takeover(joints.positions, joints.velocities, running, time - joints.taken)
+            found = takeover(
+                joints.positions,
+                joints.velocities,
+                None if running is None else running.trajectory,
+                time - joints.taken,
+                phase,
+            )
         if not np.isfinite(found.state.positions).all():
             raise RequestError(
                 ErrorCode.START_STATE_INVALID,
@@ -121,6 +140,10 @@ class PlanInputs:
                 f'{time - joints.taken:.3f} s later',
             )
         return found
+
+    def _is_on_time(self, running: RunningMotion) -> bool:
+        joints = self.joints
+        return running.is_on_time(joints.positions, joints.velocities, joints.taken)
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)

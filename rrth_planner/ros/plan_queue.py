@@ -168,7 +168,7 @@ class PlanQueue:
                 self._now,
                 lambda: ticket.is_cancelled,
                 goal,
-                None if running is None else running.trajectory,
+                running,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             incident = outcome.incident

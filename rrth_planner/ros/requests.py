@@ -23,6 +23,7 @@ from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import Takeover
 from rrth_planner.touch import Disagreement
@@ -51,14 +52,14 @@ class Start:
         [s].
     takeover : Takeover
         What the arm does then.
-    running : Trajectory or None
+    running : RunningMotion or None
         The motion that it was last told to follow.
 
     """
 
     time: float
     takeover: Takeover
-    running: Trajectory | None
+    running: RunningMotion | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +103,7 @@ def plan_request(
     clock: Callable[[], float],
     should_stop: Callable[[], bool],
     goal: PointingGoal | None = None,
-    running: Trajectory | None = None,
+    running: RunningMotion | None = None,
 ) -> PlanOutcome:
     """
     Return the outcome of a request that begins now.
@@ -121,7 +122,7 @@ def plan_request(
         Polled while planning; True cancels.
     goal : PointingGoal, optional
         Of the request; without, the last target.
-    running : Trajectory, optional
+    running : RunningMotion, optional
         The motion that the arm was last told to follow.
 
     Raises
@@ -140,7 +141,7 @@ def plan_request(
                     ErrorCode.PREEMPTED, 'the request was cancelled before its turn'
                 )
             start = None
-            if inputs.is_moving(now):
+            if inputs.is_moving(now) or inputs.pauses(running, now, lead):
                 start = Start(
                     now + lead, inputs.ahead(running, now + lead, parameters.arm), running
                 )

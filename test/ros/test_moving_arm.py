@@ -1,0 +1,117 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a request makes of an arm that follows its motion, on a clock of its own."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from rclpy.node import Node  # noqa: E402
+from rrth_planner.goal import PointingGoal  # noqa: E402
+from rrth_planner.ros.edits import BodyPart  # noqa: E402
+from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.inputs import Input, Inputs  # noqa: E402
+from rrth_planner.ros.joints import JointReading  # noqa: E402
+from rrth_planner.ros.messages import WearerBody  # noqa: E402
+from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.requests import EARLY, LEADS, plan_request  # noqa: E402
+from rrth_planner.running_motion import RunningMotion  # noqa: E402
+from rrth_planner.trajectory import sample, Trajectory  # noqa: E402
+import worlds  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+BEGIN, TARGET = 100.0, PointingGoal(np.array([2.0, 0.3, 0.4]))
+
+
+class Following(Input):
+    """Joint states of an arm that is where its motion is whenever somebody looks."""
+
+    def __init__(self, motion, clock):
+        """Say where the arm is by a clock."""
+        self._motion, self._clock = motion, clock
+        super().__init__('joints', None)
+
+    def at(self, now):
+        """Return the reading of that time."""
+        q, v, _ = (values[0] for values in sample(self._motion, [now - BEGIN]))
+        return JointReading(q, v, now, now, float('inf'))
+
+    value = property(lambda self: self.at(self._clock()), lambda self, _: None)
+    received = property(lambda self: self._clock(), lambda self, _: None)
+
+
+class Clock:
+    """A clock on which a little time passes whenever somebody looks at it."""
+
+    def __init__(self, now):
+        """Begin at a time [s]."""
+        self.now = now
+
+    def __call__(self):
+        """Return the time [s]."""
+        self.now += 2e-4
+        return self.now
+
+
+@pytest.fixture(name='ask')
+def _ask():
+    """Give what asks for a plan at a time since a motion began [s]."""
+    node = Node('moving_arm')
+    parameters = declare_parameters(node)
+
+    def ask(motion, since, is_known=True):
+        clock = Clock(BEGIN + since)
+        heard = Inputs('body', 'target', 'joints')
+        boxes = worlds.wearer().boxes
+        parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in boxes)
+        heard.body.accept(lambda: WearerBody(parts), clock())
+        heard.joints = Following(motion, clock)
+        running = RunningMotion(trajectory=motion, start_time=BEGIN) if is_known else None
+        outcome = plan_request(heard, parameters, clock, lambda: False, TARGET, running)
+        return outcome, clock.now
+
+    yield ask
+    node.destroy_node()
+
+
+def _swings():
+    """Return a motion that rests for an instant in its middle, at 1 s."""
+    q = worlds.FOLDED
+    still = np.zeros((3, 4))
+    return Trajectory(
+        times=[0.0, 1.0, 2.0],
+        positions=[q, q + [0.3, 0.0, 0.2, 0.0], q + [0.1, 0.0, 0.5, 0.1]],
+        velocities=still,
+        accelerations=still,
+    )
+
+
+@pytest.mark.parametrize('since', [0.4, 0.995, 1.0, 1.003, 1.5])
+def test_the_motion_goes_on_from_where_the_arm_will_be(ask, since):
+    motion = _swings()
+    outcome, now = ask(motion, since)
+    assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
+    start = outcome.start
+    assert LEADS[0] <= start.time - BEGIN - since <= LEADS[0] + 0.01
+    # Told before it begins, and not long before.
+    assert start.time - EARLY <= now <= start.time
+    expected = [values[0] for values in sample(motion, [start.time - BEGIN])]
+    found = outcome.trajectory
+    np.testing.assert_allclose(found.positions[0], expected[0], atol=1e-6)
+    np.testing.assert_allclose(found.velocities[0], expected[1], atol=1e-5)
+    np.testing.assert_allclose(found.accelerations[0], expected[2], atol=1e-3)
+
+
+@pytest.mark.parametrize('since', [1.985, 2.0, 2.5])
+def test_where_the_motion_ends_the_next_one_begins_at_rest(ask, since):
+    outcome, _ = ask(_swings(), since)
+    assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
+    assert outcome.start is None
+
+
+def test_a_motion_that_nobody_knows_pauses_unseen(ask):
+    # The arm's own rest is all there is to go by.
+    outcome, _ = ask(_swings(), 1.0, is_known=False)
+    assert outcome.start is None
