@@ -136,3 +136,8 @@ def process_of(module: str) -> psutil.Process:
         if module in child.cmdline():
             return child
     raise RrthError(f'{module}: its process is gone')
+
+
+def threads_of(module: str) -> list[int]:
+    """Return the numbers of the threads of the child process that runs a module."""
+    return [thread.id for thread in process_of(module).threads()]

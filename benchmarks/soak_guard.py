@@ -22,8 +22,9 @@ from trajectory_msgs.msg import JointTrajectory
 
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
+from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyStream, NO_HAND
-from benchmarks.soak_client import Published, SoakClient
+from benchmarks.soak_client import Published, SoakClient, threads_of
 from benchmarks.soak_contacts import Episode, judge_episode
 from benchmarks.soak_judge import RAY
 
@@ -91,6 +92,7 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
         client.listen_to_states()
         client.wait_for_service(one)
         client.hear(30.0, lambda: client.states)
+        put_ahead(*threads_of(PLANNER), *threads_of(PLAYBACK))
         with BodyStream(client.stream.publish, -1) as bodies:
             client.hear(1.0)
             try:

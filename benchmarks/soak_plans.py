@@ -17,8 +17,9 @@ from tqdm import tqdm
 
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
+from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
-from benchmarks.soak_client import process_of, SoakClient
+from benchmarks.soak_client import process_of, SoakClient, threads_of
 from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, RAY
 
 NODE = 'rrth_planner.ros.planner_node'
@@ -107,6 +108,7 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
         ChildProcess(NODE, ARGUMENTS, lambda _: None) as child,
     ):
         client.wait_for_service(child)
+        put_ahead(*threads_of(NODE))
         with BodyStream(client.stream.publish, 1) as bodies:
             client.hear(2.0)
             client.on_figures = lambda f: record.ages.append(float(f['age of body [s]']))

@@ -3,7 +3,6 @@
 """The report of a soak, docs/reliability.md: what was seen in, Markdown out."""
 
 from collections.abc import Sequence
-import os
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -12,6 +11,7 @@ from rrth_planner.campaign.statistics import markdown_table
 from rrth_planner.campaign.store import replace_file
 
 from benchmarks import soak_contacts as contacts
+from benchmarks.real_time import scheduling
 from benchmarks.soak_guard import GuardRecord
 from benchmarks.soak_judge import FREE, growth_of
 from benchmarks.soak_plans import PlansRecord
@@ -69,15 +69,6 @@ def report(
     if guard:
         parts += ['## Hands in the way of running motions', _guard_text(guard)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
-
-
-def scheduling() -> str:
-    """Return how the system schedules this process, and those that it starts."""
-    kind, priority = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
-    names = {os.SCHED_FIFO: 'SCHED_FIFO', os.SCHED_RR: 'SCHED_RR'}
-    if kind in names:
-        return f'in real time ({names[kind]}, priority {priority})'
-    return f'at ordinary priority (nice {os.nice(0)})'
 
 
 def plan_targets(plans: PlansRecord) -> list[list[str]]:

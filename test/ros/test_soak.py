@@ -4,6 +4,7 @@
 
 from collections import Counter
 from dataclasses import replace
+import os
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
 from benchmarks import soak, soak_contacts as contacts, soak_judge as judge  # noqa: E402
+from benchmarks.real_time import put_ahead, scheduling  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
     BodyStream,
@@ -238,3 +240,17 @@ def test_the_command_says_what_is_missing(capsys):
     assert 'rclpy' in capsys.readouterr().err
     with pytest.raises(SystemExit):
         soak.main(['--plans', '-1'])
+
+
+@pytest.mark.parametrize('kind', [os.SCHED_RR, os.SCHED_FIFO, os.SCHED_OTHER])
+def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind):
+    put = []
+    monkeypatch.setattr(os, 'sched_getscheduler', lambda _: kind)
+    monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(10))
+    monkeypatch.setattr(
+        os, 'sched_setscheduler', lambda *given: put.append((*given[:2], given[2].sched_priority))
+    )
+    put_ahead(7, 8)
+    is_ordinary = kind == os.SCHED_OTHER
+    assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 11)])
+    assert ('in real time' in scheduling()) != is_ordinary
