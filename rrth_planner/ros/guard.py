@@ -17,7 +17,7 @@ from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.ros.sight import goes_on, out_of_sight, Pace
+from rrth_planner.ros.sight import did_not_take, goes_on, out_of_sight, Pace
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
@@ -29,6 +29,9 @@ PERIOD = 0.02
 # An arm that stands still that long after the end of its motion is taken to have arrived [s].
 GRACE = 0.5
 ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
+NOT_TAKEN = (
+    'the arm did not take its new motion and goes on along the one before, which is watched again'
+)
 
 
 class Watch(Enum):
@@ -73,6 +76,8 @@ class Guard:
         # was stopped once another motion has begun.
         self.n_brakes, self.n_begun = 0, 0
         self._stopped_from: RunningMotion | None = None
+        # What the arm followed when it was told what it follows now.
+        self._replaced: RunningMotion | None = None
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
         self._before: tuple[Scene, float] | None = None
@@ -92,10 +97,11 @@ class Guard:
         self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
     ) -> None:
         """Watch a motion from now on by the parameters of its plan; the lock is held."""
-        now = self._now()
-        if self.running is not None and now < running.start_time:
-            phase = self._phase(now)
-            if self.running is not None and phase is not None:
+        now, self._replaced = self._now(), None
+        phase = self._phase(now)
+        if self.running is not None and phase is not None:
+            self._replaced = self.running
+            if now < running.start_time:
                 running = taken_over(self.running, phase, running, now)
         self._parameters = parameters
         self.running, self._goal, self._stopped_from = running, goal, None
@@ -151,6 +157,7 @@ class Guard:
         with self._lock:
             now = self._now()
             self._insist(now)
+            self._look_back()
             if self._phase(now) is None or self._state is not Watch.WATCHING:
                 return
             why = out_of_sight(self._heard, self._reporter.parameters, now)
@@ -171,6 +178,17 @@ class Guard:
         self.running = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
         self._publishers.publish_motion(self.running.trajectory, self._parameters, now)
         self._node.get_logger().error('the arm did not stop as it was told: it is told again')
+
+    def _look_back(self) -> None:
+        """Watch the motion before where the arm goes on with that: its controller refused one."""
+        told, before, reading = self.running, self._replaced, self._heard.joints.value
+        if told is None or before is None or reading is None:
+            return
+        if self._state is Watch.WATCHING and did_not_take(reading, before, told):
+            self.running, self._replaced = before, told
+            self._node.get_logger().error(NOT_TAKEN)
+            self._say(Watch.WATCHING, NOT_TAKEN)
+            self.on_body(time.time_ns())
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where there is none any more."""

@@ -8,8 +8,8 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.takeover import phase_of, REST_SPEED
-from rrth_planner.trajectory import sample
+from rrth_planner.takeover import phase_of, REST_SPEED, SAME_POSITION
+from rrth_planner.trajectory import positions_at, sample
 
 # An arm stands still where it does not go further than at `REST_SPEED` for this time [s].
 STILL = 0.1
@@ -47,6 +47,20 @@ def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -
         return False
     found = phase_of(reading.positions, reading.velocities, before.trajectory)
     return found is not None and found[1] >= FULL
+
+
+def did_not_take(reading: JointReading, before: RunningMotion, told: RunningMotion) -> bool:
+    """Return whether an arm is seen to go on with the motion before, not with what it was told."""
+    if reading.taken - told.start_time <= LATE:
+        return False
+    found = phase_of(reading.positions, reading.velocities, before.trajectory)
+    if found is None or (np.abs(reading.velocities) <= REST_SPEED).all():
+        return False
+    at = told.phase(reading.positions, reading.taken, reading.taken)
+    if at is None:
+        return True
+    gap = np.abs(positions_at(told.trajectory, [at])[0] - reading.positions).max()
+    return bool(gap > SAME_POSITION)
 
 
 def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:

@@ -178,15 +178,19 @@ def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
     assert np.allclose(stop.positions[0], watched.motion.positions[0])
 
 
-def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
-    turned = sample(watched.motion, [PHASE + 0.2])
-    later = Trajectory(
+def _turned(watched, after):
+    """Return a motion that takes over so much after the phase [s], and leads elsewhere."""
+    q, v, a = (row[0] for row in sample(watched.motion, [PHASE + after]))
+    return Trajectory(
         times=[0.0, 1.0],
-        positions=[turned[0][0], turned[0][0] + [0.0, 0.0, 0.1, 0.3]],
-        velocities=[turned[1][0], np.zeros(4)],
-        accelerations=[turned[2][0], np.zeros(4)],
+        positions=[q, q + [0.0, 0.0, 0.1, 0.3]],
+        velocities=[v, np.zeros(4)],
+        accelerations=[a, np.zeros(4)],
     )
-    running = RunningMotion(trajectory=later, start_time=watched.now + 0.2)
+
+
+def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
+    running = RunningMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
     watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
     watched.now += 0.02
     watched.read(*watched.on_time(PHASE + 0.02))
@@ -197,6 +201,30 @@ def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
     ((stop, begin),) = watched.published
     assert begin == watched.now
     assert np.allclose(stop.positions[0], watched.on_time(PHASE + 0.02)[0], atol=1e-3)
+
+
+@pytest.mark.parametrize('ahead', [0.0, 0.02])
+@pytest.mark.parametrize('is_taken', [True, False])
+def test_what_the_arm_follows_is_watched_even_where_it_was_told_otherwise(
+    watched, ahead, is_taken
+):
+    turned = _turned(watched, ahead)
+    running = RunningMotion(trajectory=turned, start_time=watched.now + ahead)
+    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
+
+    def arm(after):
+        if is_taken and after > ahead:
+            return tuple(row[0] for row in sample(turned, [after - ahead])[:2])
+        return watched.on_time(PHASE + after)
+
+    watched.run(0.35, arm)
+    assert watched.published == []
+    assert ('did not take its new motion' in watched.reporter.guard[1]) != is_taken
+    # In the way of the old motion.
+    watched.see(watched.hand(0.6, 0.0))
+    assert len(watched.published) == (not is_taken)
+    for stop, _ in watched.published:
+        assert np.allclose(stop.positions[0], watched.on_time(PHASE + 0.35)[0], atol=1e-3)
 
 
 @pytest.mark.parametrize(
