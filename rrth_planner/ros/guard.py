@@ -12,22 +12,21 @@ from rclpy.node import Node
 from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.ros.sight import did_not_take, goes_on, out_of_sight, Pace
+from rrth_planner.ros.sight import out_of_sight
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import box_speeds, is_still_free, leads_away, taken_over
+from rrth_planner.underway import box_speeds, is_still_free, leads_away
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
-# An arm that stands still that long after the end of its motion is taken to have arrived [s].
-GRACE = 0.5
 ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
 NOT_TAKEN = (
     'the arm did not take its new motion and goes on along the one before, which is watched again'
@@ -69,21 +68,15 @@ class Guard:
         """Begin with no motion."""
         self._node, self._heard, self._reporter = node, heard, reporter
         self._publishers, self._lock = publishers, lock
-        self.running: RunningMotion | None = None
+        self._followed = Followed(heard.joints)
         self._goal: PointingGoal | None = None
         self._state = Watch.IDLE
         # Motions that were planned before a brake are of no use after it, nor is a plan for what
         # was stopped once another motion has begun.
         self.n_brakes, self.n_begun = 0, 0
-        self._stopped_from: RunningMotion | None = None
-        # What the arm followed when it was told what it follows now.
-        self._replaced: RunningMotion | None = None
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
         self._before: tuple[Scene, float] | None = None
-        self._pace = Pace()
-        # When the arm was last where its motion leads [s].
-        self._seen = 0.0
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
         # Has a stop that was published as free judged once more; set by the owner.
@@ -93,26 +86,25 @@ class Guard:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
 
+    @property
+    def running(self) -> RunningMotion | None:
+        """The motion that the arm follows, as far as that is known."""
+        return self._followed.motion
+
     def begin(
         self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
     ) -> None:
         """Watch a motion from now on by the parameters of its plan; the lock is held."""
-        now, self._replaced = self._now(), None
-        phase = self._phase(now)
-        if self.running is not None and phase is not None:
-            self._replaced = self.running
-            if now < running.start_time:
-                running = taken_over(self.running, phase, running, now)
-        self._parameters = parameters
-        self.running, self._goal, self._stopped_from = running, goal, None
-        self.n_begun, self._seen = self.n_begun + 1, now
+        self._followed.begin(running, self._now())
+        self._parameters, self._goal = parameters, goal
+        self.n_begun += 1
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
         self.on_body(time.time_ns())
 
     def close(self) -> None:
         """Watch nothing any more."""
-        self.running = None
+        self._followed.forget()
 
     def _stop_of(self, running: RunningMotion, phase: float) -> Trajectory:
         """Return the soonest stop that is found at once, from where the arm is."""
@@ -166,47 +158,34 @@ class Guard:
 
     def _insist(self, now: float) -> None:
         """Stop the arm again where it goes on along the motion that it was to stop."""
-        stop, before, reading = self.running, self._stopped_from, self._heard.joints.value
-        if stop is None or before is None or reading is None:
+        found = self._followed.unstopped(now)
+        if found is None:
             return
-        if not goes_on(reading, before, stop):
-            return
-        phase = before.phase(reading.positions, reading.taken, now)
-        if phase is None or phase >= before.trajectory.duration:
-            self._stopped_from = None
-            return
-        self.running = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
-        self._publishers.publish_motion(self.running.trajectory, self._parameters, now)
+        before, phase = found
+        stop = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
+        self._followed.motion = stop
+        self._publishers.publish_motion(stop.trajectory, self._parameters, now)
         self._node.get_logger().error('the arm did not stop as it was told: it is told again')
 
     def _look_back(self) -> None:
         """Watch the motion before where the arm goes on with that: its controller refused one."""
-        told, before, reading = self.running, self._replaced, self._heard.joints.value
-        if told is None or before is None or reading is None:
-            return
-        if self._state is Watch.WATCHING and did_not_take(reading, before, told):
-            self.running, self._replaced = before, told
+        if self._state is Watch.WATCHING and self._followed.look_back():
             self._node.get_logger().error(NOT_TAKEN)
             self._say(Watch.WATCHING, NOT_TAKEN)
             self.on_body(time.time_ns())
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where there is none any more."""
-        running, reading = self.running, self._heard.joints.value
-        if running is None or reading is None:
-            return None
-        is_moving = self._pace.is_moving(reading, now)
-        if now - running.start_time - running.trajectory.duration > GRACE and not is_moving:
-            self.running = self._stopped_from = None
+        if self._followed.is_over(now):
+            self._followed.forget()
             if self._state is Watch.BRAKING and not self._reporter.parameters.replan:
                 self._say(Watch.HOLDING, self._reporter.guard[1])
             elif self._state is not Watch.HOLDING:
                 self._say(Watch.IDLE, '')
             return None
-        phase = running.phase(reading.positions, reading.taken, now)
-        if phase is not None:
-            self._seen = now
-        elif abs(now - self._seen) > GRACE and self._reporter.guard[1] != ELSEWHERE:
+        phase = self._followed.phase(now)
+        is_lost = phase is None and self._followed.is_lost(now)
+        if is_lost and self._reporter.guard[1] != ELSEWHERE:
             self._node.get_logger().error(ELSEWHERE)
             self._say(self._state, ELSEWHERE)
         return phase
@@ -245,8 +224,8 @@ class Guard:
             return
         self._publishers.publish_motion(stopped.trajectory, parameters, start)
         took = 1e-9 * (time.time_ns() - arrived)
-        self._stopped_from = running
-        self.running, self.n_brakes = stopped, self.n_brakes + 1
+        self._followed.stop(stopped)
+        self.n_brakes += 1
         warning = '' if is_safe else self._warning(stopped.trajectory, scene)
         sentence = (
             f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'

@@ -38,7 +38,7 @@ START_TOLERANCE = 1e-3
 # and once more with more time [s].
 LEADS = (0.05, 0.25)
 # So long before it begins such a motion is told, so that the arm has it in time [s].
-EARLY = 0.01
+EARLY = 0.025
 
 
 @dataclass(frozen=True, slots=True, eq=False)

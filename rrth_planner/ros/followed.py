@@ -1,0 +1,148 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which motion an arm follows, of those that it was told, and how far it has come."""
+
+import numpy as np
+from rrth_planner.arrays import Array
+from rrth_planner.ros.inputs import Input
+from rrth_planner.ros.joints import JointReading
+from rrth_planner.running_motion import RunningMotion
+from rrth_planner.takeover import phase_of, REST_SPEED, SAME_POSITION
+from rrth_planner.trajectory import positions_at, sample
+from rrth_planner.underway import taken_over
+
+# An arm that stands still that long after the end of its motion is taken to have arrived; where it
+# is nowhere on it for as long, it does something else [s].
+GRACE = 0.5
+# An arm stands still where it does not go further than at `REST_SPEED` for this time [s].
+STILL = 0.1
+# An arm may be so late [s]. It did not hear of a stop where it still has so great a share of its
+# motion's pace, when it should have no more than so little.
+LATE, FULL, LITTLE = 0.1, 0.9, 0.5
+
+
+class Pace:
+    """Whether an arm moves, by what it says and by where it is: not every driver says."""
+
+    def __init__(self) -> None:
+        """Begin with nothing seen."""
+        self._place: Array = np.zeros(0)
+        self._then = 0.0
+
+    def is_moving(self, reading: JointReading, now: float) -> bool:
+        """Return whether the arm moves, as far as its last readings tell, at a time [s]."""
+        q = reading.positions
+        if self._place.shape != q.shape or np.abs(q - self._place).max() > REST_SPEED * STILL:
+            self._place, self._then = q, now
+            return True
+        # A clock that was set back tells no time that passed, and NaN is no rest.
+        is_fast = not (np.abs(reading.velocities) <= REST_SPEED).all()
+        return is_fast or abs(now - self._then) < STILL
+
+
+def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -> bool:
+    """Return whether an arm is seen to go on along a motion that it was told to stop."""
+    elapsed = reading.taken - stop.start_time - LATE
+    if elapsed <= 0.0:
+        return False
+    pace = np.linalg.norm(sample(stop.trajectory, [0.0, elapsed])[1], axis=1)
+    if pace[1] > LITTLE * pace[0]:
+        return False
+    found = phase_of(reading.positions, reading.velocities, before.trajectory)
+    return found is not None and found[1] >= FULL
+
+
+def did_not_take(reading: JointReading, before: RunningMotion, told: RunningMotion) -> bool:
+    """Return whether an arm is seen to go on with the motion before, not with what it was told."""
+    if reading.taken - told.start_time <= LATE:
+        return False
+    found = phase_of(reading.positions, reading.velocities, before.trajectory)
+    if found is None or (np.abs(reading.velocities) <= REST_SPEED).all():
+        return False
+    at = told.phase(reading.positions, reading.taken, reading.taken)
+    if at is None:
+        return True
+    gap = np.abs(positions_at(told.trajectory, [at])[0] - reading.positions).max()
+    return bool(gap > SAME_POSITION)
+
+
+class Followed:
+    """
+    The motion that an arm was told last, as far as its joint states bear that out.
+
+    Parameters
+    ----------
+    joints : Input
+        Where the arm is.
+
+    """
+
+    def __init__(self, joints: Input[JointReading | None]) -> None:
+        """Begin with no motion."""
+        self.motion: RunningMotion | None = None
+        self._joints, self._pace = joints, Pace()
+        # What the arm followed when it was told what it follows now: as the way that it stops on,
+        # and as the motion that gave way to another one.
+        self._stopped: RunningMotion | None = None
+        self._replaced: RunningMotion | None = None
+        # When the arm was last where its motion leads [s].
+        self._seen = 0.0
+
+    def begin(self, motion: RunningMotion, now: float) -> None:
+        """Follow a motion from its beginning on, and the present one, if any, until then."""
+        phase = None if self.is_over(now) else self.phase(now)
+        self._replaced = None if phase is None else self.motion
+        if self.motion is not None and phase is not None and now < motion.start_time:
+            motion = taken_over(self.motion, phase, motion, now)
+        self.motion, self._stopped, self._seen = motion, None, now
+
+    def stop(self, stop: RunningMotion) -> None:
+        """Follow a stop on the way of the present motion."""
+        self.motion, self._stopped = stop, self.motion
+
+    def forget(self) -> None:
+        """Follow nothing any more."""
+        self.motion = self._stopped = self._replaced = None
+
+    def is_over(self, now: float) -> bool:
+        """Return whether the motion, if there is one, has ended and the arm is at rest."""
+        motion, reading = self.motion, self._joints.value
+        if motion is None or reading is None:
+            return False
+        is_moving = self._pace.is_moving(reading, now)
+        return now - motion.start_time - motion.trajectory.duration > GRACE and not is_moving
+
+    def phase(self, now: float) -> float | None:
+        """Return the time within the motion; None where the arm is nowhere on it [s]."""
+        motion, reading = self.motion, self._joints.value
+        if motion is None or reading is None:
+            return None
+        phase = motion.phase(reading.positions, reading.taken, now)
+        if phase is not None:
+            self._seen = now
+        return phase
+
+    def is_lost(self, now: float) -> bool:
+        """Return whether the arm has been nowhere on its motion for a while."""
+        return self.motion is not None and abs(now - self._seen) > GRACE
+
+    def look_back(self) -> bool:
+        """Follow the motion before where the arm goes on with that; return whether it does."""
+        motion, before, reading = self.motion, self._replaced, self._joints.value
+        if motion is None or before is None or reading is None or self._stopped is not None:
+            return False
+        if not did_not_take(reading, before, motion):
+            return False
+        self.motion, self._replaced = before, motion
+        return True
+
+    def unstopped(self, now: float) -> tuple[RunningMotion, float] | None:
+        """Return the motion that the arm goes on with although it was stopped, and the time."""
+        stop, before, reading = self.motion, self._stopped, self._joints.value
+        if stop is None or before is None or reading is None or not goes_on(reading, before, stop):
+            return None
+        phase = before.phase(reading.positions, reading.taken, now)
+        if phase is None or phase >= before.trajectory.duration:
+            self._stopped = None
+            return None
+        return before, phase
