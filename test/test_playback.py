@@ -75,15 +75,8 @@ def test_a_motion_may_begin_later():
 
 def test_a_motion_replaces_the_running_one_from_its_present_state():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
-    q, v, a = running.state_at(0.8)
-    turned = Trajectory(
-        times=[0.0, 1.5],
-        positions=[q, FOLDED],
-        velocities=[v, STILL],
-        accelerations=[a, STILL],
-    )
-    replaced = taken(running, turned, 0.8)
-    for one, other in zip(replaced.state_at(0.8), (q, v, a), strict=True):
+    replaced = taken(running, turn_from(running.state_at(0.8), FOLDED, 1.5), 0.8)
+    for one, other in zip(replaced.state_at(0.8), running.state_at(0.8), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
     np.testing.assert_allclose(replaced.state_at(2.3)[0], FOLDED, atol=1e-12)
 
@@ -331,23 +324,17 @@ def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
 
 def test_until_a_motion_begins_that_takes_over_the_arm_goes_on():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
-    q, v, a = running.state_at(0.8)
-    turned = Trajectory(
-        times=[0.0, 1.5],
-        positions=[q, FOLDED],
-        velocities=[v, STILL],
-        accelerations=[a, STILL],
-    )
-    told = accept(running, turned, ARM, rules(), start_time=0.8, time=0.6)
+    back = turn_from(running.state_at(0.8), FOLDED, 1.5)
+    told = accept(running, back, ARM, rules(), start_time=0.8, time=0.6)
     times = np.linspace(0.6, 0.79, 20)
     for one, other in zip(told.states_at(times), running.states_at(times), strict=True):
         np.testing.assert_array_equal(one, other)
     times = np.linspace(0.8, 2.3, 20)
-    for one, other in zip(told.states_at(times), sample(turned, times - 0.8), strict=True):
+    for one, other in zip(told.states_at(times), sample(back, times - 0.8), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
     # Where the arm will be counts, not where it is.
     with pytest.raises(MessageError, match='the motion begins at position'):
-        accept(running, turned, ARM, rules(), start_time=0.75, time=0.6)
+        accept(running, back, ARM, rules(), start_time=0.75, time=0.6)
 
 
 def test_a_motion_that_has_not_begun_never_does_when_another_comes():
@@ -355,21 +342,13 @@ def test_a_motion_that_has_not_begun_never_does_when_another_comes():
     told = running
     for start in (1.9, 1.95, 1.8):
         q, v, a = running.state_at(start)
-        held = Trajectory(
-            times=[0.0, 0.5],
-            positions=[q, q + 0.2 * v],
-            velocities=[v, STILL],
-            accelerations=[a, STILL],
-        )
+        held = turn_from((q, v, a), q + 0.2 * v, 0.5)
         told = accept(told, held, ARM, rules(), start_time=start, time=1.0)
         assert told.before is running
         np.testing.assert_array_equal(told.state_at(1.5)[0], running.state_at(1.5)[0])
         np.testing.assert_allclose(told.state_at(start + 0.5)[0], q + 0.2 * v)
     # One that has begun is taken over itself.
-    q, v, a = told.state_at(2.0)
-    stay = Trajectory(
-        times=[0.0, 1.0], positions=[q, q], velocities=[v, STILL], accelerations=[a, STILL]
-    )
+    stay = turn_from(told.state_at(2.0), told.state_at(2.0)[0], 1.0)
     last = accept(told, stay, ARM, rules(), start_time=2.0, time=1.95)
     assert last.before.trajectory is told.trajectory
     assert last.before.before is None
@@ -377,14 +356,8 @@ def test_a_motion_that_has_not_begun_never_does_when_another_comes():
 
 def test_a_stop_before_the_motion_that_takes_over_brakes_the_one_that_runs():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
-    q, v, a = running.state_at(1.2)
-    turned = Trajectory(
-        times=[0.0, 1.5],
-        positions=[q, FOLDED],
-        velocities=[v, STILL],
-        accelerations=[a, STILL],
-    )
-    told = accept(running, turned, ARM, rules(), start_time=1.2, time=0.8)
+    back = turn_from(running.state_at(1.2), FOLDED, 1.5)
+    told = accept(running, back, ARM, rules(), start_time=1.2, time=0.8)
     times = np.linspace(0.9, 3.0, 40)
     expected = stop(running, LIMITS, 0.9).states_at(times)
     for one, other in zip(stop(told, LIMITS, 0.9).states_at(times), expected, strict=True):
