@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who goes before whom where the system runs a client and its nodes in real time."""
 
+from contextlib import suppress
 import os
 
 REAL_TIME = {os.SCHED_FIFO: 'SCHED_FIFO', os.SCHED_RR: 'SCHED_RR'}
@@ -14,9 +15,13 @@ def put_ahead(*threads: int) -> None:
     What asks and judges all the time would else take the processor from what it measures.
     """
     kind, priority = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
-    if kind in REAL_TIME:
-        for thread in threads:
-            os.sched_setscheduler(thread, kind, os.sched_param(priority + 1))
+    if kind not in REAL_TIME:
+        return
+    ahead = os.sched_param(min(priority + 1, os.sched_get_priority_max(kind)))
+    for thread in threads:
+        # One may have ended since somebody listed it.
+        with suppress(ProcessLookupError):
+            os.sched_setscheduler(thread, kind, ahead)
 
 
 def scheduling() -> str:

@@ -85,8 +85,9 @@ def accept(
     Raises
     ------
     MessageError
-        The new motion is not where the arm is now, or will be when it begins, leaves limits
-        somewhere, or ends more than an hour ahead. Within `start_tolerance` the arm steps onto it.
+        The new motion is not where the arm is when it begins, or now if that is over, leaves
+        limits somewhere, or ends more than an hour ahead. Within `start_tolerance` the arm steps
+        onto it.
 
     """
     before = at_present(playback, time)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wearer's boxes and the bars of an arm as objects of the Flexible Collision Library."""
 
+from collections.abc import Callable
 import functools
 import math
 from typing import ClassVar
@@ -30,28 +31,34 @@ class _Shape:
         self.geometry, self.item = geometry, fcl.CollisionObject(geometry)
 
 
+def _taken(spare: list[_Shape], make: Callable[[], fcl.CollisionGeometry]) -> _Shape:
+    """Return a spare shape, or a new one; to append and to pop are whole steps for all threads."""
+    try:
+        return spare.pop()
+    except IndexError:
+        return _Shape(make())
+
+
 class Boxes:
     """The boxes of a scene as objects of the library."""
 
-    # To append and to pop are whole steps, whatever the threads.
     _spare: ClassVar[list[_Shape]] = []
 
     def __init__(self, scene: Scene) -> None:
+        self._shapes: list[_Shape] = []
         self.names = [box.name for box in scene.boxes]
-        self._shapes = [self._placed(box) for box in scene.boxes]
+        for box in scene.boxes:
+            self._place(box)
 
     def __del__(self) -> None:
         self._spare.extend(self._shapes)
 
-    def _placed(self, box: Box) -> _Shape:
-        try:
-            shape = self._spare.pop()
-        except IndexError:
-            shape = _Shape(fcl.Box(1.0, 1.0, 1.0))
+    def _place(self, box: Box) -> None:
+        shape = _taken(self._spare, lambda: fcl.Box(1.0, 1.0, 1.0))
+        self._shapes.append(shape)
         shape.geometry.side = box.size
         shape.geometry.computeLocalAABB()
         shape.item.setTransform(fcl.Transform(box.rotation, box.center))
-        return shape
 
     def nearest(self, item: fcl.CollisionObject, bounds: Array) -> tuple[float, int]:
         """
@@ -82,6 +89,7 @@ class Bar:
     _spare: ClassVar[list[_Shape]] = []
 
     def __init__(self, arm: ArmModel, k: int, ray_length: float) -> None:
+        self._capsule = _taken(self._spare, lambda: fcl.Capsule(THINNEST, 1.0))
         self.k, self.name = k, bar_names(arm)[k]
         row, end = bar_ends(arm)[k]
         self._is_a, self._is_ray = end == 'a', end == 'd' and row == arm.dof
@@ -92,10 +100,6 @@ class Bar:
         is_sliding = end == 'd' and not self._is_ray and arm.is_prismatic[row]
         self._slide = row if is_sliding else None
         self._radius = float(arm.radii[row])
-        try:
-            self._capsule = self._spare.pop()
-        except IndexError:
-            self._capsule = _Shape(fcl.Capsule(THINNEST, 1.0))
         self._stretch(self._offset)
 
     def __del__(self) -> None:

@@ -15,6 +15,8 @@ from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Tr
 SLOW, LATEST = 0.05, 0.05
 # An arm that is further from all of its motion, in one joint, does something else [rad].
 ELSEWHERE = 0.1
+# A motion is told no earlier before it begins; a clock that was set back may say otherwise [s].
+LONGEST_LEAD = 0.25
 # Places of a motion at which an arm is looked for [s].
 SPACING = 5e-3
 # An arm that is so near to where its motion is now is on time [rad].
@@ -64,25 +66,36 @@ class RunningMotion:
 
         """
         motion, guess = self.trajectory, taken - self.start_time
-        if now < self.start_time:
+        if now < self.start_time <= now + LONGEST_LEAD and not self._has_begun(q, guess):
             # It takes over from another one, where the arm is still.
             return now - self.start_time
         if len(motion.times) == 1:
             is_there = np.abs(motion.positions[0] - q).max() <= ELSEWHERE
             return max(0.0, now - self.start_time) if is_there else None
         # Mostly the arm is where it was told to be, a little late: it began when it heard of it.
-        at = self._near(guess, q, SAME_POSITION)
+        at = self.near(guess, q, SAME_POSITION)
         if not math.isfinite(at):
-            times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
-            gaps = positions_at(motion, times) - q
-            if not np.abs(gaps).max(axis=1).min() <= ELSEWHERE:
-                return None
-            squares = (gaps * gaps).sum(axis=1)
-            # A motion may pass a place twice.
-            near = times[squares <= squares.min() + SAME_POSITION**2]
-            nearest = float(near[np.abs(near - guess).argmin()])
-            at = self._near(nearest, q, math.inf)
-        return float(at) + now - taken
+            at = self._place(q, guess)
+        return at + now - taken if math.isfinite(at) else None
+
+    def _place(self, q: Array, guess: float) -> float:
+        """Return the time of the nearest place, of several that near a guess; NaN: none [s]."""
+        motion = self.trajectory
+        times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
+        gaps = positions_at(motion, times) - q
+        if not np.abs(gaps).max(axis=1).min() <= ELSEWHERE:
+            return math.nan
+        squares = (gaps * gaps).sum(axis=1)
+        # A motion may pass a place twice.
+        near = times[squares <= squares.min() + SAME_POSITION**2]
+        return self.near(float(near[np.abs(near - guess).argmin()]), q)
+
+    def _has_begun(self, q: Array, guess: float) -> bool:
+        """Return whether an arm is on the motion, past its beginning, whatever the clock says."""
+        at = math.nan if len(self.trajectory.times) == 1 else self._place(q, guess)
+        if not at > BEGINNING:
+            return False
+        return bool(np.abs(positions_at(self.trajectory, [at])[0] - q).max() <= SAME_POSITION)
 
     def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
         """Return whether an arm was where the motion is at that time, and as fast [rad, s]."""
@@ -97,7 +110,14 @@ class RunningMotion:
         since = time - self.start_time + np.linspace(0.0, span, N_SOON)
         return bool((np.abs(sample(self.trajectory, since)[1]) > REST_SPEED).any())
 
-    def _near(self, guess: float, q: Array, same: float) -> float:
-        motion = self.trajectory
-        curves = piece_coefficients(motion)
-        return float(time_on(curves, motion.times, guess, q, same, SLOW, LATEST))
+    def near(self, guess: float, q: Array, same: float = math.inf) -> float:
+        """Return when, near a guess, the motion passes q; NaN if not within `same` [s, rad]."""
+        curves = piece_coefficients(self.trajectory)
+        return float(time_on(curves, self.trajectory.times, guess, q, same, SLOW, LATEST))
+
+    def gap(self, q: Array, taken: float) -> float:
+        """Return how far a reading, taken at a time [s], is beside the motion [rad]."""
+        at = self.phase(q, taken, taken)
+        if at is None:
+            return math.inf
+        return float(np.abs(positions_at(self.trajectory, [at])[0] - q).max())

@@ -188,7 +188,7 @@ def takeover(
     velocities: Array,
     running: Trajectory | None,
     ahead: float,
-    phase: float | None = None,
+    known_phase: float | None = None,
 ) -> Takeover:
     """
     Return what an arm will do, from a reading of it.
@@ -205,11 +205,11 @@ def takeover(
         The motion that the arm was last told to follow.
     ahead : float
         From the reading on, >= 0 [s].
-    phase : float, optional
+    known_phase : float, optional
         Where in that motion the arm is known to be, on time; without, it is looked for [s].
 
     """
-    found = None if phase is None else (phase, 1.0)
+    found = None if known_phase is None else (known_phase, 1.0)
     if running is not None and found is None:
         found = phase_of(positions, velocities, running)
     if running is None or found is None:

@@ -22,6 +22,8 @@ from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, S
 CLOSEST = 1e-4
 # Stretches of time in each of which boxes that move are as large as they get in it.
 STRETCHES = 6
+# Where one motion takes over from another no joint is further apart [rad].
+SEAM = 1e-7
 
 
 def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
@@ -69,9 +71,15 @@ def taken_over(
         That takes over; returned as it is where nothing is known of the way to it.
 
     """
-    end = phase + after.start_time - now
-    is_known = phase >= 0.0 and phase + CLOSEST < end <= before.trajectory.duration
-    if not is_known or len(after.trajectory.times) == 1:
+    duration = before.trajectory.duration
+    if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:
+        return after
+    # By place, not by time: clocks differ by microseconds, and an arm may be slower than its
+    # motion. What is between the two where they meet is jumped in the time to the next point.
+    first = after.trajectory.positions[0]
+    end = min(before.near(min(phase + after.start_time - now, duration), first), duration)
+    is_known = phase + CLOSEST < end
+    if not is_known or np.abs(positions_at(before.trajectory, [end])[0] - first).max() > SEAM:
         return after
     way = between(before.trajectory, phase, end)
     return replace(after, trajectory=joined(way, after.trajectory), start_time=now)

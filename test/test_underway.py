@@ -4,6 +4,7 @@
 
 from hypothesis import given, strategies as st
 import numpy as np
+import pytest
 from rrth_planner import oracle
 from rrth_planner.certificate import certify
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
@@ -13,8 +14,9 @@ from rrth_planner.oracle import frames, quintic_states
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
+from rrth_planner.takeover import joined
 from rrth_planner.timing import limit_ratio
-from rrth_planner.trajectory import piece_coefficients, sample
+from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.underway import between, box_speeds, is_still_free, leads_away, taken_over
 from rrth_planner.world import arm_world
 from worlds import (
@@ -228,18 +230,55 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
     assert min(told.values()) >= 5, told
 
 
-def test_a_motion_that_takes_over_is_known_from_now_on():
+@pytest.mark.parametrize(
+    ('late', 'rate'), [(0.0, 1.0), (1e-5, 1.0), (-1e-5, 1.0), (0.003, 1.0), (0.0, 0.5), (0.0, 0.1)]
+)
+def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
+    rng = np.random.default_rng(12)
+    n_known = 0
+    for motion in filter(None, [random_motion(rng) for _ in range(12)]):
+        before = RunningMotion(trajectory=motion, start_time=100.0)
+        begin, begin_ahead = 0.3 * motion.duration, 0.025
+        # Its first two points are close, as those of a lead-in.
+        at = begin + rate * begin_ahead
+        later = joined(
+            between(motion, at, at + 0.001), between(motion, at + 0.001, motion.duration)
+        )
+        after = RunningMotion(trajectory=later, start_time=150.0)
+        now = 150.0 - begin_ahead
+        whole = taken_over(before, begin - late, after, now)
+        # Where nothing moves no place tells the time.
+        if np.abs(sample(motion, [at])[1]).max() < 0.05:
+            continue
+        n_known += 1
+        assert whole.start_time == now
+        assert whole.trajectory.duration == pytest.approx(motion.duration - begin + late, abs=1e-6)
+        times = np.linspace(0.0, whole.trajectory.duration, 300)
+        q, _, _ = sample(whole.trajectory, times)
+        expected, _, _ = sample(motion, begin - late + times)
+        assert np.abs(q - expected).max() < 1e-5
+        # No jump where they meet, and none in a stop that follows it.
+        assert limit_ratio(whole.trajectory, limits()) < 1.01
+        assert limit_ratio(emergency_stop(whole.trajectory, 0.001, limits()), limits()) < 1.01
+    assert n_known >= 5
+
+
+def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
     rng = np.random.default_rng(12)
     motion = random_motion(rng)
     before = RunningMotion(trajectory=motion, start_time=100.0)
-    later = between(motion, 0.5 * motion.duration, motion.duration)
-    after = RunningMotion(trajectory=later, start_time=100.0 + 0.5 * motion.duration)
-    # The arm is a little late.
-    whole = taken_over(before, 0.3 * motion.duration - 0.002, after, 100.0 + 0.3 * motion.duration)
-    assert whole.start_time == 100.0 + 0.3 * motion.duration
-    times = np.linspace(0.0, 0.7 * motion.duration - 0.01, 50)
-    q, _, _ = sample(whole.trajectory, times)
-    expected, _, _ = sample(motion, 0.3 * motion.duration + times)
-    assert np.abs(q - expected).max() < 0.01
-    # Nothing is known of an arm whose motion is over before.
+    half = 0.5 * motion.duration
+    later = between(motion, half, motion.duration)
+    after = RunningMotion(trajectory=later, start_time=100.0 + half)
+    assert taken_over(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
+    # Its motion is over before, has not begun, or does not lead there.
     assert taken_over(before, 0.9 * motion.duration, after, 100.0) is after
+    assert taken_over(before, -0.1, after, 100.0) is after
+    aside = Trajectory(
+        times=later.times,
+        positions=later.positions + [0.0, 1e-4, 0.0, 0.0],
+        velocities=later.velocities,
+        accelerations=later.accelerations,
+    )
+    aside = RunningMotion(trajectory=aside, start_time=100.0 + half)
+    assert taken_over(before, half - 0.02, aside, 100.0 + half - 0.02) is aside

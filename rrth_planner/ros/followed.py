@@ -7,8 +7,8 @@ from rrth_planner.arrays import Array
 from rrth_planner.ros.inputs import Input
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.takeover import phase_of, REST_SPEED, SAME_POSITION
-from rrth_planner.trajectory import positions_at, sample
+from rrth_planner.takeover import phase_of, REST_SPEED
+from rrth_planner.trajectory import sample
 from rrth_planner.underway import taken_over
 
 # An arm that stands still that long after the end of its motion is taken to have arrived; where it
@@ -16,6 +16,9 @@ from rrth_planner.underway import taken_over
 GRACE = 0.5
 # An arm stands still where it does not go further than at `REST_SPEED` for this time [s].
 STILL = 0.1
+# An arm that is further from its motion than this [rad], and nearer to another one by so great a
+# share, follows that.
+ASIDE, NEARER = 0.02, 0.25
 # An arm may be so late [s]. It did not hear of a stop where it still has so great a share of its
 # motion's pace, when it should have no more than so little.
 LATE, FULL, LITTLE = 0.1, 0.9, 0.5
@@ -52,23 +55,15 @@ def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -
     return found is not None and found[1] >= FULL
 
 
-def did_not_take(reading: JointReading, before: RunningMotion, told: RunningMotion) -> bool:
-    """Return whether an arm is seen to go on with the motion before, not with what it was told."""
-    if reading.taken - told.start_time <= LATE:
-        return False
-    found = phase_of(reading.positions, reading.velocities, before.trajectory)
-    if found is None or (np.abs(reading.velocities) <= REST_SPEED).all():
-        return False
-    at = told.phase(reading.positions, reading.taken, reading.taken)
-    if at is None:
-        return True
-    gap = np.abs(positions_at(told.trajectory, [at])[0] - reading.positions).max()
-    return bool(gap > SAME_POSITION)
+def is_on_other(reading: JointReading, motion: RunningMotion, other: RunningMotion) -> bool:
+    """Return whether an arm is far from its motion, and much nearer to the other one."""
+    gap = motion.gap(reading.positions, reading.taken)
+    return gap > ASIDE and other.gap(reading.positions, reading.taken) < NEARER * gap
 
 
 class Followed:
     """
-    The motion that an arm was told last, as far as its joint states bear that out.
+    The motion that an arm was told last, or the one before, as its joint states bear out.
 
     Parameters
     ----------
@@ -80,6 +75,8 @@ class Followed:
     def __init__(self, joints: Input[JointReading | None]) -> None:
         """Begin with no motion."""
         self.motion: RunningMotion | None = None
+        # Whether that is what the arm was told last.
+        self.is_told = True
         self._joints, self._pace = joints, Pace()
         # What the arm followed when it was told what it follows now: as the way that it stops on,
         # and as the motion that gave way to another one.
@@ -94,7 +91,7 @@ class Followed:
         self._replaced = None if phase is None else self.motion
         if self.motion is not None and phase is not None and now < motion.start_time:
             motion = taken_over(self.motion, phase, motion, now)
-        self.motion, self._stopped, self._seen = motion, None, now
+        self.motion, self.is_told, self._stopped, self._seen = motion, True, None, now
 
     def stop(self, stop: RunningMotion) -> None:
         """Follow a stop on the way of the present motion."""
@@ -127,13 +124,18 @@ class Followed:
         return self.motion is not None and abs(now - self._seen) > GRACE
 
     def look_back(self) -> bool:
-        """Follow the motion before where the arm goes on with that; return whether it does."""
+        """Follow the motion before where the arm is seen to do so; return whether that is new."""
         motion, before, reading = self.motion, self._replaced, self._joints.value
-        if motion is None or before is None or reading is None or self._stopped is not None:
+        if motion is None or before is None or reading is None:
             return False
-        if not did_not_take(reading, before, motion):
+        if reading.taken - motion.start_time <= LATE or not is_on_other(reading, motion, before):
             return False
-        self.motion, self._replaced = before, motion
+        # A stop may come by the motion before: then the arm must go its way, too.
+        q, v = reading.positions, reading.velocities
+        if self._stopped is not None and phase_of(q, v, before.trajectory) is None:
+            return False
+        self.motion, self._replaced, self._stopped = before, motion, None
+        self.is_told = not self.is_told
         return True
 
     def unstopped(self, now: float) -> tuple[RunningMotion, float] | None:

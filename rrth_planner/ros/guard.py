@@ -28,9 +28,11 @@ from rrth_planner.world import arm_world
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
 ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
-NOT_TAKEN = (
-    'the arm did not take its new motion and goes on along the one before, which is watched again'
-)
+# By whether the arm was told last what it is seen to follow.
+TURNED = {
+    False: 'the arm did not take its new motion and goes on with the one before, which is watched',
+    True: 'the arm is seen to follow what it was told last, which is watched again',
+}
 
 
 class Watch(Enum):
@@ -169,9 +171,9 @@ class Guard:
 
     def _look_back(self) -> None:
         """Watch the motion before where the arm goes on with that: its controller refused one."""
-        if self._state is Watch.WATCHING and self._followed.look_back():
-            self._node.get_logger().error(NOT_TAKEN)
-            self._say(Watch.WATCHING, NOT_TAKEN)
+        if self._state in (Watch.WATCHING, Watch.BRAKING) and self._followed.look_back():
+            self._node.get_logger().error(TURNED[self._followed.is_told])
+            self._say(Watch.WATCHING, TURNED[self._followed.is_told])
             self.on_body(time.time_ns())
 
     def _phase(self, now: float) -> float | None:
@@ -199,7 +201,7 @@ class Guard:
         if running is None or phase is None or phase >= running.trajectory.duration:
             return
         # Of a motion that takes over a little later the stop begins then.
-        start = max(now, running.start_time)
+        start = running.start_time if phase < 0.0 else now
         stopped = RunningMotion(trajectory=self._stop_of(running, phase), start_time=start)
         is_safe = not scene.boxes or is_still_free(
             stopped,

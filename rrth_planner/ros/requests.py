@@ -23,7 +23,7 @@ from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
-from rrth_planner.running_motion import RunningMotion
+from rrth_planner.running_motion import LONGEST_LEAD, RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import Takeover
 from rrth_planner.touch import Disagreement
@@ -36,8 +36,9 @@ START_TOLERANCE = 1e-3
 
 # How far ahead a motion begins that takes over from one that runs: that long its plan may take,
 # and once more with more time [s].
-LEADS = (0.05, 0.25)
-# So long before it begins such a motion is told, so that the arm has it in time [s].
+LEADS = (0.05, LONGEST_LEAD)
+# So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
+# present motion is unknown, since the arm has to be looked at as late as can be.
 EARLY = 0.025
 
 
@@ -60,6 +61,11 @@ class Start:
     time: float
     takeover: Takeover
     running: RunningMotion | None
+
+    @property
+    def early(self) -> float:
+        """How long before it begins the motion is told, if all goes well [s]."""
+        return 0.0 if self.takeover.running is None else EARLY
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +170,8 @@ def plan_request(
                     return PlanOutcome(
                         ErrorCode.FAILURE, sentence, plan, inputs, incident=incident
                     )
-                return PlanOutcome(code, plan.sentence, plan, inputs, start, question)
+                if start is None or start.early == 0.0 or clock() <= start.time:
+                    return PlanOutcome(code, plan.sentence, plan, inputs, start, question)
         raise RequestError(
             ErrorCode.TIMED_OUT,
             f'the arm moves, and no plan was ready within {LEADS[-1]:g} s to take over from its '
@@ -203,7 +210,7 @@ def _wait_for(
     # A simulated clock may stand still.
     end = time.monotonic() + 2 * LEADS[-1]
     while start is not None and time.monotonic() < end and not should_stop():
-        left = start.time - EARLY - clock()
+        left = start.time - start.early - clock()
         if left <= 0.0:
             return
         time.sleep(min(1e-3, max(1e-5, left)))

@@ -87,9 +87,10 @@ class Watched:
         self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
         self.guard.on_body(time.time_ns())
 
-    def hand(self, ahead, away):
+    def hand(self, ahead, away, motion=None):
         """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
-        T = oracle.frames(ARM, sample(self.motion, [PHASE + ahead, PHASE + ahead + 0.01])[0])
+        at = PHASE + ahead if motion is None else ahead
+        T = oracle.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
         tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]
         onward = (next_tip - tip) / np.linalg.norm(next_tip - tip)
         return Box('hand', tip - away * onward, np.full(3, 0.05), np.eye(3))
@@ -203,21 +204,27 @@ def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
     assert np.allclose(stop.positions[0], watched.on_time(PHASE + 0.02)[0], atol=1e-3)
 
 
+def _told(watched, ahead):
+    """Tell a motion that takes over; return it, and arms by whether they take it."""
+    turned = _turned(watched, ahead)
+    running = RunningMotion(trajectory=turned, start_time=watched.now + ahead)
+    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
+
+    def taken(after):
+        if after < ahead:
+            return watched.on_time(PHASE + after)
+        return tuple(row[0] for row in sample(turned, [after - ahead])[:2])
+
+    return turned, {True: taken, False: lambda after: watched.on_time(PHASE + after)}
+
+
 @pytest.mark.parametrize('ahead', [0.0, 0.02])
 @pytest.mark.parametrize('is_taken', [True, False])
 def test_what_the_arm_follows_is_watched_even_where_it_was_told_otherwise(
     watched, ahead, is_taken
 ):
-    turned = _turned(watched, ahead)
-    running = RunningMotion(trajectory=turned, start_time=watched.now + ahead)
-    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
-
-    def arm(after):
-        if is_taken and after > ahead:
-            return tuple(row[0] for row in sample(turned, [after - ahead])[:2])
-        return watched.on_time(PHASE + after)
-
-    watched.run(0.35, arm)
+    _, arms = _told(watched, ahead)
+    watched.run(0.35, arms[is_taken])
     assert watched.published == []
     assert ('did not take its new motion' in watched.reporter.guard[1]) != is_taken
     # In the way of the old motion.
@@ -225,6 +232,58 @@ def test_what_the_arm_follows_is_watched_even_where_it_was_told_otherwise(
     assert len(watched.published) == (not is_taken)
     for stop, _ in watched.published:
         assert np.allclose(stop.positions[0], watched.on_time(PHASE + 0.35)[0], atol=1e-3)
+
+
+@pytest.mark.parametrize('aside', [0.0, 0.002, 0.004, 0.015])
+def test_an_arm_beside_its_new_motion_is_watched_on_that(watched, aside):
+    turned, arms = _told(watched, 0.02)
+
+    def arm(after):
+        (q, v), (old, _) = arms[True](after), arms[False](after)
+        gap = np.abs(old - q).max()
+        return q + (old - q) * min(1.0, aside / max(gap, 1e-9)), v
+
+    watched.run(0.35, arm)
+    watched.see(watched.hand(0.9, 0.0, turned))
+    ((stop, _),) = watched.published
+    assert np.abs(stop.positions[0] - arm(0.35)[0]).max() <= aside + 1e-3
+
+
+def test_an_arm_that_takes_its_motion_late_is_watched_on_that_again(watched):
+    turned, arms = _told(watched, 0.0)
+    watched.run(0.3, arms[False])
+    assert 'did not take its new motion' in watched.reporter.guard[1]
+    watched.now += 0.02
+    watched.read(*(row[0] for row in sample(turned, [0.8])[:2]))
+    watched.guard._on_timer()
+    assert 'follow what it was told last' in watched.reporter.guard[1]
+    watched.see(watched.hand(0.95, 0.0, turned))
+    assert len(watched.published) == 1
+
+
+def test_an_arm_that_took_neither_its_motion_nor_the_stop_of_it_is_stopped_on_its_way(watched):
+    turned, arms = _told(watched, 0.02)
+    watched.run(0.04, arms[False])
+    watched.see(watched.hand(0.5, 0.0, turned), watched.hand(0.8, 0.0))
+    assert len(watched.published) == 1
+    begin = watched.now
+    for k in range(1, 31):
+        watched.now = begin + 0.01 * k
+        watched.read(*arms[False](watched.now - 100.0 - PHASE))
+        watched.guard._on_timer()
+    stop, at = watched.published[1]
+    assert np.allclose(stop.positions[0], arms[False](at - 100.0 - PHASE)[0], atol=1e-3)
+
+
+@pytest.mark.parametrize('back', [0.1, 0.6, 3600.0])
+def test_a_clock_that_is_set_back_does_not_move_the_stop(watched, back):
+    q, v = watched.on_time(PHASE)
+    watched.now -= back
+    watched.read(q, v)
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, begin),) = watched.published
+    assert begin == watched.now
+    assert np.allclose(stop.positions[0], q, atol=1e-3)
 
 
 @pytest.mark.parametrize(

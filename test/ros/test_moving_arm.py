@@ -111,6 +111,21 @@ def test_where_the_motion_ends_the_next_one_begins_at_rest(ask, since):
     assert outcome.start is None
 
 
+def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
+    still = np.zeros((2, 4))
+    q = worlds.FOLDED
+    slow = Trajectory(
+        times=[0.0, 6.0],
+        positions=[q, q + [0.5, 0.0, 0.3, 0.0]],
+        velocities=still,
+        accelerations=still,
+    )
+    outcome, now = ask(slow, 3.0, is_known=False)
+    assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
+    assert outcome.start.takeover.running is None
+    assert outcome.start.time - 1e-3 <= now <= outcome.start.time
+
+
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):
     # The arm's own rest is all there is to go by.
     outcome, _ = ask(_swings(), 1.0, is_known=False)
