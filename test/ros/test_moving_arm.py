@@ -123,7 +123,7 @@ def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
     outcome, now = ask(slow, 3.0, is_known=False)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.start.takeover.running is None
-    assert outcome.start.time - 1e-3 <= now <= outcome.start.time
+    assert abs(now - outcome.start.time) < 5e-3
 
 
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):
