@@ -16,6 +16,7 @@ from rrth_planner.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.trajectory import MotionLimits, Trajectory  # noqa: E402
+from rrth_planner.viewers import arm_view  # noqa: E402
 from rrth_planner.viewers.arm_view import arm_points, draw_way  # noqa: E402
 from rrth_planner.viewers.plots import (  # noqa: E402
     draw_limits,
@@ -111,6 +112,22 @@ def test_a_way_is_drawn_by_as_many_postures_as_are_given(n):
     assert len(axes.collections) == n + 3
     colours = [lines.get_edgecolor()[0, :3] for lines in axes.collections[: n - 2]]
     assert all(a[0] < b[0] for a, b in pairwise(colours))
+
+
+@pytest.mark.parametrize(('passes_by', 'is_aimed'), [(0.0, True), (0.005, True), (0.05, False)])
+def test_a_ray_goes_to_the_target_only_where_it_points_there(monkeypatch, passes_by, is_aimed):
+    T = tool_pose(ARM, FOLDED - 0.4)
+    target = T[:3, 3] + 1.7 * T[:3, 2] + passes_by * T[:3, 0]
+    drawn = []
+    monkeypatch.setattr(arm_view, '_draw_line', lambda *line: drawn.append(line[3]))
+    axes = Figure().add_subplot(projection='3d')
+    q = np.array([FOLDED, FOLDED - 0.4])
+    draw_way(axes, ARM, SCENE, q, q, target, 1.2)
+    (ray,) = (line for line in drawn if len(line) == 2 and (line[0] == T[:3, 3]).all())
+    np.testing.assert_allclose(ray[1], target if is_aimed else T[:3, 3] + 1.2 * T[:3, 2])
+    # There is room for it in any case.
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+    assert ((low <= target) & (target <= high)).all()
 
 
 def test_the_drawn_arm_goes_from_the_mount_through_all_frames():

@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 import numpy as np
-from rrth_planner.arm import ArmModel, forward_kinematics
+from rrth_planner.arm import ArmModel, forward_kinematics, pointing_error
 from rrth_planner.arrays import Array
 from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import sample, Trajectory
@@ -22,6 +22,8 @@ CLOTH, SKIN = '#8fa3bf', '#e3b898'
 HIDDEN, BODY, SEEN = 1.0, 2.0, 3.0
 LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 N_POSTURES = 16
+# A ray that passes a target by no more than that points at it [m].
+AIMED = 0.01
 # How large the space is drawn, and the width of the picture over its height.
 ZOOM, SHAPE = 0.93, 1.35
 
@@ -110,12 +112,13 @@ def draw_way(
     tool_path, first, last = poses[:, :3, 3], poses[0], poses[-1]
     first_ray = np.array([first[:3, 3], first[:3, 3] + ray_guard_length * first[:3, 2]])
     ray = np.array([last[:3, 3], last[:3, 3] + ray_guard_length * last[:3, 2]])
-    if target is not None:
+    if target is not None and pointing_error(arm, q_dense[-1], target) <= AIMED:
         ray[1] = target
+    targets = [] if target is None else [target[None]]
 
     if towards is None:
         towards = best_view(scene, postures, ray)
-    _frame(axes, scene, np.concatenate([*postures, ray, first_ray]), towards, shape)
+    _frame(axes, scene, np.concatenate([*postures, ray, first_ray, *targets]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)
     blend = np.linspace(0.0, 1.0, len(postures))[:, None]

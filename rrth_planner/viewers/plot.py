@@ -107,9 +107,17 @@ def _draw_recording(options: argparse.Namespace) -> Figure:
     for topic, sentence in reader.refused.items():
         print(f'plot: {topic}: bad messages are left out: {sentence}', file=sys.stderr)
     if options.begin is not None or options.end is not None:
-        begin = -np.inf if options.begin is None else options.begin
-        recording = section(recording, begin, np.inf if options.end is None else options.end)
+        last = float(recording.times[-1])
+        begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)
+        recording = section(recording, begin, end)
     return recording_figure(recording, arm, settings, options.file.name)
+
+
+def _time(given: float | None, default: float, last: float) -> float:
+    """Return a time of a recording [s]: below 0 it is given from the last one backwards."""
+    if given is None:
+        return default
+    return given + last if given < 0.0 else given
 
 
 def _arm_and_settings(options: argparse.Namespace) -> tuple[ArmModel, PlanSettings]:
@@ -171,7 +179,10 @@ def _parser() -> argparse.ArgumentParser:
     recording.add_argument('file', type=Path, metavar='FILE', help='MCAP')
     for name in ('begin', 'end'):
         recording.add_argument(
-            f'--{name}', type=float, metavar='S', help=f'{name} of what is drawn [s]'
+            f'--{name}',
+            type=float,
+            metavar='S',
+            help=f'{name} of what is drawn [s]; below 0: so long before the last of it',
         )
     recording.add_argument('--namespace', metavar='NAME', help='of the run, if there are several')
     recording.add_argument(

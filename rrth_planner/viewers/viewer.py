@@ -89,7 +89,10 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         '--live', action='store_true', help='follow the running nodes instead of planning'
     )
     parser.add_argument(
-        '--screenshot', type=Path, metavar='FILE', help='save a picture of the page, and end'
+        '--screenshot',
+        type=Path,
+        metavar='FILE',
+        help='save a picture of the page, the arm where it comes to, and end',
     )
     return parser.parse_args(arguments)
 

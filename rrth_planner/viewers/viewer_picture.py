@@ -50,7 +50,7 @@ def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
     if find_spec('playwright') is None:
         raise OptionsError(
             'playwright: not installed, expected for a picture of the page '
-            '(pip install playwright)'
+            '(pip install playwright, or ./run exec pip install playwright)'
         )
     browser_path = find_browser()
     if browser_path is None:

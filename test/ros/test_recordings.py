@@ -10,6 +10,7 @@ pytest.importorskip('mcap')
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.arm import ArmModel  # noqa: E402
 from rrth_planner.errors import RecordError  # noqa: E402
@@ -19,6 +20,7 @@ from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.ros.recorder import RecordingFile  # noqa: E402
 from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
 from rrth_planner.trajectory import Trajectory  # noqa: E402
+from rrth_planner.viewers import plot  # noqa: E402
 from rrth_planner.viewers.plot import main  # noqa: E402
 from samples import array, box, FOLDED, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -231,3 +233,25 @@ def test_a_section_outside_of_the_run_is_refused(tmp_path, capsys):
     assert main(['recording', str(path), '--begin', '7', '-o', str(tmp_path / 'run.png')]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert 'expected times between 0.00 and 0.90' in line
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'expected'),
+    [
+        (['--begin', '-0.35'], (0.6, 0.9)),
+        (['--begin=-0.35', '--end', '-0.05'], (0.6, 0.8)),
+        (['--begin', '0.15', '--end', '-0.35'], (0.2, 0.5)),
+        (['--begin', '-7'], (0.0, 0.9)),
+    ],
+)
+def test_times_below_zero_count_from_the_end(tmp_path, monkeypatch, arguments, expected):
+    drawn = []
+
+    def figure(recording, *_):
+        drawn.append(recording.times[[0, -1]])
+        return Figure()
+
+    monkeypatch.setattr(plot, 'recording_figure', figure)
+    path = write(tmp_path / 'run.mcap', *STATES)
+    assert main(['recording', str(path), *arguments, '-o', str(tmp_path / 'run.png')]) == 0
+    np.testing.assert_allclose(drawn, [expected], atol=1e-5)
