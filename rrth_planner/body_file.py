@@ -5,6 +5,7 @@
 from collections.abc import Mapping
 import math
 from pathlib import Path
+import reprlib
 from typing import Any
 
 from rrth_planner.errors import SceneError
@@ -34,7 +35,7 @@ def scene_from_mapping(data: Any) -> Scene:
     """
     boxes = data.get('boxes') if isinstance(data, Mapping) else None
     if not isinstance(boxes, list) or not boxes:
-        raise SceneError(f'body: {data!r}, expected a mapping with a list of boxes')
+        raise SceneError(f'body: {reprlib.repr(data)}, expected a mapping with a list of boxes')
     return Scene(tuple(_box(k, box) for k, box in enumerate(boxes)))
 
 

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.body_file import load_body
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
@@ -23,6 +22,7 @@ from rrth_planner.pipeline import plan_motion, warm_up
 from rrth_planner.resources import load_arm, load_yaml, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.status import PlanStatus
+from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 2**31
@@ -69,7 +69,7 @@ def _run(options: argparse.Namespace) -> int:
         check_suffix(options.output)
     elif options.period is not None:
         raise OptionsError('--period: without --output, expected a file to write the points to')
-    arm, scene = load_arm(options.arm), load_body(options.body)
+    arm, scene = load_arm(options.arm), load_wearer(options.body)
     settings = _settings(options, arm)
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # What compiling and loading takes is not planning time.
@@ -201,7 +201,7 @@ def _parser() -> argparse.ArgumentParser:
         help='the point to point at [m]',
     )
     parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm (config/arm.yaml)')
-    parser.add_argument('--body', type=Path, metavar='FILE', help='the wearer (config/body.yaml)')
+    parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
     parser.add_argument(
         '--from',
         dest='q_from',

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.body_file import load_body
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.pipeline import plan_motion, warm_up
@@ -21,6 +20,7 @@ from rrth_planner.resources import load_arm, load_yaml, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.viewers.plots import Motion, motion_figure
 from rrth_planner.viewers.recording_figure import recording_figure
+from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')
@@ -63,7 +63,7 @@ def _check_output(output: Path) -> None:
 
 def _draw_plan(options: argparse.Namespace) -> Figure:
     arm, settings = _arm_and_settings(options)
-    scene, goal = load_body(options.body), PointingGoal(options.target)
+    scene, goal = load_wearer(options.body), PointingGoal(options.target)
     q_start = _start(arm, options.start)
     warm_up(arm, settings.options)
     plan = plan_motion(
@@ -164,7 +164,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar=('X', 'Y', 'Z'),
         help='the point to point at, in the base frame [m]',
     )
-    plan.add_argument('--body', metavar='FILE', help='the wearer (config/body.yaml)')
+    plan.add_argument('--body', metavar='FILE', help=WEARER_HELP)
     plan.add_argument(
         '--from',
         dest='start',

@@ -24,8 +24,9 @@ from rrth_planner.pipeline import warm_up
 from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import load_arm
 from rrth_planner.settings import load_settings
-from rrth_planner.viewers.viewer_examples import example_target, load_wearer, start_of
+from rrth_planner.viewers.viewer_examples import example_target, start_of
 from rrth_planner.viewers.viewer_picture import save_picture
+from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 ROS_ARGS = '--ros-args'
 PORT = 8081
@@ -56,12 +57,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         epilog=f'With --live, what follows {ROS_ARGS} is for ROS: remaps, parameters.',
     )
     parser.add_argument('--arm', type=Path, metavar='FILE', help='laid out as config/arm.yaml')
-    parser.add_argument(
-        '--body',
-        type=Path,
-        metavar='FILE',
-        help='laid out as config/body.yaml, or msg_examples/body.yaml',
-    )
+    parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
     parser.add_argument(
         '--settings', type=Path, metavar='FILE', help='parameters, laid out as config/planner.yaml'
     )
