@@ -168,6 +168,45 @@ def test_an_arm_that_has_not_begun_is_held(watched):
     assert np.abs(stop.positions - watched.motion.positions[0]).max() < 5e-3
 
 
+def see_in_turn(watched, most, *hands):
+    """Let bodies come every tenth of a second, the first before the motion begins."""
+    watched.reporter.parameters = replace(watched.reporter.parameters, max_body_speed=most)
+    # A box that was not there before may be as fast as any.
+    watched.guard.close()
+    watched.now -= 0.1
+    watched.see(hands[0])
+    watched.now += 0.1
+    watched.begin()
+    for hand in hands[1:]:
+        assert watched.published == []
+        watched.now += 0.1
+        watched.read(*watched.on_time(watched.now - 100.0))
+        watched.see(hand)
+
+
+@pytest.mark.parametrize(('most', 'n_stops'), [(0.0, 0), (0.1, 0), (2.0, 1)])
+def test_a_hand_on_its_way_into_the_way_is_foreseen(watched, most, n_stops):
+    still, moved = watched.hand(0.6, -0.4), watched.hand(0.6, -0.3)
+    see_in_turn(watched, most, still, still, moved)
+    assert len(watched.published) == n_stops
+
+
+def test_a_hand_that_the_arm_has_passed_is_let_go_on(watched):
+    # At 0.3 m/s it comes to where the arm is now when that has long gone.
+    see_in_turn(watched, 2.0, *(watched.hand(0.0, away) for away in (0.18, 0.15)))
+    assert watched.published == []
+    assert watched.said[-1] == 'free'
+
+
+def test_a_motion_that_begins_between_two_bodies_makes_nothing_faster(watched):
+    # It goes away, too slowly to get into the way of anything.
+    see_in_turn(watched, 2.0, watched.hand(0.6, -0.400))
+    watched.now += 0.001
+    watched.read(*watched.on_time(watched.now - 100.0))
+    watched.see(watched.hand(0.6, -0.405))
+    assert watched.published == []
+
+
 def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
     watched.now = 100.0 - 0.2
     watched.read(watched.motion.positions[0] + 0.5, np.full(4, 1.0))
