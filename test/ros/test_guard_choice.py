@@ -118,7 +118,7 @@ def test_an_arm_that_has_its_way_goes_on(watched):
 
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
-def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead):
+def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     watched.see(watched.hand(ahead, 0.0))
     ((stop, _),) = watched.published
     assert watched.said == ['braked']
@@ -126,6 +126,9 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead):
     sentence = watched.reporter.guard[1]
     assert 'the arm brakes' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
+    level = 'ERROR' if ahead < 0.3 else 'WARN'
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
+    assert level in line
 
 
 def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(watched):
@@ -166,6 +169,14 @@ def test_an_arm_that_has_not_begun_is_held(watched):
     watched.see(watched.hand(0.6, 0.0))
     ((stop, _),) = watched.published
     assert np.abs(stop.positions - watched.motion.positions[0]).max() < 5e-3
+
+
+def test_a_motion_that_begins_is_held_against_the_body_of_then(watched):
+    hand = watched.hand(0.6, 0.0)
+    # It came after the motion was looked at last, while none was watched.
+    watched.heard.body.value = WearerBody(((('hand', 0), BodyPart((hand,))),))
+    watched.begin()
+    assert len(watched.published) == 1
 
 
 def see_in_turn(watched, most, *hands):
@@ -322,10 +333,23 @@ def test_an_arm_that_is_elsewhere_is_said_aloud(watched):
     assert 'nothing is guarded' in watched.reporter.guard[1]
 
 
-def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched):
+@pytest.mark.parametrize('replan', [False, True])
+def test_it_plans_again_for_the_same_goal_only_where_it_may(watched, replan):
+    watched.reporter.parameters = replace(watched.reporter.parameters, replan=replan)
+    asked = []
+    watched.guard.plan_again = lambda goal, wait: asked.append((goal.target.tolist(), wait))
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, _),) = watched.published
+    assert asked == [([1.0, 1.0, 1.0], stop.duration)] * replan
+
+
+def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched, capfd):
     watched.guard.hold('no way to the goal before')
     assert watched.guard._state is Watch.WATCHING
     watched.see(watched.hand(0.6, 0.0))
     assert len(watched.published) == 1
     watched.guard.hold('no way to the goal')
     assert watched.guard._state is Watch.HOLDING
+    said = 'the arm holds where it is: no way to the goal'
+    assert watched.reporter.guard == ('holds', said)
+    assert said in capfd.readouterr().err
