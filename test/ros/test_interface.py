@@ -219,6 +219,8 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
     say_all(planner, stranger)
     assert seconds(planner) == 0.0
     assert stranger.answer().success
+    n = len(stranger.heard['/diagnostics'])
+    wait_until(lambda: len(stranger.heard['/diagnostics']) > n + 2)
     set_clock(clock, 100.0, wait_until, planner)
     inputs = inputs_of(planner)
     for now, is_fresh in ((100.0, True), (100.5, True), (101.5, False), (20.0, False)):
