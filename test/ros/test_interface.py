@@ -300,14 +300,20 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     def plan_while_it_is_set(*args, **kwargs):
         if not jerks:
             planner.set_parameters(
-                [Parameter('seed', value=6), Parameter('max_jerk', value=[30.0])]
+                [
+                    Parameter('seed', value=6),
+                    Parameter('max_jerk', value=[30.0]),
+                    Parameter('margin', value=0.03),
+                ]
             )
         jerks.append(kwargs['limits'].jerk[0])
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_it_is_set)
-    assert stranger.answer().message.endswith('seed 5')
-    assert stranger.answer().message.endswith('seed 6')
+    # The motion is watched by them too.
+    for seed, margin in ((5, 0.02), (6, 0.03)):
+        assert stranger.answer().message.endswith(f'seed {seed}')
+        assert planner._queue.guard._parameters.margin == margin
     assert jerks == [40.0, 30.0]
 
 
