@@ -326,13 +326,18 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
-        far = box('far', center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
+        body = inputs.body.value
+        far = box('far', body.n_boxes, center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(array(far))
-        wait_until(lambda: inputs.body.value.n_boxes == 4)
+        wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    touch = Touch(0.001, 0.01, 'pointing ray', 'hand/0')
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, 'leads_out', lambda *_: False)
+        message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    touch = Touch(0.001, 0.01, 'pointing ray', 'hand/0')
     monkeypatch.setattr(requests, 'touch_on_way_out', lambda *_: touch)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
@@ -676,20 +681,21 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
     assert order == ['RRTOptions', 'plan']
 
 
-def test_a_box_whose_lifetime_has_passed_is_named(start, monkeypatch):
+def test_a_box_whose_lifetime_has_passed_is_named_and_no_obstacle(start, monkeypatch):
     planner, stranger = start()
     warnings = []
     monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
     body = wearer()
-    hat = box('hat', center=(0.0, 0.0, 0.7), size=(0.2, 0.2, 0.1), text='a hat')
-    hat.lifetime.nanosec = 10**8
-    body.markers.append(hat)
+    # The folded arm is in it.
+    pack = box('pack', center=(-0.3, -0.1, 0.3), text='a pack')
+    pack.lifetime.nanosec = 10**8
+    body.markers.append(pack)
     say_all(planner, stranger, body_boxes=body)
-    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a hat')
-    stranger.wait_until(lambda: any('"a hat"' in line for line in warnings))
+    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a pack')
+    stranger.wait_until(lambda: any('"a pack"' in line for line in warnings))
     assert stranger.answer().success
     assert stranger.answer().success
-    assert sum('"a hat"' in line for line in warnings) == 1
+    assert sum('"a pack"' in line for line in warnings) == 1
 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
