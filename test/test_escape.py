@@ -19,6 +19,7 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import MotionState, Takeover
 from rrth_planner.timing import parameterize
+from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, sample
 from rrth_planner.underway import is_still_free
 from rrth_planner.world import arm_world
@@ -37,7 +38,7 @@ from worlds import (
 )
 
 pytest.importorskip('fcl')
-from rrth_planner import fcl_check, pipeline  # noqa: E402
+from rrth_planner import fcl_check, path_timing, pipeline  # noqa: E402
 
 ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
@@ -311,6 +312,17 @@ def second_opinion(arm, scene, world, trajectory):
     return fcl_check.touch_on_way_out(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
+
+
+def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
+    arm, scene = pressed()
+    touch = Touch(0.001, 0.005, 'pointing ray', 'hand')
+    monkeypatch.setattr(path_timing, 'touch_on_way_out', lambda *_: touch)
+    plan = ask(arm, scene, FOLDED)
+    assert plan.status is PlanStatus.NOT_CERTIFIED
+    assert plan.trajectory is None
+    assert plan.disagreement.touch == touch
+    assert 'at 0.001 s, on the way out of the wearer; expected no part deeper' in plan.sentence
 
 
 def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():

@@ -165,6 +165,13 @@ def test_the_speed_of_a_box_is_that_of_its_fastest_corner():
     found = box_speeds(Scene((still,)), Scene((moved, new)), 0.1, 2.0)
     assert np.allclose(found, [1.0, 2.0])
     assert np.allclose(box_speeds(Scene((still,)), Scene((still,)), 0.1, 2.0), [0.0])
+    assert np.allclose(box_speeds(Scene((still,)), Scene((moved,)), 0.01, 2.0), [2.0])
+    # It may turn or grow where it is.
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = Box('torso', np.zeros(3), np.ones(3), quarter)
+    assert box_speeds(Scene((still,)), Scene((turned,)), 1.0, 9.0) >= np.sqrt(2.0 * 0.5)
+    grown = Box('torso', np.zeros(3), np.array([1.0, 1.2, 1.0]), np.eye(3))
+    assert np.allclose(box_speeds(Scene((still,)), Scene((grown,)), 0.1, 2.0), [1.0])
 
 
 @examples(25)

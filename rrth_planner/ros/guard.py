@@ -14,7 +14,7 @@ from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs
-from rrth_planner.ros.messages import scene_of
+from rrth_planner.ros.messages import scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
@@ -78,7 +78,8 @@ class Guard:
         self.n_brakes, self.n_begun = 0, 0
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
-        self._before: tuple[Scene, float] | None = None
+        # The body that came before, its boxes, and when that was [s].
+        self._before: tuple[WearerBody, Scene, float] | None = None
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
         # Has a stop that was published as free judged once more; set by the owner.
@@ -120,11 +121,14 @@ class Guard:
             speeds, most = None, self._reporter.parameters.max_body_speed
             if self.running is None and most == 0.0:
                 return
-            scene = scene_of(self._heard.body.value.at(now))
-            if most > 0.0 and self._before is not None:
-                before, then = self._before
-                speeds = box_speeds(before, scene, now - then, most)
-            self._before = (scene, now)
+            body = self._heard.body.value
+            scene = scene_of(body.at(now))
+            # A motion that begins looks at the same body again, which tells of no speed.
+            if self._before is None or body is not self._before[0]:
+                if most > 0.0 and self._before is not None:
+                    _, before, then = self._before
+                    speeds = box_speeds(before, scene, now - then, most)
+                self._before = (body, scene, now)
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
                 return

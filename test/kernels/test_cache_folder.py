@@ -87,12 +87,11 @@ def test_a_full_disk_is_warned_of_once(tmp_path):
     assert 'No space left on device' in line
 
 
-def test_a_file_of_the_cache_that_was_cut_short_is_compiled_again(tmp_path):
+def test_files_of_the_cache_that_were_cut_short_are_compiled_again(tmp_path):
     folder = tmp_path / 'cache'
     run(COMPILE, folder, tmp_path)
     for file in folder.rglob('*.nb*'):
-        if 'twice' in file.name:
-            file.write_bytes(file.read_bytes()[:20])
+        file.write_bytes(file.read_bytes()[:20])
     assert len(warnings_in(run(COMPILE, folder, tmp_path))) <= 1
 
 

@@ -119,7 +119,7 @@ def test_an_arm_that_has_its_way_goes_on(watched):
 
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
-def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead):
+def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     watched.see(watched.hand(ahead, 0.0))
     ((stop, _),) = watched.published
     assert watched.said == ['braked']
@@ -127,6 +127,9 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead):
     sentence = watched.reporter.guard[1]
     assert 'the arm brakes' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
+    level = 'ERROR' if ahead < 0.3 else 'WARN'
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
+    assert level in line
 
 
 def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(watched):
@@ -167,6 +170,53 @@ def test_an_arm_that_has_not_begun_is_held(watched):
     watched.see(watched.hand(0.6, 0.0))
     ((stop, _),) = watched.published
     assert np.abs(stop.positions - watched.motion.positions[0]).max() < 5e-3
+
+
+def test_a_motion_that_begins_is_held_against_the_body_of_then(watched):
+    hand = watched.hand(0.6, 0.0)
+    # It came after the motion was looked at last, while none was watched.
+    watched.heard.body.value = WearerBody(((('hand', 0), BodyPart((hand,))),))
+    watched.begin()
+    assert len(watched.published) == 1
+
+
+def see_in_turn(watched, most, *hands):
+    """Let bodies come every tenth of a second, the first before the motion begins."""
+    watched.reporter.parameters = replace(watched.reporter.parameters, max_body_speed=most)
+    # A box that was not there before may be as fast as any.
+    watched.guard.close()
+    watched.now -= 0.1
+    watched.see(hands[0])
+    watched.now += 0.1
+    watched.begin()
+    for hand in hands[1:]:
+        assert watched.published == []
+        watched.now += 0.1
+        watched.read(*watched.on_time(watched.now - 100.0))
+        watched.see(hand)
+
+
+@pytest.mark.parametrize(('most', 'n_stops'), [(0.0, 0), (0.1, 0), (2.0, 1)])
+def test_a_hand_on_its_way_into_the_way_is_foreseen(watched, most, n_stops):
+    still, moved = watched.hand(0.6, -0.4), watched.hand(0.6, -0.3)
+    see_in_turn(watched, most, still, still, moved)
+    assert len(watched.published) == n_stops
+
+
+def test_a_hand_that_the_arm_has_passed_is_let_go_on(watched):
+    # At 0.3 m/s it comes to where the arm is now when that has long gone.
+    see_in_turn(watched, 2.0, *(watched.hand(0.0, away) for away in (0.18, 0.15)))
+    assert watched.published == []
+    assert watched.said[-1] == 'free'
+
+
+def test_a_motion_that_begins_between_two_bodies_makes_nothing_faster(watched):
+    # It goes away, too slowly to get into the way of anything.
+    see_in_turn(watched, 2.0, watched.hand(0.6, -0.400))
+    watched.now += 0.001
+    watched.read(*watched.on_time(watched.now - 100.0))
+    watched.see(watched.hand(0.6, -0.405))
+    assert watched.published == []
 
 
 def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
@@ -342,10 +392,23 @@ def test_an_arm_that_is_elsewhere_is_said_aloud(watched):
     assert 'nothing is guarded' in watched.reporter.guard[1]
 
 
-def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched):
+@pytest.mark.parametrize('replan', [False, True])
+def test_it_plans_again_for_the_same_goal_only_where_it_may(watched, replan):
+    watched.reporter.parameters = replace(watched.reporter.parameters, replan=replan)
+    asked = []
+    watched.guard.plan_again = lambda goal, wait: asked.append((goal.target.tolist(), wait))
+    watched.see(watched.hand(0.6, 0.0))
+    ((stop, _),) = watched.published
+    assert asked == [([1.0, 1.0, 1.0], stop.duration)] * replan
+
+
+def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched, capfd):
     watched.guard.hold('no way to the goal before')
     assert watched.guard._state is Watch.WATCHING
     watched.see(watched.hand(0.6, 0.0))
     assert len(watched.published) == 1
     watched.guard.hold('no way to the goal')
     assert watched.guard._state is Watch.HOLDING
+    said = 'the arm holds where it is: no way to the goal'
+    assert watched.reporter.guard == ('holds', said)
+    assert said in capfd.readouterr().err

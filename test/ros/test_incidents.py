@@ -13,15 +13,19 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
+from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner import path_timing  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
+from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros import requests, second_opinion  # noqa: E402
+from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.ros.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages import scene_of  # noqa: E402
 from rrth_planner.status import PlanStatus  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
@@ -243,12 +247,42 @@ def test_diagnostics_say_everything(start):
         *(
             f'{kind} {name}{unit}'
             for name in ('body', 'target', 'joints')
-            for kind, unit in (('age of', ' [s]'), ('refused messages,', ''))
+            for kind, unit in (
+                *(('age of', ' [s]'), ('good messages,', '')),
+                ('refused messages,', ''),
+            )
         ),
     ):
         assert float(stranger.value(name)) >= 0.0, name
     for name in ('last sentence', 'last incident', 'guard', 'last stop', 'last refusal, body'):
         assert isinstance(stranger.value(name), str)
+
+
+def test_the_summary_of_diagnostics_is_what_is_worst(start):
+    planner, _ = start(body_timeout=1.0)
+    heard = Inputs('body', 'target', 'joints')
+
+    def summary(now=10.0, code=None, sentence=''):
+        report = PlanReport(code=code, sentence=sentence)
+        parameters = planner._reporter.parameters
+        (status,) = diagnostics_msg('', Time(), now, heard, parameters, report).status
+        return status.level, status.message
+
+    def refuse():
+        raise MessageError('no point')
+
+    assert summary() == (DiagnosticStatus.WARN, 'waiting for body, target, joints')
+    for topic in heard.all.values():
+        topic.accept(lambda topic=topic: topic.value, 10.0)
+    assert summary() == (DiagnosticStatus.OK, 'ready')
+    assert summary(code=ErrorCode.SUCCESS, sentence='so') == (DiagnosticStatus.OK, 'so')
+    late = {'code': ErrorCode.TIMED_OUT, 'sentence': 'no path'}
+    assert summary(**late) == (DiagnosticStatus.WARN, 'TIMED_OUT (-6): no path')
+    heard.target.accept(refuse, 10.0)
+    assert summary(**late) == (DiagnosticStatus.WARN, 'target refused: no point')
+    assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
+    broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
+    assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken
 
 
 def test_every_end_of_a_plan_has_a_code_of_its_own_kind():

@@ -219,6 +219,8 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
     say_all(planner, stranger)
     assert seconds(planner) == 0.0
     assert stranger.answer().success
+    n = len(stranger.heard['/diagnostics'])
+    wait_until(lambda: len(stranger.heard['/diagnostics']) > n + 2)
     set_clock(clock, 100.0, wait_until, planner)
     inputs = inputs_of(planner)
     for now, is_fresh in ((100.0, True), (100.5, True), (101.5, False), (20.0, False)):
@@ -298,14 +300,20 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     def plan_while_it_is_set(*args, **kwargs):
         if not jerks:
             planner.set_parameters(
-                [Parameter('seed', value=6), Parameter('max_jerk', value=[30.0])]
+                [
+                    Parameter('seed', value=6),
+                    Parameter('max_jerk', value=[30.0]),
+                    Parameter('margin', value=0.03),
+                ]
             )
         jerks.append(kwargs['limits'].jerk[0])
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_it_is_set)
-    assert stranger.answer().message.endswith('seed 5')
-    assert stranger.answer().message.endswith('seed 6')
+    # The motion is watched by them too.
+    for seed, margin in ((5, 0.02), (6, 0.03)):
+        assert stranger.answer().message.endswith(f'seed {seed}')
+        assert planner._queue.guard._parameters.margin == margin
     assert jerks == [40.0, 30.0]
 
 

@@ -29,7 +29,7 @@ from rclpy.qos import (  # noqa: E402
 from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros import plan_queue, requests  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
@@ -317,6 +317,33 @@ def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wai
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
 
 
+def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
+    start, monkeypatch, wait_until, tmp_path
+):
+    planner, stranger = start(incident_folder=str(tmp_path))
+    say_all(planner, stranger, body_boxes=leaned())
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+
+    def plan_while_a_box_comes(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        body = inputs.body.value
+        far = box('far', body.n_boxes, center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
+        stranger.publishers['body_boxes'].publish(array(far))
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, 'leads_out', lambda *_: False)
+        message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    touch = Touch(0.001, 0.01, 'pointing ray', 'hand/0')
+    monkeypatch.setattr(requests, 'touch_on_way_out', lambda *_: touch)
+    message = stranger.answer().message
+    assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
+    assert not stranger.heard['joint_trajectory']
+
+
 @pytest.mark.parametrize(
     ('timeout', 'answer'),
     [('body_timeout', 'SENSOR_INFO_STALE (-24)'), ('joint_timeout', 'ROBOT_STATE_STALE (-23)')],
@@ -468,6 +495,34 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     monkeypatch.setattr(requests, 'plan_motion', plan_while_it_starts)
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
+    monkeypatch.setattr(plan_queue, 'LONGEST_SETTLING', 30.0)
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
+    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    # Time enough for a plan that does not wait for rest.
+    time.sleep(0.2)
+    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    (msg,) = stranger.heard['joint_trajectory']
+    assert list(msg.points[0].positions) == [0.1, *FOLDED[1:]]
+    assert not any(msg.points[0].velocities)
+    error = pointing_error(load_arm(), np.array(msg.points[-1].positions), [1.5, 0.1, 0.3])
+    assert error < 1e-6
+
+
+def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
+    planner, stranger = start(max_samples=100)
+    say_all(planner, stranger, body_boxes=fenced())
+    guard = planner._queue.guard
+    guard.plan_again(inputs_of(planner).target.value, 0.0)
+    stranger.publishers['joint_states'].publish(joints())
+    stranger.wait_until(lambda: stranger.value('guard') == 'holds')
+    said = stranger.value('last stop')
+    assert said.startswith('the arm holds where it is: PLANNING_FAILED (-1): ')
     assert not stranger.heard['joint_trajectory']
 
 
@@ -626,20 +681,21 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
     assert order == ['RRTOptions', 'plan']
 
 
-def test_a_box_whose_lifetime_has_passed_is_named(start, monkeypatch):
+def test_a_box_whose_lifetime_has_passed_is_named_and_no_obstacle(start, monkeypatch):
     planner, stranger = start()
     warnings = []
     monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
     body = wearer()
-    hat = box('hat', center=(0.0, 0.0, 0.7), size=(0.2, 0.2, 0.1), text='a hat')
-    hat.lifetime.nanosec = 10**8
-    body.markers.append(hat)
+    # The folded arm is in it.
+    pack = box('pack', center=(-0.3, -0.1, 0.3), text='a pack')
+    pack.lifetime.nanosec = 10**8
+    body.markers.append(pack)
     say_all(planner, stranger, body_boxes=body)
-    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a hat')
-    stranger.wait_until(lambda: any('"a hat"' in line for line in warnings))
+    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a pack')
+    stranger.wait_until(lambda: any('"a pack"' in line for line in warnings))
     assert stranger.answer().success
     assert stranger.answer().success
-    assert sum('"a hat"' in line for line in warnings) == 1
+    assert sum('"a pack"' in line for line in warnings) == 1
 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
@@ -679,6 +735,10 @@ def test_publishers_of_every_quality_are_heard_once(start, profile):
         for name, (_, make) in TOPICS.items():
             stranger.publishers[name].publish(make())
     stranger.wait_until(lambda: all(i.received is not None for i in inputs.all.values()))
+    if profile is not BEST_EFFORT:
+        # What the best-effort reader misses comes by another one.
+        hearers = planner._listener._subscriptions
+        stranger.wait_until(lambda: all(profile.durability in h._reliable for h in hearers))
 
 
 def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until):
