@@ -181,13 +181,14 @@ def test_a_motion_that_begins_is_held_against_the_body_of_then(watched):
 
 
 def see_in_turn(watched, most, *hands):
-    """Let bodies come every tenth of a second, the first before the motion begins."""
+    """Let bodies come every tenth of a second, the first, twice, before the motion begins."""
     watched.reporter.parameters = replace(watched.reporter.parameters, max_body_speed=most)
     # A box that was not there before may be as fast as any.
     watched.guard.close()
-    watched.now -= 0.1
-    watched.see(hands[0])
-    watched.now += 0.1
+    watched.now -= 0.2
+    for _ in range(2):
+        watched.see(hands[0])
+        watched.now += 0.1
     watched.begin()
     for hand in hands[1:]:
         assert watched.published == []
@@ -208,6 +209,18 @@ def test_a_hand_that_the_arm_has_passed_is_let_go_on(watched):
     see_in_turn(watched, 2.0, *(watched.hand(0.0, away) for away in (0.18, 0.15)))
     assert watched.published == []
     assert watched.said[-1] == 'free'
+
+
+def test_a_motion_that_begins_while_a_hand_comes_is_held_against_its_way(watched):
+    still, moved = watched.hand(0.6, -0.4), watched.hand(0.6, -0.3)
+    see_in_turn(watched, 2.0, still)
+    watched.guard.close()
+    watched.now += 0.1
+    watched.read(*watched.on_time(watched.now - 100.0))
+    watched.see(moved)
+    assert watched.published == []
+    watched.begin()
+    assert len(watched.published) == 1
 
 
 def test_a_motion_that_begins_between_two_bodies_makes_nothing_faster(watched):
