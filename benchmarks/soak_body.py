@@ -113,9 +113,10 @@ class BodyStream:
 
     def change(self, wearer: int) -> None:
         """Be another wearer from the next message on."""
+        # Bodies go on to be sent while this one is drawn.
+        msg = _message(scene_of_body(BodyAt(0, wearer, 0.0)))
         with self._lock:
-            self._wearer = wearer
-            self._msg = _message(scene_of_body(BodyAt(0, wearer, 0.0)))
+            self._wearer, self._msg = wearer, msg
 
     def put(self, hand: tuple[float, float, float, float]) -> BodyAt:
         """Return the first body with a hand, `NO_HAND` to take it away, once it is sent."""
