@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A running motion: what is left of it, held against a new body, and how it stops."""
 
+import functools
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -237,13 +239,19 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
     assert min(told.values()) >= 5, told
 
 
+@functools.cache
+def some_motions():
+    """Return a few motions round the wearer."""
+    rng = np.random.default_rng(12)
+    return [motion for motion in [random_motion(rng) for _ in range(12)] if motion is not None]
+
+
 @pytest.mark.parametrize(
     ('late', 'rate'), [(0.0, 1.0), (1e-5, 1.0), (-1e-5, 1.0), (0.003, 1.0), (0.0, 0.5), (0.0, 0.1)]
 )
 def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
-    rng = np.random.default_rng(12)
     n_known = 0
-    for motion in filter(None, [random_motion(rng) for _ in range(12)]):
+    for motion in some_motions():
         before = RunningMotion(trajectory=motion, start_time=100.0)
         begin, begin_ahead = 0.3 * motion.duration, 0.025
         # Its first two points are close, as those of a lead-in.
@@ -271,8 +279,7 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
 
 
 def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
-    rng = np.random.default_rng(12)
-    motion = random_motion(rng)
+    motion = some_motions()[0]
     before = RunningMotion(trajectory=motion, start_time=100.0)
     half = 0.5 * motion.duration
     later = between(motion, half, motion.duration)
