@@ -219,7 +219,7 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         if motion is None or motion.duration < 0.2:
             continue
         phase = rng.uniform(0.0, 0.8) * motion.duration
-        times = np.linspace(phase, motion.duration, 400)
+        times = np.linspace(phase, motion.duration, 200)
         q, _, _ = sample(motion, times)
         scene = hand_beside(rng, q[0], MARGIN)
         if scene is None:

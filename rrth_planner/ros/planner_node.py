@@ -81,7 +81,7 @@ class PlannerNode(Node):
             )
         if not is_compiled():
             how_often = 'at every start' if cache_folder() is None else 'once for this machine'
-            self.get_logger().info(f'compiling kernels, {how_often}: takes up to a minute')
+            self.get_logger().info(f'compiling kernels, {how_often}: takes one or two minutes')
             if cache_folder() is not None:
                 compile_kernels()
 
