@@ -119,6 +119,8 @@ def test_an_arm_that_has_its_way_goes_on(watched):
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
 def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
+    judged = []
+    watched.guard.judge = lambda stop, *_: judged.append(stop)
     watched.see(watched.hand(ahead, 0.0))
     ((stop, _),) = watched.published
     assert watched.said == ['braked']
@@ -126,6 +128,8 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     sentence = watched.reporter.guard[1]
     assert 'the arm brakes' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
+    # What is proven free, and only that, is for the second judge too.
+    assert judged == ([] if ahead < 0.3 else [stop])
     level = 'ERROR' if ahead < 0.3 else 'WARN'
     (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
     assert level in line
