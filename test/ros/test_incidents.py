@@ -214,13 +214,16 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
     assert stranger.answer().success
 
 
-def test_each_request_is_logged_once_with_figures_or_with_its_code(start):
-    planner, stranger = start(seed=3)
+def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkeypatch, tmp_path):
+    planner, stranger = start(seed=3, incident_folder=str(tmp_path))
     stranger.hear('/rosout', Log, 100)
     name = planner.get_logger().name
     say_all(planner, stranger)
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
-    answers = [stranger.answer() for _ in range(3)]
+    answers = [stranger.answer() for _ in range(2)]
+    with monkeypatch.context() as patch:
+        patch.setattr(path_timing, 'first_touch', lambda *_: TOUCH)
+        answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
     answers.append(stranger.answer())
@@ -230,7 +233,7 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start):
 
     stranger.wait_until(lambda: len(lines()) == len(answers))
     assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
-    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'info', 'warning']
+    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'error', 'warning']
     for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
         assert word in lines()[0].msg
     assert lines()[-1].msg.startswith('GOAL_IN_COLLISION (-12): the target (0.000, 0.000, 0.000)')
