@@ -177,10 +177,12 @@ def test_an_arm_that_has_not_begun_is_held(watched):
 
 def test_a_motion_that_begins_is_held_against_the_body_of_then(watched):
     hand = watched.hand(0.6, 0.0)
-    # It came after the motion was looked at last, while none was watched.
-    watched.heard.body.value = WearerBody(((('hand', 0), BodyPart((hand,))),))
-    watched.begin()
-    assert len(watched.published) == 1
+    # It came after the motion was looked at last, while none was watched; one is gone by now.
+    for expires, n_stops in ((watched.now - 0.1, 0), (watched.now + 0.1, 1)):
+        parts = (('hand', 0), BodyPart((hand,), expires)), (('far', 0), BodyPart((FAR,)))
+        watched.heard.body.value = WearerBody(parts)
+        watched.begin()
+        assert len(watched.published) == n_stops
 
 
 def see_in_turn(watched, most, *hands):
