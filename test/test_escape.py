@@ -13,6 +13,7 @@ from rrth_planner.leaving import box_depths, leads_out, relaxed
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch, first_contact
 from rrth_planner.path import Path
+from rrth_planner.path_search import SPARES
 from rrth_planner.reach import bar_ends
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
@@ -22,7 +23,7 @@ from rrth_planner.timing import parameterize
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, sample
 from rrth_planner.underway import is_still_free
-from rrth_planner.world import arm_world
+from rrth_planner.world import arm_world, grown
 from worlds import (
     examples,
     FOLDED,
@@ -253,6 +254,24 @@ def pressed(depth=0.03):
     size = np.array([0.1, 0.1, 0.1])
     center = tip.mean(axis=0) - (0.5 * size[1] + MARGIN - depth) * side
     return arm, Scene((*wearer().boxes, Box('hand', center, size, rotation)))
+
+
+@pytest.mark.parametrize('seed', [None, 4, 7, 8])
+def test_no_way_out_that_is_shorter_is_found_by_trying_many(seed):
+    if seed is None:
+        (arm, scene), q_start = pressed(), FOLDED
+    else:
+        arm, scene, q_start, _ = leaned_case(seed, 0.01, 0.045)
+    plan = ask(arm, scene, q_start)
+    way = plan.path.waypoints[1] - q_start
+    roomy = grown(arm_world(arm, scene, MARGIN, RAY), SPARES[0])
+    assert roomy.is_valid(q_start + way)
+    rng, length = np.random.default_rng(0), np.linalg.norm(way)
+    aside = rng.normal(size=(3000, 4)) * np.repeat([0.1, 0.3, 3.0], 1000)[:, None]
+    tries = way / length + aside
+    tries *= 0.98 * length / np.linalg.norm(tries, axis=1)[:, None]
+    ends = np.clip(q_start + tries, *roomy.bounds)
+    assert not any(roomy.is_valid(q_end) for q_end in ends)
 
 
 def test_an_arm_that_moves_is_not_led_out():

@@ -120,6 +120,8 @@ def test_an_arm_that_has_its_way_goes_on(watched):
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
 def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
+    judged = []
+    watched.guard.judge = lambda stop, *_: judged.append(stop)
     watched.see(watched.hand(ahead, 0.0))
     ((stop, _),) = watched.published
     assert watched.said == ['braked']
@@ -127,6 +129,8 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     sentence = watched.reporter.guard[1]
     assert 'the arm brakes' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
+    # What is proven free, and only that, is for the second judge too.
+    assert judged == ([] if ahead < 0.3 else [stop])
     level = 'ERROR' if ahead < 0.3 else 'WARN'
     (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
     assert level in line
@@ -174,10 +178,12 @@ def test_an_arm_that_has_not_begun_is_held(watched):
 
 def test_a_motion_that_begins_is_held_against_the_body_of_then(watched):
     hand = watched.hand(0.6, 0.0)
-    # It came after the motion was looked at last, while none was watched.
-    watched.heard.body.value = WearerBody(((('hand', 0), BodyPart((hand,))),))
-    watched.begin()
-    assert len(watched.published) == 1
+    # It came after the motion was looked at last, while none was watched; one is gone by now.
+    for expires, n_stops in ((watched.now - 0.1, 0), (watched.now + 0.1, 1)):
+        parts = (('hand', 0), BodyPart((hand,), expires)), (('far', 0), BodyPart((FAR,)))
+        watched.heard.body.value = WearerBody(parts)
+        watched.begin()
+        assert len(watched.published) == n_stops
 
 
 def see_in_turn(watched, most, *hands):

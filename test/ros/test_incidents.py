@@ -22,11 +22,11 @@ from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.options import RRTStarOptions  # noqa: E402
-from rrth_planner.ros import requests, second_opinion  # noqa: E402
+from rrth_planner.ros import reporter, requests, second_opinion  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
-from rrth_planner.ros.messages import scene_of  # noqa: E402
+from rrth_planner.ros.messages import scene_of, WearerBody  # noqa: E402
 from rrth_planner.status import PlanStatus  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
@@ -214,13 +214,16 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
     assert stranger.answer().success
 
 
-def test_each_request_is_logged_once_with_figures_or_with_its_code(start):
-    planner, stranger = start(seed=3)
+def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkeypatch, tmp_path):
+    planner, stranger = start(seed=3, incident_folder=str(tmp_path))
     stranger.hear('/rosout', Log, 100)
     name = planner.get_logger().name
     say_all(planner, stranger)
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
-    answers = [stranger.answer() for _ in range(3)]
+    answers = [stranger.answer() for _ in range(2)]
+    with monkeypatch.context() as patch:
+        patch.setattr(path_timing, 'first_touch', lambda *_: TOUCH)
+        answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
     answers.append(stranger.answer())
@@ -230,7 +233,7 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start):
 
     stranger.wait_until(lambda: len(lines()) == len(answers))
     assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
-    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'info', 'warning']
+    assert [LEVELS[msg.level] for msg in lines()] == ['info', 'info', 'error', 'warning']
     for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
         assert word in lines()[0].msg
     assert lines()[-1].msg.startswith('GOAL_IN_COLLISION (-12): the target (0.000, 0.000, 0.000)')
@@ -283,6 +286,20 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
     broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
     assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken
+
+
+def test_only_so_many_expired_boxes_are_remembered_as_named(start, monkeypatch):
+    monkeypatch.setattr(reporter, 'MOST_NAMED', 3)
+    planner, _ = start()
+    heard = inputs_of(planner).body
+    for k in range(20):
+        hat = samples.box('hat', k)
+        hat.lifetime.nanosec = 1
+        heard.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
+        planner._reporter._warn_of_expired(1.0)
+        named = planner._reporter._named
+        assert ('hat', k) in named
+        assert len(named) <= 5
 
 
 def test_every_end_of_a_plan_has_a_code_of_its_own_kind():

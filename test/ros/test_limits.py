@@ -15,7 +15,7 @@ from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import body_history  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
 from rrth_planner.ros.edits import (  # noqa: E402
     LONGEST_NAME,
@@ -163,6 +163,23 @@ def test_the_history_keeps_to_a_number_of_boxes(monkeypatch):
     assert len(history._heard) == 1
     old = read_edits(array(command(Marker.DELETEALL), box('pack')), 0.0, 'torso')
     assert history.apply(body, old, 50, 0.0).n_boxes == 41
+
+
+def test_the_history_keeps_to_a_number_of_arrays(monkeypatch):
+    monkeypatch.setattr(body_history, 'REMEMBERED', 3)
+    history, body = BodyHistory(), WearerBody()
+    for k in range(10):
+        edits = read_edits(array(command(Marker.DELETE, 'hat', k)), 0.0, 'torso')
+        body = history.apply(body, edits, 100 + k, 0.0)
+    assert [sent for sent, *_ in history._heard] == [107, 108, 109]
+
+
+def test_the_last_of_many_that_have_expired_are_kept():
+    hats = [box('hat', k) for k in range(MOST_EXPIRED + 20)]
+    for hat in hats:
+        hat.lifetime.nanosec = 1
+    body = WearerBody().apply(array(*hats), 0.0, 'torso').at(1.0)
+    assert [key for key, _ in body.expired] == [('hat', 20 + k) for k in range(MOST_EXPIRED)]
 
 
 def test_what_has_expired_is_kept_by_its_first_box_only():

@@ -514,6 +514,36 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
     assert error < 1e-6
 
 
+def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    plan_motion = requests.plan_motion
+
+    def plan_while_the_arm_is_stopped(*args, **kwargs):
+        planner._queue.guard.n_brakes += 1
+        return plan_motion(*args, **kwargs)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(requests, 'plan_motion', plan_while_the_arm_is_stopped)
+        message = stranger.answer().message
+    assert message.startswith(
+        'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped for the wearer'
+    )
+    assert not stranger.heard['joint_trajectory']
+    assert stranger.answer().success
+
+
+def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
+    monkeypatch.setattr(plan_queue, 'LONGEST_SETTLING', 30.0)
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
+    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    planner._queue.guard.n_begun += 1
+    stranger.publishers['joint_states'].publish(joints())
+    planner._queue._worker.submit(lambda: None).result(30.0)
+    assert planner._reporter.report.n_requests == 0
+
+
 def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
     planner, stranger = start(max_samples=100)
     say_all(planner, stranger, body_boxes=fenced())

@@ -15,7 +15,11 @@ from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402
 from rrth_planner.ros.messages import joint_reading  # noqa: E402
-from rrth_planner.ros.subscriptions import DuplicateFilter, OpenSubscription  # noqa: E402
+from rrth_planner.ros.subscriptions import (  # noqa: E402
+    DuplicateFilter,
+    OpenSubscription,
+    REMEMBERED,
+)
 from samples import array, box, command, FOLDED, JOINTS, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
@@ -46,6 +50,17 @@ def test_a_latched_message_of_a_late_publisher_is_late():
     assert copies.counts_reliable((50, 1))
     assert not copies.counts_reliable((50, 1))
     assert not copies.is_late((100, 3))
+
+
+def test_no_more_than_a_number_of_copies_are_remembered():
+    copies = DuplicateFilter()
+    assert copies.counts_live((10**6, 0))
+    for k in range(2 * REMEMBERED):
+        assert copies.counts_live((10**6 + k, 1))
+        assert copies.counts_reliable((k, 2))
+    assert len(copies._seen) == len(copies._seen_late) == REMEMBERED
+    # The newest ones.
+    assert not copies.counts_live((10**6 + 2 * REMEMBERED - 1, 1))
 
 
 def test_what_comes_live_counts_even_from_a_clock_that_is_behind():

@@ -28,7 +28,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.errors import LONGEST_SENTENCE  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from rrth_planner.ros.playback_node import MOST_BYTES, PlaybackNode  # noqa: E402
 from samples import array, box, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
@@ -377,6 +377,12 @@ def test_bytes_that_are_no_trajectory_are_refused(playback, data):
     before = playback._playback
     playback._on_raw_trajectory(b'\0\1\0\0' + data)
     playback._on_raw_trajectory(data)
+    assert playback._playback is before
+
+
+def test_a_motion_of_too_many_bytes_is_refused(playback):
+    before = playback._playback
+    playback._on_raw_trajectory(serialize_message(good_motion()) + bytes(MOST_BYTES))
     assert playback._playback is before
 
 
