@@ -51,8 +51,11 @@ def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -
     pace = np.linalg.norm(sample(stop.trajectory, [0.0, elapsed])[1], axis=1)
     if pace[1] > LITTLE * pace[0]:
         return False
-    found = phase_of(reading.positions, reading.velocities, before.trajectory)
-    return found is not None and found[1] >= FULL
+    q, v = reading.positions, reading.velocities
+    along, braking = phase_of(q, v, before.trajectory), phase_of(q, v, stop.trajectory)
+    # A motion may slow down by itself where it is stopped: an arm that obeys has its pace, too.
+    obeys = braking is not None and braking[1] * FULL <= 1.0
+    return along is not None and along[1] >= FULL and not obeys
 
 
 def is_on_other(reading: JointReading, motion: RunningMotion, other: RunningMotion) -> bool:
