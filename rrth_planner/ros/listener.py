@@ -89,6 +89,7 @@ class Listener:
 
     def _on_body(self, msg: MarkerArray, sent: int, arrived: int) -> None:
         now, body = self._now(), self._inputs.body
+        body.arrived = arrived
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(body)
 

@@ -15,6 +15,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.catching_up import catch_up
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
@@ -169,6 +170,7 @@ class PlanQueue:
                 lambda: ticket.is_cancelled,
                 goal,
                 running,
+                self._catch_up,
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             incident = outcome.incident
@@ -298,6 +300,11 @@ class PlanQueue:
         self._publishers.publish_view(
             outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
         )
+
+    def _catch_up(self) -> None:
+        """Wait until the node has read the bodies that came."""
+        body = self._heard.body
+        catch_up(self._node.executor, lambda: (body.n_good + body.n_refused, body.arrived))
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9

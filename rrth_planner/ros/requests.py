@@ -40,6 +40,8 @@ LEADS = (0.05, LONGEST_LEAD)
 # So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
 # present motion is unknown, since the arm has to be looked at as late as can be.
 EARLY = 0.025
+# How often a motion is held against the wearer before it is told, who may never stand still.
+MOST_CHECKS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +112,7 @@ def plan_request(
     should_stop: Callable[[], bool],
     goal: PointingGoal | None = None,
     running: RunningMotion | None = None,
+    catch_up: Callable[[], object] = lambda: None,
 ) -> PlanOutcome:
     """
     Return the outcome of a request that begins now.
@@ -130,6 +133,8 @@ def plan_request(
         Of the request; without, the last target.
     running : RunningMotion, optional
         The motion that the arm was last told to follow.
+    catch_up : callable, optional
+        Returns when all that has come is heard.
 
     Raises
     ------
@@ -163,7 +168,7 @@ def plan_request(
                 _wait_for(start, clock, should_stop)
                 if should_stop():
                     raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-                moved = _check_present(heard, parameters, clock(), inputs, plan, start)
+                moved = _check_news(heard, parameters, clock, inputs, plan, start, catch_up)
                 if moved is not None:
                     incident = disagreement_incident(question, *moved)
                     sentence = f'{incident.sentence}, seed {plan.seed}'
@@ -214,6 +219,25 @@ def _wait_for(
         if left <= 0.0:
             return
         time.sleep(min(1e-3, max(1e-5, left)))
+
+
+def _check_news(
+    heard: Inputs,
+    parameters: PlannerParameters,
+    clock: Callable[[], float],
+    inputs: PlanInputs,
+    plan: MotionPlan,
+    start: Start | None,
+    catch_up: Callable[[], object],
+) -> tuple[Disagreement, Scene] | None:
+    """Check as `_check_present` does until no other body comes meanwhile."""
+    for _ in range(MOST_CHECKS):
+        catch_up()
+        body = heard.body.value
+        moved = _check_present(heard, parameters, clock(), inputs, plan, start)
+        if moved is not None or heard.body.value is body:
+            return moved
+    return None
 
 
 def _check_present(

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-import threading
+from threading import Event, Thread, Timer
 import time
 
 import numpy as np
@@ -29,7 +29,7 @@ from rclpy.qos import (  # noqa: E402
 from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import plan_queue, requests  # noqa: E402
+from rrth_planner.ros import catching_up, plan_queue, requests  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
@@ -498,6 +498,50 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     assert not stranger.heard['joint_trajectory']
 
 
+def test_a_body_that_came_but_was_not_read_yet_counts(start, monkeypatch):
+    monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    plan_motion = requests.plan_motion
+
+    def plan_while_the_node_is_busy(*args, **kwargs):
+        plan = plan_motion(*args, **kwargs)
+        begun, end = Event(), Event()
+        planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
+        assert begun.wait(10.0)
+        stranger.publishers['body_boxes'].publish(fenced())
+        Timer(0.3, end.set).start()
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_node_is_busy)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert not stranger.heard['joint_trajectory']
+
+
+@pytest.mark.parametrize('is_in_the_way', [True, False])
+def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
+    start, monkeypatch, wait_until, is_in_the_way
+):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, check, checked = inputs_of(planner), requests._check_present, []
+
+    def check_while_a_body_comes(*args):
+        found, body = check(*args), inputs.body.value
+        checked.append(body)
+        far = box('far', len(checked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
+        stranger.publishers['body_boxes'].publish(fenced() if is_in_the_way else array(far))
+        wait_until(lambda: inputs.body.value is not body)
+        return found
+
+    monkeypatch.setattr(requests, '_check_present', check_while_a_body_comes)
+    message = stranger.answer().message
+    # Not for ever: the guard holds the motion against the bodies that follow.
+    assert len(checked) == (1 if is_in_the_way else requests.MOST_CHECKS)
+    assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
+
+
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
     monkeypatch.setattr(plan_queue, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
@@ -645,7 +689,7 @@ def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
 def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, is_answered = planner._queue, threading.Event()
+    queue, is_answered = planner._queue, Event()
     show = queue._show
 
     def show_late(*args):
@@ -680,7 +724,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
 
     def close_after_the_last_look(*args):
         check_present(*args)
-        closers.append(threading.Thread(target=queue.close))
+        closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
 
