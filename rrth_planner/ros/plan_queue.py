@@ -15,7 +15,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.catching_up import catch_up
+from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
@@ -90,6 +90,8 @@ class PlanQueue:
         self._node, self._heard, self._reporter = node, heard, reporter
         self._plan_request = plan_request
         self._publishers = PlanPublishers(node)
+        body = heard.body
+        self._catch_up = CatchUp(node, lambda: (body.n_good + body.n_refused, body.arrived))
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         # Held while a motion is published, so that what was cancelled before never is.
         self._lock = RLock()
@@ -300,11 +302,6 @@ class PlanQueue:
         self._publishers.publish_view(
             outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
         )
-
-    def _catch_up(self) -> None:
-        """Wait until the node has read the bodies that came."""
-        body = self._heard.body
-        catch_up(self._node.executor, lambda: (body.n_good + body.n_refused, body.arrived))
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9

@@ -231,8 +231,8 @@ def _check_news(
     catch_up: Callable[[], object],
 ) -> tuple[Disagreement, Scene] | None:
     """Check as `_check_present` does until no other body comes meanwhile."""
+    catch_up()
     for _ in range(MOST_CHECKS):
-        catch_up()
         body = heard.body.value
         moved = _check_present(heard, parameters, clock(), inputs, plan, start)
         if moved is not None or heard.body.value is body:

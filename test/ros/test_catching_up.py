@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What came before a motion is published is read before, however busy the node was."""
 
-from threading import Event, Thread, Timer
+from itertools import count
+from threading import Event, Timer
 import time
 
 import pytest
@@ -12,11 +13,11 @@ pytest.importorskip('rclpy')
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.ros import catching_up  # noqa: E402
-from rrth_planner.ros.catching_up import catch_up  # noqa: E402
+from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
 from std_msgs.msg import Int32  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
-N = 5
+N = catching_up.MOST_ROUNDS
 # For messages to come that nobody reads yet [s].
 DELIVERY = 0.3
 
@@ -47,6 +48,7 @@ def _busy(executor):
 
 def test_all_that_came_is_heard(node, spinning, wait_until, monkeypatch):
     monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
+    catch_up = CatchUp(node, lambda: (len(node.numbers), 0))
     with spinning(node) as executor:
         wait_until(lambda: node.out.get_subscription_count() == 1)
         end = _busy(executor)
@@ -56,59 +58,46 @@ def test_all_that_came_is_heard(node, spinning, wait_until, monkeypatch):
         time.sleep(DELIVERY)
         assert node.numbers == []
         Timer(0.05, end.set).start()
-        assert catch_up(executor, lambda: (len(node.numbers), 0))
+        assert catch_up()
         assert node.numbers == list(range(N))
 
 
 def test_who_hears_more_and_more_is_not_waited_for(node, spinning):
-    rounds = []
-
-    def heard():
-        rounds.append(0)
-        return len(rounds), 0
-
-    with spinning(node) as executor:
-        assert catch_up(executor, heard)
-        assert len(rounds) == catching_up.MOST_ROUNDS + 1
+    rounds = count()
+    catch_up = CatchUp(node, lambda: (next(rounds), 0))
+    with spinning(node):
+        for k in range(1, 4):
+            assert catch_up()
+            assert next(rounds) == k * (catching_up.MOST_ROUNDS + 2) - 1
 
 
 @pytest.mark.parametrize('is_news', [False, True])
 def test_one_that_came_later_ends_the_waiting(node, spinning, is_news):
-    rounds, before = [], time.time_ns()
+    rounds, before = count(), time.time_ns()
+    catch_up = CatchUp(node, lambda: (next(rounds), time.time_ns() if is_news else before))
+    with spinning(node):
+        assert catch_up()
+    assert next(rounds) == 1 + (1 if is_news else catching_up.MOST_ROUNDS)
 
-    def heard():
-        rounds.append(0)
-        return len(rounds), time.time_ns() if is_news else before
 
+def test_a_node_that_stays_busy_is_not_waited_for(node, spinning):
+    looks = count()
+    catch_up = CatchUp(node, lambda: (next(looks), 0))
     with spinning(node) as executor:
-        assert catch_up(executor, heard)
-        assert len(rounds) == (1 if is_news else catching_up.MOST_ROUNDS + 1)
-
-
-def test_a_node_that_stays_busy_is_not_waited_for(node, spinning, wait_until):
-    looked = []
-    with spinning(node) as executor:
-        end = _busy(executor)
-        assert not catch_up(executor, lambda: (looked.append(0) or len(looked), 0))
+        end, again = _busy(executor), Event()
+        assert not catch_up()
         end.set()
-        wait_until(lambda: looked)
-        again = Event()
-        executor.create_task(again.set)
-        assert again.wait(10.0)
         # It looks no further for who has gone.
-        assert len(looked) == 1
+        node.create_guard_condition(again.set).trigger()
+        assert again.wait(10.0)
+        assert next(looks) == 1
 
 
 def test_nobody_waits_for_an_executor_that_is_gone(node):
-    assert not catch_up(None, lambda: (0, 0))
+    catch_up = CatchUp(node, lambda: (0, 0))
+    assert not catch_up()
     executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    assert not catch_up()
     executor.shutdown()
-    assert not catch_up(executor, lambda: (0, 0))
-    idle = SingleThreadedExecutor()
-    idle.add_node(node)
-    found = []
-    thread = Thread(target=lambda: found.append(catch_up(idle, lambda: (0, 0))))
-    thread.start()
-    thread.join(10.0)
-    assert found == [False]
-    idle.shutdown()
+    assert not catch_up()
