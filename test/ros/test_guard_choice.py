@@ -14,13 +14,14 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.guard import Guard, Watch  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.joints import JointReading  # noqa: E402
-from rrth_planner.ros.messages import WearerBody  # noqa: E402
+from rrth_planner.ros.messages import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.running_motion import RunningMotion  # noqa: E402
 from rrth_planner.scene import Box  # noqa: E402
@@ -136,6 +137,23 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     assert level in line
 
 
+def test_how_near_a_stop_comes_that_is_not_free_is_said(watched):
+    # Beside the way of the ray, within the margin.
+    hand, next_hand = watched.hand(0.1, 0.0), watched.hand(0.11, 0.0)
+    ray = oracle.frames(ARM, watched.on_time(PHASE + 0.1)[0][None])[0, -1, :3, 2]
+    aside = np.cross(ray, next_hand.center - hand.center)
+    center = hand.center + 0.053 * aside / np.linalg.norm(aside)
+    watched.see(Box('hand', center, hand.size, hand.rotation))
+    ((stop, _),) = watched.published
+    q = sample(stop, np.linspace(0.0, stop.duration, 2000))[0]
+    scene = scene_of(watched.heard.body.value.at(watched.now))
+    parameters = watched.reporter.parameters
+    least = oracle.least_clearance(ARM, scene, q, parameters.ray_guard_length)
+    assert 0.003 < least < parameters.margin
+    said = watched.reporter.guard[1].partition('not proven safe either, least clearance ')[2]
+    assert float(said.removesuffix(' m')) == pytest.approx(least, abs=2e-4)
+
+
 def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(watched):
     watched.see(watched.hand(0.0, 0.045))
     assert watched.published == []
@@ -167,6 +185,17 @@ def test_every_arm_is_braked(watched, arm, late):
     # From where it is, not from where it should be.
     q = watched.on_time(PHASE - late)[0]
     assert np.abs(stop.positions[0] - q).max() < 5e-3
+
+
+def test_the_guard_looks_while_simulated_time_stands_still(spinning, wait_until, monkeypatch):
+    looks = []
+    monkeypatch.setattr(Guard, '_on_timer', lambda _: looks.append(0))
+    node = Node('paused', parameter_overrides=[Parameter('use_sim_time', value=True)])
+    Watched(node)
+    with spinning(node):
+        wait_until(lambda: len(looks) > 5)
+    assert node.get_clock().now().nanoseconds == 0
+    node.destroy_node()
 
 
 def test_an_arm_that_has_not_begun_is_held(watched):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a request makes of an arm that follows its motion, on a clock of its own."""
 
+from threading import Thread
+
 import numpy as np
 import pytest
 
@@ -45,13 +47,13 @@ class Following(Input):
 class Clock:
     """A clock on which a little time passes whenever somebody looks at it."""
 
-    def __init__(self, now):
+    def __init__(self, now, tick):
         """Begin at a time [s]."""
-        self.now = now
+        self.now, self._tick = now, tick
 
     def __call__(self):
         """Return the time [s]."""
-        self.now += 2e-4
+        self.now += self._tick
         return self.now
 
 
@@ -61,8 +63,8 @@ def _ask():
     node = Node('moving_arm')
     parameters = declare_parameters(node)
 
-    def ask(motion, since, is_known=True):
-        clock = Clock(BEGIN + since)
+    def ask(motion, since, is_known=True, tick=2e-4):
+        clock = Clock(BEGIN + since, tick)
         heard = Inputs('body', 'target', 'joints')
         boxes = worlds.wearer().boxes
         parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in boxes)
@@ -124,6 +126,17 @@ def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.start.takeover.running is None
     assert abs(now - outcome.start.time) < 5e-3
+
+
+def test_a_clock_that_stands_still_is_not_waited_for(ask):
+    outcomes = []
+    # As a simulation that is paused: the time to tell the motion never comes.
+    thread = Thread(target=lambda: outcomes.append(ask(_swings(), 0.4, tick=0.0)), daemon=True)
+    thread.start()
+    thread.join(30.0)
+    ((outcome, _),) = outcomes
+    assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
+    assert outcome.start.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
 
 
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):
