@@ -205,30 +205,20 @@ def _swollen(scene: Scene, by: Array) -> Scene:
     )
 
 
-def box_speeds(before: Scene, after: Scene, elapsed: float, most: float) -> Array:
+def box_speed(before: Box, after: Box, elapsed: float) -> float:
     """
-    Return how fast the boxes of a scene move, from where they were before, shape (m,) [m/s].
-
-    The greatest speed of any of a box's corners, no more than `most`; a box that was not there
-    before may move as fast as any.
+    Return how fast a box moved, the greatest speed of any of its corners [m/s].
 
     Parameters
     ----------
-    before, after : Scene
-        Boxes are the same where their names are.
+    before, after : Box
     elapsed : float
-        Between the two [s].
-    most : float
-        [m/s].
+        Between the two [s]; where that is none it may be as fast as any.
 
     """
-    known = {box.name: box for box in before.boxes}
-    result = np.full(len(after.boxes), most)
-    for i, box in enumerate(after.boxes):
-        old = known.get(box.name)
-        if old is not None and elapsed > 0.0:
-            turned = np.linalg.norm(box.rotation - old.rotation, 2) * np.linalg.norm(box.size)
-            moved = np.linalg.norm(box.center - old.center) + 0.5 * turned
-            grown = 0.5 * np.linalg.norm(np.maximum(box.size - old.size, 0.0))
-            result[i] = min(most, (moved + grown) / elapsed)
-    return result
+    if elapsed <= 0.0:
+        return np.inf
+    turned = np.linalg.norm(after.rotation - before.rotation, 2) * np.linalg.norm(after.size)
+    moved = np.linalg.norm(after.center - before.center) + 0.5 * turned
+    grown = 0.5 * np.linalg.norm(np.maximum(after.size - before.size, 0.0))
+    return float((moved + grown) / elapsed)

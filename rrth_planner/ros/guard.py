@@ -9,13 +9,13 @@ import time
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.arrays import Array
 from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.box_speeds import BoxSpeeds
 from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs
-from rrth_planner.ros.messages import scene_of, WearerBody
+from rrth_planner.ros.messages import scene_of
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
@@ -23,7 +23,7 @@ from rrth_planner.ros.sight import out_of_sight
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.underway import box_speeds, is_still_free, leads_away
+from rrth_planner.underway import is_still_free, leads_away
 from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
@@ -79,8 +79,7 @@ class Guard:
         self.n_brakes, self.n_begun = 0, 0
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
-        # The body that came last, its boxes, when that was [s], and their speeds.
-        self._before: tuple[WearerBody, Scene, float, Array | None] | None = None
+        self._speeds = BoxSpeeds()
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
         # Has a stop that was published as free judged once more; set by the owner.
@@ -121,9 +120,9 @@ class Guard:
             now, parameters = self._now(), self._parameters
             if self.running is None and self._reporter.parameters.max_body_speed == 0.0:
                 return
-            body = self._heard.body.value
-            scene = scene_of(body.at(now))
-            speeds = self._speeds_of(body, scene, now)
+            body = self._heard.body.value.at(now)
+            scene = scene_of(body)
+            speeds = self._speeds.look(body, now, self._reporter.parameters.max_body_speed)
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
                 return
@@ -142,20 +141,6 @@ class Guard:
                 self._stop(scene, 'the wearer moved into the way', arrived)
             else:
                 self._reporter.recertified(time.perf_counter() - begin)
-
-    def _speeds_of(self, body: WearerBody, scene: Scene, now: float) -> Array | None:
-        """Return how fast the boxes may go on moving, (m,) [m/s]; None: that does not count."""
-        most = self._reporter.parameters.max_body_speed
-        if self._before is None or body is not self._before[0]:
-            speeds = None
-            if most > 0.0 and self._before is not None:
-                _, before, then, _ = self._before
-                speeds = box_speeds(before, scene, now - then, most)
-            self._before = (body, scene, now, speeds)
-        # A motion that begins looks at the same body again, which tells of no other speed; but
-        # the lifetime of some boxes may have passed.
-        speeds = self._before[3]
-        return None if speeds is None or len(speeds) != len(scene.boxes) else speeds
 
     def _on_timer(self) -> None:
         """Stop an arm that nobody sees any more, or whose wearer, or that goes on for all that."""
