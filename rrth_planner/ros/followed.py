@@ -19,9 +19,10 @@ STILL = 0.1
 # An arm that is further from its motion than this [rad], and nearer to another one by so great a
 # share, follows that.
 ASIDE, NEARER = 0.02, 0.25
-# An arm may be so late [s]. It did not hear of a stop where it still has so great a share of its
-# motion's pace, when it should have no more than so little.
-LATE, FULL, LITTLE = 0.1, 0.9, 0.5
+# An arm may be so late [s].
+LATE = 0.1
+# Between two places of a stop that are looked at [s].
+SPACING = 2e-3
 
 
 class Pace:
@@ -44,18 +45,21 @@ class Pace:
 
 
 def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -> bool:
-    """Return whether an arm is seen to go on along a motion that it was told to stop."""
-    elapsed = reading.taken - stop.start_time - LATE
-    if elapsed <= 0.0:
+    """
+    Return whether an arm is seen to go on along a motion that it was told to stop.
+
+    One that obeys is where the stop was at some time until now, however late it heard of it, and
+    wherever the motion slows down by itself.
+    """
+    elapsed = reading.taken - stop.start_time
+    if elapsed <= LATE:
         return False
-    pace = np.linalg.norm(sample(stop.trajectory, [0.0, elapsed])[1], axis=1)
-    if pace[1] > LITTLE * pace[0]:
-        return False
-    q, v = reading.positions, reading.velocities
-    along, braking = phase_of(q, v, before.trajectory), phase_of(q, v, stop.trajectory)
-    # A motion may slow down by itself where it is stopped: an arm that obeys has its pace, too.
-    obeys = braking is not None and braking[1] * FULL <= 1.0
-    return along is not None and along[1] >= FULL and not obeys
+    end = min(elapsed, stop.trajectory.duration)
+    passed = sample(stop.trajectory, np.linspace(0.0, end, 2 + int(end / SPACING)))[0]
+    is_ahead = bool(np.abs(passed - reading.positions).max(axis=1).min() > ASIDE)
+    return (
+        is_ahead and phase_of(reading.positions, reading.velocities, before.trajectory) is not None
+    )
 
 
 def is_on_other(reading: JointReading, motion: RunningMotion, other: RunningMotion) -> bool:
