@@ -8,8 +8,10 @@ import time
 
 from rclpy.node import Node
 
-# A node that is busy for longer is not waited for [s], nor one that hears more than it can read.
-LONGEST, MOST_ROUNDS = 0.25, 3
+# Longer than this a node is not waited for [s].
+LONGEST = 1.0
+# A message that came no longer ago may as well be under way still [s].
+FRESH = 0.005
 
 
 class CatchUp:
@@ -22,37 +24,39 @@ class CatchUp:
     Parameters
     ----------
     node : Node
-        Spun by another thread.
-    heard : callable
-        Returns how many messages were handled, and when the last of them came [ns].
+        Spun by a single-threaded executor in another thread; by several threads it may be through
+        a little early.
+    handled : callable
+        Returns how many messages were handled, and when the last of them came that leaves none
+        before it [ns].
 
     """
 
-    def __init__(self, node: Node, heard: Callable[[], tuple[int, int]]) -> None:
+    def __init__(self, node: Node, handled: Callable[[], tuple[int, int]]) -> None:
         """Begin with nobody who waits."""
-        self._node, self._heard = node, heard
-        self._begin = self._count = self._n_rounds = 0
-        self._is_over = Event()
+        self._handled = handled
+        self._begin = self._n = 0
+        # Whether somebody waits; whether a round was asked for that nobody waits for any more.
+        self._is_over, self._is_stale = Event(), False
         self._is_over.set()
         self._round = node.create_guard_condition(self._on_round)
 
     def __call__(self) -> bool:
         """Wait, one thread at a time; return whether the executor is through."""
-        if self._node.executor is None:
-            return False
-        self._begin, self._count, self._n_rounds = time.time_ns(), self._heard()[0], 0
+        self._begin, self._n = time.time_ns() - int(FRESH * 1e9), self._handled()[0]
         self._is_over.clear()
         self._round.trigger()
         is_through = self._is_over.wait(LONGEST)
         self._is_over.set()
+        self._is_stale = not is_through
         return is_through
 
     def _on_round(self) -> None:
+        is_stale, self._is_stale = self._is_stale, False
         if self._is_over.is_set():
             return
-        before, (self._count, arrived) = self._count, self._heard()
-        self._n_rounds += 1
-        if arrived >= self._begin or self._count == before or self._n_rounds == MOST_ROUNDS:
+        before, (self._n, came) = self._n, self._handled()
+        if not is_stale and (came >= self._begin or self._n == before):
             self._is_over.set()
         else:
             self._round.trigger()

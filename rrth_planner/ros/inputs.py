@@ -50,8 +50,6 @@ class Input(Generic[T]):
         self.topic = topic
         self.value = empty
         self.received: float | None = None
-        # When the middleware had the last message, where somebody asks for that [ns].
-        self.arrived = 0
         self.n_good, self.n_refused = 0, 0
         self.refusal: MessageError | None = None
         self.is_last_refused = False

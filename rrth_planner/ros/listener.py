@@ -83,13 +83,16 @@ class Listener:
 
         return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse)
 
+    def body_progress(self) -> tuple[int, int]:
+        """Return what `OpenSubscription.progress` says of the bodies."""
+        return self._subscriptions[0].progress()
+
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
     def _on_body(self, msg: MarkerArray, sent: int, arrived: int) -> None:
         now, body = self._now(), self._inputs.body
-        body.arrived = arrived
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(body)
 

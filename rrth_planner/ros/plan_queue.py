@@ -15,7 +15,6 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
@@ -76,6 +75,8 @@ class PlanQueue:
         Its parameters, as they are when a request's turn begins, are those of the plan.
     plan_request : callable
         `requests.plan_request`, which is loaded late.
+    catch_up : callable
+        Returns when the bodies that came are read, and whether that is so.
 
     """
 
@@ -85,13 +86,13 @@ class PlanQueue:
         heard: Inputs,
         reporter: Reporter,
         plan_request: Callable[..., Any],
+        catch_up: Callable[[], bool],
     ) -> None:
         """Start with nothing to do."""
+        self._catch_up = catch_up
         self._node, self._heard, self._reporter = node, heard, reporter
         self._plan_request = plan_request
         self._publishers = PlanPublishers(node)
-        body = heard.body
-        self._catch_up = CatchUp(node, lambda: (body.n_good + body.n_refused, body.arrived))
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         # Held while a motion is published, so that what was cancelled before never is.
         self._lock = RLock()

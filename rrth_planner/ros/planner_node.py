@@ -49,6 +49,7 @@ class PlannerNode(Node):
         parameters = declare_parameters(self)
         self._compile()
         # Only now: loading them compiles the kernels that nobody has compiled yet.
+        from rrth_planner.ros.catching_up import CatchUp
         from rrth_planner.ros.inputs import Inputs
         from rrth_planner.ros.listener import Listener
         from rrth_planner.ros.plan_queue import PlanQueue
@@ -59,7 +60,8 @@ class PlannerNode(Node):
         )
         self._reporter = Reporter(self, heard, parameters)
         self._listener = Listener(self, parameters, heard, self._reporter.publish)
-        self._queue = PlanQueue(self, heard, self._reporter, self._load_planner())
+        catch_up = CatchUp(self, self._listener.body_progress)
+        self._queue = PlanQueue(self, heard, self._reporter, self._load_planner(), catch_up)
         self._listener.on_body = self._queue.guard.on_body
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()

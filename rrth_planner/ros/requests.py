@@ -40,6 +40,8 @@ LEADS = (0.05, LONGEST_LEAD)
 # So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
 # present motion is unknown, since the arm has to be looked at as late as can be.
 EARLY = 0.025
+# So late a motion may be told of which nobody knows how the arm moved until then [s].
+LATE = 0.02
 # How often a motion is held against the wearer before it is told, who may never stand still.
 MOST_CHECKS = 3
 
@@ -68,6 +70,11 @@ class Start:
     def early(self) -> float:
         """How long before it begins the motion is told, if all goes well [s]."""
         return 0.0 if self.takeover.running is None else EARLY
+
+    @property
+    def latest(self) -> float:
+        """When the motion can still be told [s]."""
+        return self.time + (LATE if self.takeover.running is None else 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +119,7 @@ def plan_request(
     should_stop: Callable[[], bool],
     goal: PointingGoal | None = None,
     running: RunningMotion | None = None,
-    catch_up: Callable[[], object] = lambda: None,
+    catch_up: Callable[[], bool] = lambda: True,
 ) -> PlanOutcome:
     """
     Return the outcome of a request that begins now.
@@ -134,7 +141,7 @@ def plan_request(
     running : RunningMotion, optional
         The motion that the arm was last told to follow.
     catch_up : callable, optional
-        Returns when all that has come is heard.
+        Returns when the bodies that came are heard, and whether that is so.
 
     Raises
     ------
@@ -165,17 +172,18 @@ def plan_request(
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return PlanOutcome(code, plan.sentence, plan, inputs)
             if start is None or clock() <= start.time:
+                _require_news(catch_up)
                 _wait_for(start, clock, should_stop)
                 if should_stop():
                     raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-                moved = _check_news(heard, parameters, clock, inputs, plan, start, catch_up)
+                moved = _check_news(heard, parameters, clock, inputs, plan, start)
                 if moved is not None:
                     incident = disagreement_incident(question, *moved)
                     sentence = f'{incident.sentence}, seed {plan.seed}'
                     return PlanOutcome(
                         ErrorCode.FAILURE, sentence, plan, inputs, incident=incident
                     )
-                if start is None or start.early == 0.0 or clock() <= start.time:
+                if start is None or clock() <= start.latest:
                     return PlanOutcome(code, plan.sentence, plan, inputs, start, question)
         raise RequestError(
             ErrorCode.TIMED_OUT,
@@ -221,6 +229,15 @@ def _wait_for(
         time.sleep(min(1e-3, max(1e-5, left)))
 
 
+def _require_news(catch_up: Callable[[], bool]) -> None:
+    """Wait until the bodies that came are heard, or raise RequestError."""
+    if not catch_up():
+        raise RequestError(
+            ErrorCode.SENSOR_INFO_STALE,
+            'the node is busy: the bodies that came while the motion was planned are not read yet',
+        )
+
+
 def _check_news(
     heard: Inputs,
     parameters: PlannerParameters,
@@ -228,10 +245,8 @@ def _check_news(
     inputs: PlanInputs,
     plan: MotionPlan,
     start: Start | None,
-    catch_up: Callable[[], object],
 ) -> tuple[Disagreement, Scene] | None:
     """Check as `_check_present` does until no other body comes meanwhile."""
-    catch_up()
     for _ in range(MOST_CHECKS):
         body = heard.body.value
         moved = _check_present(heard, parameters, clock(), inputs, plan, start)

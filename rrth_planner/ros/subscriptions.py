@@ -120,6 +120,7 @@ class OpenSubscription:
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
+        self._n_read = self._live_came = 0
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
@@ -136,6 +137,14 @@ class OpenSubscription:
                 POLL_PERIOD, self.look_at_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
             )
         self.topic_name = self._live.topic_name
+
+    def progress(self) -> tuple[int, int]:
+        """
+        Return how many copies were read, and when the one came that was read last [ns].
+
+        Of the reader that hears everybody; 0 where its middleware does not say.
+        """
+        return self._n_read, self._live_came
 
     def look_at_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
@@ -164,10 +173,13 @@ class OpenSubscription:
         )
 
     def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
+        self._live_came = info.get('received_timestamp') or 0
+        self._n_read += 1
         if self._filter.counts_live(_stamp_of(info)):
             self._hand_on(data, self._on_message, self._filter.newest, info)
 
     def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
+        self._n_read += 1
         stamp = _stamp_of(info)
         is_late = self._filter.is_late(stamp)
         if not self._filter.counts_reliable(stamp):

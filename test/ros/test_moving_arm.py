@@ -3,6 +3,7 @@
 """What a request makes of an arm that follows its motion, on a clock of its own."""
 
 from threading import Thread
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
+from rrth_planner.ros import requests  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Input, Inputs  # noqa: E402
@@ -58,20 +60,29 @@ class Clock:
 
 
 @pytest.fixture(name='ask')
-def _ask():
+def _ask(monkeypatch):
     """Give what asks for a plan at a time since a motion began [s]."""
     node = Node('moving_arm')
     parameters = declare_parameters(node)
 
-    def ask(motion, since, is_known=True, tick=2e-4):
+    def ask(motion, since, is_known=True, tick=2e-4, reads=True, reading=0.0):
         clock = Clock(BEGIN + since, tick)
+        if tick > 0.0:
+            # No time but that of the clock, however busy the machine.
+            still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
+            monkeypatch.setattr(requests, 'time', still)
+
+        def catch_up():
+            clock.now += reading
+            return reads
+
         heard = Inputs('body', 'target', 'joints')
         boxes = worlds.wearer().boxes
         parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in boxes)
         heard.body.accept(lambda: WearerBody(parts), clock())
         heard.joints = Following(motion, clock)
         running = RunningMotion(trajectory=motion, start_time=BEGIN) if is_known else None
-        outcome = plan_request(heard, parameters, clock, lambda: False, TARGET, running)
+        outcome = plan_request(heard, parameters, clock, lambda: False, TARGET, running, catch_up)
         return outcome, clock.now
 
     yield ask
@@ -85,6 +96,18 @@ def _swings():
     return Trajectory(
         times=[0.0, 1.0, 2.0],
         positions=[q, q + [0.3, 0.0, 0.2, 0.0], q + [0.1, 0.0, 0.5, 0.1]],
+        velocities=still,
+        accelerations=still,
+    )
+
+
+def _slow():
+    """Return a motion that moves for 6 s."""
+    still = np.zeros((2, 4))
+    q = worlds.FOLDED
+    return Trajectory(
+        times=[0.0, 6.0],
+        positions=[q, q + [0.5, 0.0, 0.3, 0.0]],
         velocities=still,
         accelerations=still,
     )
@@ -114,15 +137,7 @@ def test_where_the_motion_ends_the_next_one_begins_at_rest(ask, since):
 
 
 def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
-    still = np.zeros((2, 4))
-    q = worlds.FOLDED
-    slow = Trajectory(
-        times=[0.0, 6.0],
-        positions=[q, q + [0.5, 0.0, 0.3, 0.0]],
-        velocities=still,
-        accelerations=still,
-    )
-    outcome, now = ask(slow, 3.0, is_known=False)
+    outcome, now = ask(_slow(), 3.0, is_known=False)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.start.takeover.running is None
     assert abs(now - outcome.start.time) < 5e-3
@@ -137,6 +152,29 @@ def test_a_clock_that_stands_still_is_not_waited_for(ask):
     ((outcome, _),) = outcomes
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.start.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
+
+
+@pytest.mark.parametrize('is_known', [True, False])
+def test_a_motion_whose_time_has_passed_is_planned_anew(ask, is_known):
+    # So long the node needs to read what came.
+    outcome, now = ask(_slow(), 3.0, is_known, reading=0.1)
+    assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
+    assert outcome.start.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
+    assert now <= outcome.start.latest
+    outcome, _ = ask(_slow(), 3.0, is_known, reading=0.5)
+    # Where the motion is unknown the arm is no longer where it was expected, either.
+    assert outcome.code in (
+        ErrorCode.TIMED_OUT,
+        ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+    )
+    assert outcome.trajectory is None
+
+
+@pytest.mark.parametrize('since', [1.0, 3.0, 7.0])
+def test_nothing_is_told_while_bodies_are_not_read(ask, since):
+    outcome, _ = ask(_slow(), since, reads=False)
+    assert outcome.code is ErrorCode.SENSOR_INFO_STALE
+    assert outcome.trajectory is None
 
 
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):
