@@ -93,7 +93,7 @@ def is_still_free(
     *,
     margin: float,
     ray_guard_length: float,
-    speeds: Array | None = None,
+    moves: tuple[Array, Array] | None = None,
 ) -> bool:
     """
     Return whether what is left of a motion is proven free of the wearer as seen now.
@@ -108,9 +108,9 @@ def is_still_free(
         The wearer in the base frame.
     margin, ray_guard_length : float
         [m].
-    speeds : ndarray, shape (m,), optional
-        How fast each box may go on moving, in any direction: until the arm has passed it counts
-        as that much larger [m/s].
+    moves : tuple of ndarray, shape (m,), optional
+        How fast each box may go on moving, in any direction, and how long ago it was seen: until
+        the arm has passed it counts as that much larger [m/s, s].
 
     """
     trajectory = running.trajectory
@@ -121,12 +121,13 @@ def is_still_free(
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
         checked = running.escape_time
-    if speeds is None or not speeds.any():
+    if moves is None or not moves[0].any():
         return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
     # Within a stretch of time the boxes are as large as they get at its end.
     now = min(max(checked, 0.0), trajectory.duration)
     for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
-        world = arm_world(arm, _swollen(scene, speeds * (end - phase)), margin, ray_guard_length)
+        reach = moves[0] * (moves[1] + end - phase)
+        world = arm_world(arm, _swollen(scene, reach), margin, ray_guard_length)
         if not certify(between(trajectory, begin, end), world).is_proven:
             return False
     return world.is_valid(q_end, running.reach)

@@ -154,10 +154,18 @@ def test_boxes_that_may_move_on_are_larger_the_later_the_arm_comes():
     keep = {'margin': MARGIN, 'ray_guard_length': RAY}
     n = len(wearer().boxes)
     assert is_still_free(running, 0.0, table_1_arm(), wearer(), **keep)
-    slow = is_still_free(running, 0.0, table_1_arm(), wearer(), speeds=np.full(n, 1e-4), **keep)
-    fast = is_still_free(running, 0.0, table_1_arm(), wearer(), speeds=np.full(n, 5.0), **keep)
+    slow = is_still_free(
+        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 1e-4), np.zeros(n)), **keep
+    )
+    fast = is_still_free(
+        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 5.0), np.zeros(n)), **keep
+    )
+    seen_long_ago = is_still_free(
+        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 1e-4), np.full(n, 1e4)), **keep
+    )
     assert slow
     assert not fast
+    assert not seen_long_ago
 
 
 def test_the_speed_of_a_box_is_that_of_its_fastest_corner():

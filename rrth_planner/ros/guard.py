@@ -122,7 +122,8 @@ class Guard:
                 return
             body = self._heard.body.value.at(now)
             scene = scene_of(body)
-            speeds = self._speeds.look(body, now, self._reporter.parameters.max_body_speed)
+            came = now - 1e-9 * (time.time_ns() - arrived)
+            moves = self._speeds.look(body, came, self._reporter.parameters.max_body_speed)
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
                 return
@@ -136,7 +137,7 @@ class Guard:
                 scene,
                 margin=parameters.margin,
                 ray_guard_length=parameters.ray_guard_length,
-                speeds=speeds,
+                moves=moves,
             ):
                 self._stop(scene, 'the wearer moved into the way', arrived)
             else:

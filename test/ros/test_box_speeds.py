@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from builtin_interfaces.msg import Duration  # noqa: E402
-from rrth_planner.ros.box_speeds import BoxSpeeds  # noqa: E402
+from rrth_planner.ros.box_speeds import BoxSpeeds, HELD, MOST_AGE  # noqa: E402
 from rrth_planner.ros.messages import WearerBody  # noqa: E402
 import samples  # noqa: E402
 
@@ -30,7 +30,7 @@ def _heard(*arrays):
     body, speeds, found = WearerBody(), BoxSpeeds(), []
     for time, *markers in arrays:
         body = body.apply(samples.array(*markers), time, 'torso').at(time)
-        row = speeds.look(body, time, MOST)
+        row = (speeds.look(body, time, MOST) or (None,))[0]
         names = [f'{ns}/{k}' for (ns, k), part in body.parts for _ in part.boxes]
         found.append(None if row is None else dict(zip(names, row, strict=True)))
     return found
@@ -79,8 +79,28 @@ def test_the_same_body_tells_of_no_other_speed():
     for time in (0.0, 0.1):
         body = body.apply(samples.array(_hand(time)), time, 'torso')
         speeds.look(body, time, MOST)
-    assert np.allclose(speeds.look(body, 0.101, MOST), [0.5])
-    assert np.allclose(speeds.look(body, 0.2, 0.3), [0.3])
+    assert np.allclose(speeds.look(body, 0.101, MOST), [[0.5], [0.001]])
+    assert np.allclose(speeds.look(body, 0.2, 0.3), [[0.3], [0.1]])
+    # What nobody speaks of does not count as older and older.
+    assert np.allclose(speeds.look(body, 9.0, MOST), [[0.5], [MOST_AGE]])
     # Where they do not count nothing is remembered.
-    assert speeds.look(body, 0.3, 0.0) is None
-    assert speeds.look(body, 0.4, MOST) is None
+    assert speeds.look(body, 9.1, 0.0) is None
+    assert speeds.look(body, 9.2, MOST) is None
+
+
+def test_a_tracker_that_repeats_itself_does_not_make_a_hand_stand_still():
+    # At 50 Hz, but it sees the hand ten times a second.
+    arrays = [(0.02 * k, _hand(0.1 * (k // 5))) for k in range(30)]
+    found = [row['hand/0'] for row in _heard(*arrays)[6:]]
+    assert min(found) >= 0.5
+    # Once it has stood still for a while it does.
+    still = [(0.6 + 0.02 * k, _hand(0.5)) for k in range(30)]
+    rows = _heard(*arrays, *still)[30:]
+    assert rows[2]['hand/0'] >= 0.5
+    assert all(row['hand/0'] == 0.0 for row in rows[int(HELD / 0.02) + 2 :])
+
+
+def test_a_hand_that_becomes_faster_is_as_fast_at_once():
+    places = {0.0: 0.0, 0.1: 0.02, 0.2: 0.12, 0.3: 0.13}
+    hands = [(t, samples.box('hand', center=(x, 0.0, 0.0))) for t, x in places.items()]
+    assert [row['hand/0'] for row in _heard(*hands)[1:]] == pytest.approx([0.2, 1.0, 1.0])

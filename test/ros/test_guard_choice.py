@@ -82,11 +82,11 @@ class Watched:
         reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
         self.heard.joints.value, self.heard.joints.received = reading, self.now
 
-    def see(self, *boxes, expires=float('inf')):
-        """Let a body come."""
+    def see(self, *boxes, expires=float('inf'), late=0.0):
+        """Let a body come, which is dealt with so late [s]."""
         parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
         self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
-        self.guard.on_body(time.time_ns())
+        self.guard.on_body(time.time_ns() - int(late * 1e9))
 
     def hand(self, ahead, away, motion=None):
         """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
@@ -265,6 +265,34 @@ def test_a_motion_that_begins_between_two_bodies_makes_nothing_faster(watched):
     watched.read(*watched.on_time(watched.now - 100.0))
     watched.see(watched.hand(0.6, -0.405))
     assert watched.published == []
+
+
+@pytest.mark.parametrize(('late', 'n_stops'), [(0.09, 0), (0.0, 1)])
+def test_a_body_that_is_dealt_with_late_makes_the_next_no_faster(watched, late, n_stops):
+    # It goes on by 2 cm in a tenth of a second, or in a hundredth.
+    places = [watched.hand(0.6, away) for away in (-0.4, -0.4, -0.38)]
+    see_in_turn(watched, 2.0, places[0])
+    watched.now += 0.1
+    watched.read(*watched.on_time(watched.now - 100.0))
+    watched.see(places[1], late=late)
+    watched.now += 0.01
+    watched.read(*watched.on_time(watched.now - 100.0))
+    watched.see(places[2])
+    assert len(watched.published) == n_stops
+
+
+@pytest.mark.parametrize(('age', 'n_stops'), [(0.01, 0), (0.5, 1)])
+def test_a_hand_that_was_seen_long_ago_may_have_come_nearer(watched, age, n_stops):
+    watched.reporter.parameters = replace(watched.reporter.parameters, max_body_speed=2.0)
+    watched.guard.close()
+    # Ahead of where the ray comes to rest, towards which it goes half a metre a second.
+    for away, before in ((-0.35, age + 0.1), (-0.3, age)):
+        watched.now = 101.3 - before
+        watched.see(watched.hand(0.98, away))
+    watched.now = 101.3
+    watched.read(*watched.on_time(1.3))
+    watched.begin()
+    assert len(watched.published) == n_stops
 
 
 def test_a_motion_that_takes_over_is_watched_before_it_begins(watched):
