@@ -22,6 +22,7 @@ from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import MessageError, ModelError, RrthError
 from rrth_planner.kernels.jit import cache_folder, is_compiled
+from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.parameters import current_parameters, declare_parameters
 from std_srvs.srv import Trigger
@@ -49,7 +50,6 @@ class PlannerNode(Node):
         parameters = declare_parameters(self)
         self._compile()
         # Only now: loading them compiles the kernels that nobody has compiled yet.
-        from rrth_planner.ros.catching_up import CatchUp
         from rrth_planner.ros.inputs import Inputs
         from rrth_planner.ros.listener import Listener
         from rrth_planner.ros.plan_queue import PlanQueue
