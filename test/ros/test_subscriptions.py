@@ -125,6 +125,27 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
     node.destroy_node()
 
 
+@pytest.mark.usefixtures('ros_context')
+def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
+    node = Node('hearer')
+    subscription = OpenSubscription(node, PointStamped, 'target', lambda *_: None)
+    data = serialize_message(target())
+    assert subscription.progress() == (0, 0)
+    # Copies too: they stand in the queues with the others.
+    for read, came, expected in (
+        (subscription._on_live, 500, 500),
+        (subscription._on_reliable, 600, 500),
+        (subscription._on_live, 700, 700),
+        # Of a middleware that does not say.
+        (subscription._on_live, 0, 0),
+    ):
+        n = subscription.progress()[0]
+        info = {'source_timestamp': 100, 'publication_sequence_number': 1}
+        read(data, {**info, 'received_timestamp': came})
+        assert subscription.progress() == (n + 1, expected)
+    node.destroy_node()
+
+
 def test_a_late_array_takes_its_place_before_the_newer_ones():
     history = BodyHistory()
     body = told(history, WearerBody(), 100, box('torso'), box('hand'))
