@@ -133,7 +133,9 @@ class BodyStream:
         while not self._end.is_set():
             with self._lock:
                 self._tell()
-            due = max(due + 1.0 / RATE, time.monotonic() - 1.0 / RATE)
+            now = time.monotonic()
+            # Never two in a row: a tracker that was late does not make up for it.
+            due = due + 1.0 / RATE if due + 1.0 / RATE > now else now + 1.0 / RATE
             time.sleep(max(0.0, due - time.monotonic()))
 
     def _tell(self) -> None:

@@ -20,7 +20,7 @@ from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import process_of, SoakClient, threads_of
-from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, RAY
+from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, OLDER, RAY
 
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
@@ -63,6 +63,9 @@ class PlansRecord:
         Bodies.
     verdicts : Counter
         Of (verdict, whether it is a brake).
+    outdated : list of list of float
+        Of each motion that is free of an older body only: how long before it the bodies were sent,
+        the newest first [s].
     n_motions : int
         That were published.
     elapsed : float
@@ -82,6 +85,7 @@ class PlansRecord:
     figures: dict[str, str] = field(default_factory=dict)
     n_sent: int = 0
     verdicts: Counter = field(default_factory=Counter)
+    outdated: list[list[float]] = field(default_factory=list)
     n_motions: int = 0
     elapsed: float = 0.0
     is_interrupted: bool = False
@@ -122,7 +126,7 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
     record.gaps = (np.diff([body.sent for body in bodies.log]) * 1e-9).tolist()
     record.n_motions = len(client.motions)
     try:
-        judge_all(client, bodies.log, record.verdicts)
+        judge_all(client, bodies.log, record.verdicts, record.outdated)
     except KeyboardInterrupt:
         record.is_interrupted = True
     client.close()
@@ -188,7 +192,9 @@ def free_starts(rng: np.random.Generator, wearer: int) -> tuple[int, Array]:
         wearer += 1
 
 
-def judge_all(client: SoakClient, log: list[BodyAt], verdicts: Counter) -> None:
+def judge_all(
+    client: SoakClient, log: list[BodyAt], verdicts: Counter, outdated: list[list[float]]
+) -> None:
     """Judge every motion against the bodies before it, in all processors."""
     from multiprocessing import get_context
 
@@ -204,6 +210,10 @@ def judge_all(client: SoakClient, log: list[BodyAt], verdicts: Counter) -> None:
         get_context('spawn').Pool() as pool,
         tqdm(total=len(client.motions), unit='motion', **progress) as bar,
     ):
-        for word in pool.imap(judge_bytes, tasks(), chunksize=20):
+        words = pool.imap(judge_bytes, tasks(), chunksize=20)
+        for motion, word in zip(client.motions, words, strict=True):
             verdicts[word] += 1
+            if word[0] == OLDER:
+                before = newest_before(sent, motion.published, LOOKED_AT + 1)
+                outdated.append([1e-9 * (motion.published - sent[i]) for i in before])
             bar.update()

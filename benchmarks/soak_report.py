@@ -135,6 +135,11 @@ def _plans_text(plans: PlansRecord) -> str:
             f'apart; {plans.n_motions} trajectories were published.',
             markdown_table(('answer', 'requests', 'the last one'), codes),
             markdown_table(('verdict', 'trajectories'), verdicts),
+            *(
+                f'- free of an older body: published '
+                f'{", ".join(f"{1e3 * age:.1f}" for age in ages)} ms after the bodies before it'
+                for ages in plans.outdated
+            ),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
                 [['call, as its client sees it', *_percentiles(np.array(plans.calls) * 1e3)]],
