@@ -11,6 +11,7 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
@@ -140,20 +141,12 @@ class PlannerClient(Node):
 
     def _tell(self, publisher: Any, message: Any) -> None:
         self.wait_for(
-            lambda: self._is_heard(publisher), f'a reliable subscription of {publisher.topic}'
+            lambda: is_heard(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
         publisher.publish(message)
         # The request that follows takes another way, and must not overtake the message.
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
             raise NotInTimeError(f'{publisher.topic}: not taken within {self.timeout:g} s')
-
-    def _is_heard(self, publisher: Any) -> bool:
-        """Return whether all who listen are connected, one of them so that it acknowledges."""
-        infos = self.get_subscriptions_info_by_topic(publisher.topic)
-        is_reliable = any(
-            info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos
-        )
-        return is_reliable and publisher.get_subscription_count() >= len(infos)
 
     def _call(self) -> Trigger.Response:
         future = self._plan.call_async(Trigger.Request())
@@ -177,3 +170,21 @@ class PlannerClient(Node):
 
     def _on_motion(self, msg: JointTrajectory) -> None:
         self.told.append(msg)
+
+
+def is_heard(node: Node, publisher: Publisher) -> bool:
+    """
+    Return whether all who listen are connected, one of them so that it acknowledges.
+
+    Before that, `wait_for_all_acked` may wait for nobody.
+
+    Parameters
+    ----------
+    node : Node
+        Of the publisher.
+    publisher : Publisher
+
+    """
+    infos = node.get_subscriptions_info_by_topic(publisher.topic)
+    is_reliable = any(info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos)
+    return is_reliable and publisher.get_subscription_count() >= len(infos)

@@ -20,6 +20,14 @@ def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -
         time.sleep(0.005)
 
 
+def tell(node, publisher, message) -> None:
+    """Publish a message; return once all who hear it reliably have it."""
+    is_heard = pytest.importorskip('rrth_planner.ros.planner_client').is_heard
+    wait_until(lambda: is_heard(node, publisher))
+    publisher.publish(message)
+    assert publisher.wait_for_all_acked()
+
+
 @contextmanager
 def spinning(*nodes):
     """Spin nodes in a thread of their own while the block runs."""
@@ -51,6 +59,12 @@ def ros_context() -> Iterator[None]:
 def _wait_until() -> Callable[..., None]:
     """Give `wait_until` to tests, which cannot import this file."""
     return wait_until
+
+
+@pytest.fixture(name='tell')
+def _tell() -> Callable[..., None]:
+    """Give `tell` to tests."""
+    return tell
 
 
 @pytest.fixture(name='spinning')

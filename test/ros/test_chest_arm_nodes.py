@@ -54,7 +54,7 @@ def _body(scene):
     return samples.array(*boxes)
 
 
-def test_both_nodes_work_with_another_arm(wait_until, spinning):
+def test_both_nodes_work_with_another_arm(wait_until, tell, spinning):
     file = resource_path(ARM)
     arm, scene = load_arm(file), load_body(resource_path(BODY))
     client, said = Client(), []
@@ -68,11 +68,9 @@ def test_both_nodes_work_with_another_arm(wait_until, spinning):
         wait_until(client.plan.service_is_ready, 240.0)
         wait_until(lambda: client.states)
         assert client.states[0].name == list(arm.joint_names)
-        client.body.publish(_body(scene))
+        tell(client, client.body, _body(scene))
         for target in TARGETS:
-            client.target.publish(samples.target(*target))
-            for publisher in (client.body, client.target):
-                assert publisher.wait_for_all_acked()
+            tell(client, client.target, samples.target(*target))
             n_states, n_motions = len(client.states), len(client.motions)
             future = client.plan.call_async(Trigger.Request())
             wait_until(future.done, 60.0)

@@ -89,7 +89,7 @@ def _planner(ros_context, udp):
 
 @pytest.mark.parametrize('topic', TOPICS)
 def test_requests_are_answered_while_a_topic_is_flooded(
-    client, planner, spinning, wait_until, monkeypatch, topic
+    client, planner, spinning, tell, wait_until, monkeypatch, topic
 ):
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join(sys.path))
     rates, answers, times = [], [], []
@@ -97,8 +97,7 @@ def test_requests_are_answered_while_a_topic_is_flooded(
     with spinning(client):
         wait_until(client.plan.service_is_ready, 120.0)
         for name, (_, make) in TOPICS.items():
-            client.publishers_of[name].publish(make())
-            assert client.publishers_of[name].wait_for_all_acked()
+            tell(client, client.publishers_of[name], make())
         with ChildProcess('test_flood', arguments, lambda line: rates.append(float(line))) as it:
             wait_until(lambda: rates)
             for _ in range(N_ASKED):

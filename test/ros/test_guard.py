@@ -68,7 +68,7 @@ def body(*more):
 
 
 @pytest.fixture
-def scene_of_a_motion(wait_until, spinning):
+def scene_of_a_motion(wait_until, tell, spinning):
     """Have an arm on its way to a target; give the client."""
 
     def begin(*settings):
@@ -83,10 +83,8 @@ def scene_of_a_motion(wait_until, spinning):
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')
-        client.body.publish(body()[0])
-        client.target.publish(samples.target(*FAR))
-        for publisher in (client.body, client.target):
-            assert publisher.wait_for_all_acked()
+        tell(client, client.body, body()[0])
+        tell(client, client.target, samples.target(*FAR))
         future = client.plan.call_async(Trigger.Request())
         wait_until(future.done)
         assert future.result().success

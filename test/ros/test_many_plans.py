@@ -100,7 +100,7 @@ def _is_blocked_by_oracle(rng, arm, scene, target):
     return bool(is_touching.all())
 
 
-def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, spinning):
+def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, tell, spinning):
     rng = np.random.default_rng(2024)
     arm, limits = worlds.table_1_arm(), worlds.limits()
     client = Client()
@@ -114,18 +114,15 @@ def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, spinnin
             q = _free_start(rng, arm, scene)
             # The last motion is seen not to be followed: another body is no reason to stop it.
             time.sleep(0.4)
-            client.joints.publish(samples.joints(q.tolist()))
-            assert client.joints.wait_for_all_acked()
+            tell(client, client.joints, samples.joints(q.tolist()))
             time.sleep(0.05)
-            client.body.publish(_body_message(scene))
+            tell(client, client.body, _body_message(scene))
             for k in range(N_TARGETS + N_NEAR):
                 direction = rng.standard_normal(3)
                 length = rng.uniform(0.7, 4.0) if k < N_TARGETS else rng.uniform(0.1, 0.5)
                 target = length * direction / np.linalg.norm(direction)
-                client.joints.publish(samples.joints(q.tolist()))
-                client.target.publish(samples.target(*target))
-                for publisher in (client.body, client.joints, client.target):
-                    assert publisher.wait_for_all_acked()
+                tell(client, client.joints, samples.joints(q.tolist()))
+                tell(client, client.target, samples.target(*target))
                 n_before, n_asked = len(client.motions), sum(codes.values())
                 future = client.plan.call_async(Trigger.Request())
                 wait_until(future.done)

@@ -53,7 +53,7 @@ def _body():
     return samples.array(*boxes)
 
 
-def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, spinning):
+def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, tell, spinning):
     client, said, answers = Client(), [], []
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', 'seed:=7']
@@ -64,11 +64,9 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, spi
     ):
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.states)
-        client.body.publish(_body())
+        tell(client, client.body, _body())
         for target in TARGETS * ROUNDS:
-            client.target.publish(samples.target(*target))
-            for publisher in (client.body, client.target):
-                assert publisher.wait_for_all_acked()
+            tell(client, client.target, samples.target(*target))
             was_moving = client.speed() > 0.05
             future = client.plan.call_async(Trigger.Request())
             wait_until(future.done)

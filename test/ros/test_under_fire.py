@@ -392,7 +392,7 @@ def test_after_all_of_this_a_good_motion_is_followed(playback):
     assert playback._playback is not before
 
 
-def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, wait_until):
+def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_until):
     planner, playback = (kind(namespace='/wire') for kind in (PlannerNode, PlaybackNode))
     stranger, motions = Node('stranger', namespace='/wire'), []
     topics = {
@@ -431,8 +431,7 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, wait_until):
         fire()
         for publisher, _, good in publishers.values():
             if good is not None:
-                publisher.publish(good)
-                assert publisher.wait_for_all_acked()
+                tell(stranger, publisher, good)
         n, inputs = len(motions), planner._listener._inputs
         wait_until(lambda: not any(heard.is_last_refused for heard in inputs.all.values()))
         wait_until(lambda: ask().success)
