@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What each judge says of a motion, piece by piece: certificate, python-fcl, numpy oracle."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -10,10 +10,9 @@ from rrth_planner import oracle
 from rrth_planner.arm import ArmModel, reach_to
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond
-from rrth_planner.fcl_check import first_touch, nearest, touch_on_way_out
+from rrth_planner.fcl_check import nearest
 from rrth_planner.goal import PointingGoal
-from rrth_planner.leaving import box_depths, leads_out
+from rrth_planner.judges import is_proven_free, touch_seen
 from rrth_planner.scene import Scene
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, Trajectory
@@ -117,21 +116,9 @@ def verdict_of(
         fcl=_closest(arm, scene, q_end[None], np.array([end]), reach),
         oracle=oracle.least_clearance(arm, scene, q_end[None], reach),
     )
-    is_out = escape_time == 0.0 or leads_out(trajectory, world, escape_time)
-    depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-    touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray_guard_length)
-    if touch is None:
-        rest = beyond(trajectory, escape_time)
-        touch = first_touch(arm, scene, rest, margin, ray_guard_length, reach)
-        if touch is not None:
-            touch = replace(touch, time=escape_time + touch.time)
     return Verdict(
-        is_proven=(
-            is_out
-            and certify(trajectory, world, escape_time).is_proven
-            and world.is_valid(q_end, reach)
-        ),
-        touch=touch,
+        is_proven=is_proven_free(world, trajectory, reach, escape_time),
+        touch=touch_seen(arm, scene, world, trajectory, margin, reach, escape_time),
         clearance=min(opinion.oracle for opinion in (*opinions, last)),
         opinions=(*opinions, last),
     )

@@ -10,10 +10,9 @@ import numpy as np
 from rrth_planner.arm import ArmModel, reach_to
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond, Escape
-from rrth_planner.fcl_check import first_touch, touch_on_way_out
+from rrth_planner.escape import Escape
 from rrth_planner.goal import PointingGoal
-from rrth_planner.leaving import box_depths
+from rrth_planner.judges import touch_seen
 from rrth_planner.path import Path
 from rrth_planner.refusal import Refusal
 from rrth_planner.scene import Scene
@@ -83,20 +82,9 @@ def time_path(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
         )
     reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = None
-    if escape is not None:
-        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-        touch = touch_on_way_out(
-            arm, scene, depths, trajectory, escape_time, margin, world.ray_length
-        )
+    touch = touch_seen(arm, scene, world, trajectory, margin, reach, escape_time)
     if touch is not None:
         return Disagreement(trajectory, touch, escape_time)
-    touch = first_touch(
-        arm, scene, beyond(trajectory, escape_time), margin, world.ray_length, reach
-    )
-    if touch is not None:
-        later = replace(touch, time=escape_time + touch.time)
-        return Disagreement(trajectory, later, escape_time)
     return trajectory
 
 

@@ -39,7 +39,7 @@ from worlds import (
 )
 
 pytest.importorskip('fcl')
-from rrth_planner import fcl_check, path_timing, pipeline  # noqa: E402
+from rrth_planner import fcl_check, judges, pipeline  # noqa: E402
 
 ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
@@ -336,7 +336,7 @@ def second_opinion(arm, scene, world, trajectory):
 def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
     arm, scene = pressed()
     touch = Touch(0.001, 0.005, 'pointing ray', 'hand')
-    monkeypatch.setattr(path_timing, 'touch_on_way_out', lambda *_: touch)
+    monkeypatch.setattr(judges, 'touch_on_way_out', lambda *_: touch)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None

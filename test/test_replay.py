@@ -24,7 +24,7 @@ from rrth_planner.world import arm_world
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 
 pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
-from rrth_planner import opinions, path_timing, replay
+from rrth_planner import judges, opinions, replay
 
 ROOT = Path(__file__).parent.parent
 TOUCH = Touch(0.25, 0.0123, 'ray', 'head')
@@ -43,8 +43,7 @@ QUESTION = PlanQuestion(
 
 def disagree(monkeypatch):
     """Have python-fcl see a touch in every motion."""
-    for module in (path_timing, opinions):
-        monkeypatch.setattr(module, 'first_touch', lambda *_: TOUCH)
+    monkeypatch.setattr(judges, 'first_touch', lambda *_: TOUCH)
 
 
 def disagreement(monkeypatch, question=QUESTION):

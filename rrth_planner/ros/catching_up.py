@@ -10,8 +10,6 @@ from rclpy.node import Node
 
 # Longer than this a node is not waited for [s].
 LONGEST = 1.0
-# A message that came no longer ago may as well be under way still [s].
-FRESH = 0.005
 
 
 class CatchUp:
@@ -46,7 +44,7 @@ class CatchUp:
         if self._node.executor is None:
             # Whoever calls its callbacks by hand has handed over what there is.
             return True
-        self._begin, self._n = time.time_ns() - int(FRESH * 1e9), self._handled()[0]
+        self._begin, self._n = time.time_ns(), self._handled()[0]
         self._is_over.clear()
         self._round.trigger()
         is_through = self._is_over.wait(LONGEST)

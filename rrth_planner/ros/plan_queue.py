@@ -55,6 +55,8 @@ class Response:
 
 # So much longer than its brake an arm may need to come to rest [s].
 LONGEST_SETTLING = 1.0
+# How often a motion is held against the wearer before it is told, who may never stand still.
+MOST_LOOKS = 3
 
 
 class _Ticket:
@@ -175,11 +177,11 @@ class PlanQueue:
                 running,
                 self._catch_up,
             )
+            outcome, refusal = self._settle(ticket, outcome, parameters, n_brakes)
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             incident = outcome.incident
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            refusal = self._settle(ticket, outcome, parameters, n_brakes)
             if refusal is not None:
                 if code is not ErrorCode.PREEMPTED:
                     code, sentence = refusal
@@ -217,32 +219,49 @@ class PlanQueue:
 
     def _settle(
         self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters, n_brakes: int
+    ) -> tuple[Any, tuple[ErrorCode, str] | None]:
+        """
+        Publish a request's motion, if it has one.
+
+        Return the outcome, which another body may have changed, and why nothing was published of
+        a motion that is still free.
+        """
+        n_looks = 1
+        while True:
+            with self._lock:
+                if ticket.is_cancelled or self._is_closed:
+                    return outcome, (ErrorCode.PREEMPTED, 'the request was cancelled')
+                is_seen = outcome.body is self._heard.body.value or n_looks == MOST_LOOKS
+                if outcome.trajectory is None or is_seen:
+                    self._open.discard(ticket)
+                    return outcome, self._tell(outcome, parameters, n_brakes)
+            # Not while the lock is held: a motion that runs may have to be stopped.
+            outcome, n_looks = outcome.looked_at(), n_looks + 1
+
+    def _tell(
+        self, outcome: Any, parameters: PlannerParameters, n_brakes: int
     ) -> tuple[ErrorCode, str] | None:
-        """Publish a request's motion, if it has one, or return why not."""
-        with self._lock:
-            if ticket.is_cancelled or self._is_closed:
-                return ErrorCode.PREEMPTED, 'the request was cancelled'
-            self._open.discard(ticket)
-            if outcome.trajectory is None:
-                return None
-            if n_brakes != self.guard.n_brakes:
-                return (
-                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                    'the arm was stopped for the wearer while its motion was planned',
-                )
-            begin = 0.0 if outcome.start is None else outcome.start.time
-            self._publishers.publish_motion(outcome.trajectory, parameters, begin)
-            self.guard.begin(
-                RunningMotion(
-                    trajectory=outcome.trajectory,
-                    start_time=begin or self._now(),
-                    reach=outcome.plan.reach,
-                    escape_time=outcome.plan.escape_time,
-                ),
-                outcome.inputs.goal,
-                parameters,
-            )
+        """Publish a motion, if there is one, or return why not; the lock is held."""
+        if outcome.trajectory is None:
             return None
+        if n_brakes != self.guard.n_brakes:
+            return (
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'the arm was stopped for the wearer while its motion was planned',
+            )
+        begin = 0.0 if outcome.start is None else outcome.start.time
+        self._publishers.publish_motion(outcome.trajectory, parameters, begin)
+        self.guard.begin(
+            RunningMotion(
+                trajectory=outcome.trajectory,
+                start_time=begin or self._now(),
+                reach=outcome.plan.reach,
+                escape_time=outcome.plan.escape_time,
+            ),
+            outcome.inputs.goal,
+            parameters,
+        )
+        return None
 
     def _plan_again(self, goal: PointingGoal, wait: float) -> None:
         """Plan for a goal once more as soon as the arm, which brakes, rests."""

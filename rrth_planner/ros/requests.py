@@ -5,76 +5,21 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 import secrets
-import time
 
-import numpy as np
-from rrth_planner.arm import reach_to
-from rrth_planner.arrays import Array
-from rrth_planner.certificate import certify
-from rrth_planner.escape import beyond
-from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
-from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
+from rrth_planner.ros.last_look import LastLook
 from rrth_planner.ros.parameters import PlannerParameters
-from rrth_planner.running_motion import LONGEST_LEAD, RunningMotion
-from rrth_planner.scene import Scene
-from rrth_planner.takeover import Takeover
-from rrth_planner.touch import Disagreement
+from rrth_planner.ros.start import LEADS, Start
+from rrth_planner.running_motion import RunningMotion
 from rrth_planner.trajectory import Trajectory
-from rrth_planner.world import arm_world
-
-# A motion that starts further from the arm than this would begin with a jump [rad].
-START_TOLERANCE = 1e-3
-
-
-# How far ahead a motion begins that takes over from one that runs: that long its plan may take,
-# and once more with more time [s].
-LEADS = (0.05, LONGEST_LEAD)
-# So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
-# present motion is unknown, since the arm has to be looked at as late as can be.
-EARLY = 0.025
-# So late a motion may be told of which nobody knows how the arm moved until then [s].
-LATE = 0.02
-# How often a motion is held against the wearer before it is told, who may never stand still.
-MOST_CHECKS = 3
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Start:
-    """
-    Where a motion of an arm that moves begins.
-
-    Parameters
-    ----------
-    time : float
-        [s].
-    takeover : Takeover
-        What the arm does then.
-    running : RunningMotion or None
-        The motion that it was last told to follow.
-
-    """
-
-    time: float
-    takeover: Takeover
-    running: RunningMotion | None
-
-    @property
-    def early(self) -> float:
-        """How long before it begins the motion is told, if all goes well [s]."""
-        return 0.0 if self.takeover.running is None else EARLY
-
-    @property
-    def latest(self) -> float:
-        """When the motion can still be told [s]."""
-        return self.time + (LATE if self.takeover.running is None else 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +38,10 @@ class PlanOutcome:
         What the plan was asked.
     incident : Incident or None
         To be kept in a file, which the answer then names.
+    body : WearerBody or None
+        The one that the motion was last held against.
+    look : LastLook or None
+        What holds it against the body that is heard by now.
 
     """
 
@@ -103,6 +52,8 @@ class PlanOutcome:
     start: Start | None = None
     question: PlanQuestion | None = None
     incident: Incident | None = None
+    body: WearerBody | None = None
+    look: LastLook | None = None
 
     @property
     def trajectory(self) -> Trajectory | None:
@@ -110,6 +61,21 @@ class PlanOutcome:
         if self.plan is None or self.code is not ErrorCode.SUCCESS:
             return None
         return self.plan.trajectory
+
+    def looked_at(self) -> 'PlanOutcome':
+        """Return the outcome once its motion is held against the body that is heard by now."""
+        look, plan, question = self.look, self.plan, self.question
+        assert look is not None and plan is not None and question is not None
+        body = look.heard.body.value
+        try:
+            found = look.disagreement()
+        except RequestError as problem:
+            return PlanOutcome(problem.code, str(problem))
+        if found is None:
+            return replace(self, body=body)
+        incident = disagreement_incident(question, *found)
+        sentence = f'{incident.sentence}, seed {plan.seed}'
+        return PlanOutcome(ErrorCode.FAILURE, sentence, plan, self.inputs, incident=incident)
 
 
 def plan_request(
@@ -171,20 +137,20 @@ def plan_request(
                 return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return PlanOutcome(code, plan.sentence, plan, inputs)
-            if start is None or clock() <= start.time:
+            if start is not None and clock() > start.time:
+                continue
+            _require_news(catch_up)
+            if start is not None:
+                start.wait(clock, should_stop)
                 _require_news(catch_up)
-                _wait_for(start, clock, should_stop)
-                if should_stop():
-                    raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-                moved = _check_news(heard, parameters, clock, inputs, plan, start)
-                if moved is not None:
-                    incident = disagreement_incident(question, *moved)
-                    sentence = f'{incident.sentence}, seed {plan.seed}'
-                    return PlanOutcome(
-                        ErrorCode.FAILURE, sentence, plan, inputs, incident=incident
-                    )
-                if start is None or clock() <= start.latest:
-                    return PlanOutcome(code, plan.sentence, plan, inputs, start, question)
+            if should_stop():
+                raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
+            look = LastLook(heard, clock, parameters, inputs, plan, start)
+            outcome = PlanOutcome(
+                code, plan.sentence, plan, inputs, start, question, look=look
+            ).looked_at()
+            if outcome.trajectory is None or start is None or clock() <= start.latest:
+                return outcome
         raise RequestError(
             ErrorCode.TIMED_OUT,
             f'the arm moves, and no plan was ready within {LEADS[-1]:g} s to take over from its '
@@ -216,19 +182,6 @@ def _question(
     )
 
 
-def _wait_for(
-    start: Start | None, clock: Callable[[], float], should_stop: Callable[[], bool]
-) -> None:
-    """Return when a motion is to be told; at once for an arm at rest."""
-    # A simulated clock may stand still.
-    end = time.monotonic() + 2 * LEADS[-1]
-    while start is not None and time.monotonic() < end and not should_stop():
-        left = start.time - start.early - clock()
-        if left <= 0.0:
-            return
-        time.sleep(min(1e-3, max(1e-5, left)))
-
-
 def _require_news(catch_up: Callable[[], bool]) -> None:
     """Wait until the bodies that came are heard, or raise RequestError."""
     if not catch_up():
@@ -236,98 +189,3 @@ def _require_news(catch_up: Callable[[], bool]) -> None:
             ErrorCode.SENSOR_INFO_STALE,
             'the node is busy: the bodies that came while the motion was planned are not read yet',
         )
-
-
-def _check_news(
-    heard: Inputs,
-    parameters: PlannerParameters,
-    clock: Callable[[], float],
-    inputs: PlanInputs,
-    plan: MotionPlan,
-    start: Start | None,
-) -> tuple[Disagreement, Scene] | None:
-    """Check as `_check_present` does until no other body comes meanwhile."""
-    for _ in range(MOST_CHECKS):
-        body = heard.body.value
-        moved = _check_present(heard, parameters, clock(), inputs, plan, start)
-        if moved is not None or heard.body.value is body:
-            return moved
-    return None
-
-
-def _check_present(
-    heard: Inputs,
-    parameters: PlannerParameters,
-    now: float,
-    inputs: PlanInputs,
-    plan: MotionPlan,
-    start: Start | None,
-) -> tuple[Disagreement, Scene] | None:
-    """
-    Raise RequestError where wearer or arm have moved so that the motion no longer fits.
-
-    Return what the two judges disagree about in the present world, and its wearer; None where they
-    agree.
-    """
-    trajectory, escape_time = plan.trajectory, plan.escape_time
-    assert trajectory is not None
-    present = heard.at(now, parameters, inputs.goal)
-    expected = inputs.q_start
-    if start is None:
-        present.require_rest(now, parameters.arm)
-    else:
-        ahead = inputs.ahead(start.running, present.joints.taken, parameters.arm)
-        expected = ahead.state.positions
-    moved = float(np.abs(present.q_start - expected).max())
-    if not moved <= START_TOLERANCE:
-        what = 'moved by' if start is None else 'is off its course by'
-        raise RequestError(
-            ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-            f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
-            f'{START_TOLERANCE:g} rad',
-        )
-    if _is_same(present.scene, inputs.scene):
-        return None
-    world = arm_world(
-        parameters.arm, present.scene, parameters.margin, parameters.ray_guard_length
-    )
-    q_end: Array = trajectory.positions[-1]
-    reach = reach_to(parameters.arm, inputs.goal.target, q_end)
-    if not (
-        world.is_valid(q_end, reach)
-        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
-        and certify(trajectory, world, escape_time).is_proven
-    ):
-        raise RequestError(
-            ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-            'the wearer moved while the motion was planned, and it is no longer proven free of '
-            'the present body',
-        )
-    # Both judges must agree, as they had to when it was planned.
-    arm, margin = parameters.arm, parameters.margin
-    touch = None
-    if escape_time > 0.0:
-        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-        touch = touch_on_way_out(
-            arm, present.scene, depths, trajectory, escape_time, margin, world.ray_length
-        )
-    if touch is None:
-        rest = beyond(trajectory, escape_time)
-        touch = first_touch(arm, present.scene, rest, margin, world.ray_length, reach)
-        if touch is not None:
-            touch = replace(touch, time=escape_time + touch.time)
-    if touch is None:
-        return None
-    return Disagreement(trajectory, touch, escape_time), present.scene
-
-
-def _is_same(one: Scene, other: Scene) -> bool:
-    return len(one.boxes) == len(other.boxes) and all(
-        a is b
-        or (
-            np.array_equal(a.center, b.center)
-            and np.array_equal(a.size, b.size)
-            and np.array_equal(a.rotation, b.rotation)
-        )
-        for a, b in zip(one.boxes, other.boxes, strict=True)
-    )

@@ -71,12 +71,13 @@ def test_one_quiet_round_is_enough(node, spinning):
             assert len(looks) == 2 * k
 
 
-@pytest.mark.parametrize(('age', 'is_news'), [(-0.01, True), (0.001, True), (0.1, False)])
+@pytest.mark.parametrize(('age', 'is_news'), [(-0.01, True), (0.001, False)])
 def test_one_that_came_later_ends_the_waiting(node, spinning, monkeypatch, age, is_news):
     monkeypatch.setattr(catching_up, 'LONGEST', 0.3)
     rounds, came = count(), 0
     catch_up = CatchUp(node, lambda: (next(rounds), came))
     with spinning(node):
+        # It came after the waiting begins, or others that came with it may be unread.
         came = time.time_ns() - int(age * 1e9)
         assert catch_up() == is_news
     # Who hears more and more, and nothing new, is not waited for for ever.

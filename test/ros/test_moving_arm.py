@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a request makes of an arm that follows its motion, on a clock of its own."""
 
+from itertools import cycle
 from threading import Thread
 from types import SimpleNamespace
 
@@ -13,14 +14,15 @@ pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
-from rrth_planner.ros import requests  # noqa: E402
+from rrth_planner.ros import start  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.joints import JointReading  # noqa: E402
 from rrth_planner.ros.messages import WearerBody  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
-from rrth_planner.ros.requests import EARLY, LEADS, plan_request  # noqa: E402
+from rrth_planner.ros.requests import plan_request  # noqa: E402
+from rrth_planner.ros.start import EARLY, LEADS  # noqa: E402
 from rrth_planner.running_motion import RunningMotion  # noqa: E402
 from rrth_planner.trajectory import sample, Trajectory  # noqa: E402
 import worlds  # noqa: E402
@@ -70,10 +72,13 @@ def _ask(monkeypatch):
         if tick > 0.0:
             # No time but that of the clock, however busy the machine.
             still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
-            monkeypatch.setattr(requests, 'time', still)
+            monkeypatch.setattr(start, 'time', still)
+
+        # What came meanwhile takes long to be read, what comes while the arm is waited for not.
+        takes = cycle([reading, 0.0])
 
         def catch_up():
-            clock.now += reading
+            clock.now += next(takes)
             return reads
 
         heard = Inputs('body', 'target', 'joints')

@@ -26,12 +26,14 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
+from rrth_planner import judges  # noqa: E402
 from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import catching_up, plan_queue, requests  # noqa: E402
+from rrth_planner.ros import catching_up, last_look, plan_queue, requests  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.last_look import LastLook  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
@@ -322,7 +324,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    inputs, plan_motion, touches = inputs_of(planner), requests.plan_motion, []
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -330,15 +332,16 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
         far = box('far', body.n_boxes, center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(array(far))
         wait_until(lambda: inputs.body.value is not body)
+        for touch in touches:
+            monkeypatch.setattr(judges, 'touch_on_way_out', lambda *_, touch=touch: touch)
         return plan
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
     with monkeypatch.context() as patch:
-        patch.setattr(requests, 'leads_out', lambda *_: False)
+        patch.setattr(judges, 'leads_out', lambda *_: False)
         message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    touch = Touch(0.001, 0.01, 'pointing ray', 'hand/0')
-    monkeypatch.setattr(requests, 'touch_on_way_out', lambda *_: touch)
+    touches.append(Touch(0.001, 0.01, 'pointing ray', 'hand/0'))
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
     assert not stranger.heard['joint_trajectory']
@@ -525,21 +528,39 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, check, checked = inputs_of(planner), requests._check_present, []
+    inputs, check, checked = inputs_of(planner), LastLook.disagreement, []
 
-    def check_while_a_body_comes(*args):
-        found, body = check(*args), inputs.body.value
+    def check_while_a_body_comes(look):
+        found, body = check(look), inputs.body.value
         checked.append(body)
         far = box('far', len(checked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(fenced() if is_in_the_way else array(far))
         wait_until(lambda: inputs.body.value is not body)
         return found
 
-    monkeypatch.setattr(requests, '_check_present', check_while_a_body_comes)
+    monkeypatch.setattr(LastLook, 'disagreement', check_while_a_body_comes)
     message = stranger.answer().message
     # Not for ever: the guard holds the motion against the bodies that follow.
-    assert len(checked) == (1 if is_in_the_way else requests.MOST_CHECKS)
+    assert len(checked) == (1 if is_in_the_way else plan_queue.MOST_LOOKS)
     assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
+
+
+def test_a_body_that_comes_when_all_is_checked_is_checked_too(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue, inputs = planner._queue, inputs_of(planner)
+    plan_request = queue._plan_request
+
+    def plan_and_dawdle(*args):
+        outcome, body = plan_request(*args), inputs.body.value
+        stranger.publishers['body_boxes'].publish(fenced())
+        wait_until(lambda: inputs.body.value is not body)
+        return outcome
+
+    monkeypatch.setattr(queue, '_plan_request', plan_and_dawdle)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert not stranger.heard['joint_trajectory']
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -637,7 +658,7 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
         return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
-    monkeypatch.setattr(requests, 'first_touch', disagree)
+    monkeypatch.setattr(last_look, 'touch_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
@@ -653,15 +674,15 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
 def test_what_was_cancelled_is_never_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, check_present = planner._queue, requests._check_present
+    queue, check = planner._queue, LastLook.disagreement
     ended = []
 
-    def cancel_after_the_last_look(*args):
-        check_present(*args)
+    def cancel_after_the_last_look(look):
+        check(look)
         ended.append(queue.cancel())
 
     with monkeypatch.context() as patch:
-        patch.setattr(requests, '_check_present', cancel_after_the_last_look)
+        patch.setattr(LastLook, 'disagreement', cancel_after_the_last_look)
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
@@ -719,16 +740,16 @@ def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
 def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, check_present = planner._queue, requests._check_present
+    queue, check = planner._queue, LastLook.disagreement
     closers = []
 
-    def close_after_the_last_look(*args):
-        check_present(*args)
+    def close_after_the_last_look(look):
+        check(look)
         closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
 
-    monkeypatch.setattr(requests, '_check_present', close_after_the_last_look)
+    monkeypatch.setattr(LastLook, 'disagreement', close_after_the_last_look)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
     assert not stranger.heard['joint_trajectory']

@@ -1,0 +1,74 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The two judges of a whole motion: the certificate, and python-fcl, who knows nothing of it."""
+
+from dataclasses import replace
+
+from rrth_planner.arm import ArmModel
+from rrth_planner.certificate import certify
+from rrth_planner.escape import beyond
+from rrth_planner.fcl_check import first_touch, touch_on_way_out
+from rrth_planner.leaving import box_depths, leads_out
+from rrth_planner.scene import Scene
+from rrth_planner.touch import Touch
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.world import World
+
+
+def is_proven_free(
+    world: World, trajectory: Trajectory, reach: float, escape_time: float = 0.0
+) -> bool:
+    """
+    Return whether a motion is proven free, and its end with the ray out to the target.
+
+    Parameters
+    ----------
+    world : World
+    trajectory : Trajectory
+    reach : float
+        How far the target is from the tool at the end [m].
+    escape_time : float
+        Until then the motion leads out of boxes that the arm was in [s].
+
+    """
+    return (
+        world.is_valid(trajectory.positions[-1], reach)
+        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
+        and certify(trajectory, world, escape_time).is_proven
+    )
+
+
+def touch_seen(
+    arm: ArmModel,
+    scene: Scene,
+    world: World,
+    trajectory: Trajectory,
+    margin: float,
+    reach: float,
+    escape_time: float = 0.0,
+) -> Touch | None:
+    """
+    Return where python-fcl sees a motion first come nearer than it may, or None.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    scene : Scene
+        The wearer in the base frame.
+    world : World
+        The same, grown by the margin.
+    trajectory : Trajectory
+    margin : float
+        Distance to keep from every box [m].
+    reach, escape_time : float
+        As in `is_proven_free`.
+
+    """
+    ray = world.ray_length
+    if escape_time > 0.0:
+        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray)
+        if touch is not None:
+            return touch
+    touch = first_touch(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
+    return None if touch is None else replace(touch, time=escape_time + touch.time)

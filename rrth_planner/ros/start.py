@@ -1,0 +1,60 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a motion begins that takes over from another one, and when it is told."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+import time
+
+from rrth_planner.running_motion import LONGEST_LEAD, RunningMotion
+from rrth_planner.takeover import Takeover
+
+# How far ahead a motion begins that takes over from one that runs: that long its plan may take,
+# and once more with more time [s].
+LEADS = (0.05, LONGEST_LEAD)
+# So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
+# present motion is unknown, since the arm has to be looked at as late as can be.
+EARLY = 0.025
+# So late a motion may be told of which nobody knows how the arm moved until then [s].
+LATE = 0.02
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """
+    Where a motion of an arm that moves begins.
+
+    Parameters
+    ----------
+    time : float
+        [s].
+    takeover : Takeover
+        What the arm does then.
+    running : RunningMotion or None
+        The motion that it was last told to follow.
+
+    """
+
+    time: float
+    takeover: Takeover
+    running: RunningMotion | None
+
+    @property
+    def early(self) -> float:
+        """How long before it begins the motion is told, if all goes well [s]."""
+        return 0.0 if self.takeover.running is None else EARLY
+
+    @property
+    def latest(self) -> float:
+        """When the motion can still be told [s]."""
+        return self.time + (LATE if self.takeover.running is None else 0.0)
+
+    def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
+        """Return when the motion is to be told, or when it is not to be told at all."""
+        # A simulated clock may stand still.
+        end = time.monotonic() + 2 * LEADS[-1]
+        while time.monotonic() < end and not should_stop():
+            left = self.time - self.early - clock()
+            if left <= 0.0:
+                return
+            time.sleep(min(1e-3, max(1e-5, left)))
