@@ -20,7 +20,7 @@ from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import process_of, SoakClient, threads_of
-from benchmarks.soak_judge import EACH, judge_bytes, MARGIN, newest_before, OLDER, RAY
+from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, newest_before, RAY
 
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
@@ -63,9 +63,9 @@ class PlansRecord:
         Bodies.
     verdicts : Counter
         Of (verdict, whether it is a brake).
-    outdated : list of list of float
-        Of each motion that is free of an older body only: how long before it the bodies were sent,
-        the newest first [s].
+    suspects : list of (str, list of float)
+        Of each motion, but brakes, that is not free of the body: the verdict, and how long before
+        it the bodies were sent, the newest first [s].
     n_motions : int
         That were published.
     elapsed : float
@@ -85,7 +85,7 @@ class PlansRecord:
     figures: dict[str, str] = field(default_factory=dict)
     n_sent: int = 0
     verdicts: Counter = field(default_factory=Counter)
-    outdated: list[list[float]] = field(default_factory=list)
+    suspects: list[tuple[str, list[float]]] = field(default_factory=list)
     n_motions: int = 0
     elapsed: float = 0.0
     is_interrupted: bool = False
@@ -126,7 +126,7 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
     record.gaps = (np.diff([body.sent for body in bodies.log]) * 1e-9).tolist()
     record.n_motions = len(client.motions)
     try:
-        judge_all(client, bodies.log, record.verdicts, record.outdated)
+        judge_all(client, bodies.log, record.verdicts, record.suspects)
     except KeyboardInterrupt:
         record.is_interrupted = True
     client.close()
@@ -193,7 +193,10 @@ def free_starts(rng: np.random.Generator, wearer: int) -> tuple[int, Array]:
 
 
 def judge_all(
-    client: SoakClient, log: list[BodyAt], verdicts: Counter, outdated: list[list[float]]
+    client: SoakClient,
+    log: list[BodyAt],
+    verdicts: Counter,
+    suspects: list[tuple[str, list[float]]],
 ) -> None:
     """Judge every motion against the bodies before it, in all processors."""
     from multiprocessing import get_context
@@ -213,7 +216,8 @@ def judge_all(
         words = pool.imap(judge_bytes, tasks(), chunksize=20)
         for motion, word in zip(client.motions, words, strict=True):
             verdicts[word] += 1
-            if word[0] == OLDER:
+            if word[0] != FREE and not word[1]:
                 before = newest_before(sent, motion.published, LOOKED_AT + 1)
-                outdated.append([1e-9 * (motion.published - sent[i]) for i in before])
+                ages = [1e-9 * (motion.published - sent[i]) for i in before]
+                suspects.append((word[0], ages))
             bar.update()

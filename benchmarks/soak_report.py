@@ -136,9 +136,9 @@ def _plans_text(plans: PlansRecord) -> str:
             markdown_table(('answer', 'requests', 'the last one'), codes),
             markdown_table(('verdict', 'trajectories'), verdicts),
             *(
-                f'- free of an older body: published '
-                f'{", ".join(f"{1e3 * age:.1f}" for age in ages)} ms after the bodies before it'
-                for ages in plans.outdated
+                f'- {word}: published {", ".join(f"{1e3 * age:.1f}" for age in ages)} ms after '
+                'the bodies before it'
+                for word, ages in plans.suspects
             ),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
