@@ -27,7 +27,7 @@ from benchmarks.queries import table_1_arm
 
 # The wearers of the other benchmark are the first hundred.
 FIRST_BODY = 1000
-STEPS = ('round_corners', 'first_proven', 'first_touch')
+STEPS = ('round_corners', 'first_proven', 'touch_seen')
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

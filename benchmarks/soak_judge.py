@@ -88,6 +88,12 @@ def verdict_on(
     return TOUCHES if is_touching else NEAR
 
 
+def name_of(verdict: tuple[str, bool]) -> str:
+    """Return what to call a verdict of `judge_bytes`."""
+    word, is_brake = verdict
+    return f'braking: {word}' if is_brake else word
+
+
 def states_of(trajectory: Trajectory, period: float) -> Array:
     """Return where a controller takes the arm, every `period` [s] and at each point, [rad]."""
     if len(trajectory.times) == 1:
@@ -104,7 +110,7 @@ def newest_before(sent: Sequence[int], time: int, n: int) -> list[int]:
 
 def judge_bytes(task: tuple[bytes, tuple, bool]) -> tuple[str, bool]:
     """
-    Return the verdict on a serialized motion, and whether it takes over from another one.
+    Return the verdict on a serialized motion, and whether it takes over, as brakes do.
 
     Parameters
     ----------

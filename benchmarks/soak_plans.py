@@ -20,7 +20,7 @@ from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import process_of, SoakClient, threads_of
-from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, newest_before, RAY
+from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, name_of, newest_before, RAY
 
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
@@ -64,8 +64,8 @@ class PlansRecord:
     verdicts : Counter
         Of (verdict, whether it is a brake).
     suspects : list of (str, list of float)
-        Of each motion, but brakes, that is not free of the body: the verdict, and how long before
-        it the bodies were sent, the newest first [s].
+        Of each motion that is not free of the body: the verdict, and how long before it the bodies
+        were sent, the newest first [s].
     n_motions : int
         That were published.
     elapsed : float
@@ -216,8 +216,8 @@ def judge_all(
         words = pool.imap(judge_bytes, tasks(), chunksize=20)
         for motion, word in zip(client.motions, words, strict=True):
             verdicts[word] += 1
-            if word[0] != FREE and not word[1]:
+            if word[0] != FREE:
                 before = newest_before(sent, motion.published, LOOKED_AT + 1)
                 ages = [1e-9 * (motion.published - sent[i]) for i in before]
-                suspects.append((word[0], ages))
+                suspects.append((name_of(word), ages))
             bar.update()

@@ -13,7 +13,7 @@ from rrth_planner.campaign.store import replace_file
 from benchmarks import soak_contacts as contacts
 from benchmarks.real_time import scheduling
 from benchmarks.soak_guard import GuardRecord
-from benchmarks.soak_judge import FREE, growth_of
+from benchmarks.soak_judge import FREE, growth_of, name_of
 from benchmarks.soak_plans import PlansRecord
 from benchmarks.task import origin
 
@@ -123,10 +123,7 @@ def guard_targets(guard: GuardRecord) -> list[list[str]]:
 
 def _plans_text(plans: PlansRecord) -> str:
     codes = [[code, str(n), plans.examples.get(code, '')] for code, n in plans.codes.most_common()]
-    verdicts = [
-        [('braking: ' if is_brake else '') + word, str(n)]
-        for (word, is_brake), n in sorted(plans.verdicts.items())
-    ]
+    verdicts = [[name_of(verdict), str(n)] for verdict, n in sorted(plans.verdicts.items())]
     gaps = np.array(plans.gaps or [np.nan]) * 1e3
     return '\n\n'.join(
         [

@@ -9,22 +9,45 @@ import numpy as np
 from rrth_planner.arm import reach_to
 from rrth_planner.judges import is_proven_free, touch_seen
 from rrth_planner.motion_plan import MotionPlan
+from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import Start
 from rrth_planner.scene import Scene
 from rrth_planner.touch import Disagreement
-from rrth_planner.world import arm_world
+from rrth_planner.trajectory import Trajectory
+from rrth_planner.world import arm_world, World
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """
+    What a motion was held against.
+
+    Parameters
+    ----------
+    body : WearerBody
+        As it was heard.
+    scene : Scene
+        Its boxes.
+    disagreement : Disagreement or None
+        What one judge has against the motion and the other has not.
+
+    """
+
+    body: WearerBody
+    scene: Scene
+    disagreement: Disagreement | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LastLook:
     """
-    What a planned motion is held against once more, as often as need be.
+    Holds a planned motion against wearer and arm as they are by now, as often as need be.
 
     Parameters
     ----------
@@ -49,19 +72,50 @@ class LastLook:
     plan: MotionPlan
     start: Start | None
 
-    def disagreement(self) -> tuple[Disagreement, Scene] | None:
+    def take(self) -> Seen:
         """
-        Return what the two judges disagree about in the present world, and its wearer.
+        Return what is seen; the judges are asked where the wearer has moved.
 
-        None where they agree that the motion is still free. Raise RequestError where wearer or arm
-        have moved so that it no longer fits.
+        Raise RequestError where wearer or arm have moved so that the motion no longer fits.
         """
-        now = self.clock()
+        now, body = self.clock(), self.heard.body.value
         present = self.heard.at(now, self.parameters, self.inputs.goal)
         self._require_arm(present, now)
-        if _is_same(present.scene, self.inputs.scene):
-            return None
-        return self._judge(present.scene)
+        scene = present.scene
+        if _is_same(scene, self.inputs.scene):
+            return Seen(body, scene, None)
+        world = self._require_proof(scene)
+        motion, escape_time = self._motion, self.plan.escape_time
+        parameters = self.parameters
+        touch = touch_seen(
+            parameters.arm, scene, world, motion, parameters.margin, self._reach, escape_time
+        )
+        found = None if touch is None else Disagreement(motion, touch, escape_time)
+        return Seen(body, scene, found)
+
+    def is_late(self) -> bool:
+        """Return whether it is too late to tell the motion."""
+        return self.start is not None and self.clock() > self.start.latest
+
+    def still_fits(self, seen: Seen, is_last: bool) -> bool:
+        """
+        Return whether a motion may be told that fitted what was seen a moment ago.
+
+        Not when it is too late, nor when another body was heard since. After the last look the
+        certificate alone decides about that body: it is quick, and a lock may be held. Raise
+        RequestError where it does not prove the motion free.
+        """
+        if self.is_late():
+            return False
+        body = self.heard.body.value
+        if body is seen.body:
+            return True
+        scene = scene_of(body.at(self.clock()))
+        if _is_same(scene, seen.scene):
+            return True
+        if is_last:
+            self._require_proof(scene)
+        return is_last
 
     def _require_arm(self, present: PlanInputs, now: float) -> None:
         """Raise RequestError where the arm is not where the motion needs it."""
@@ -80,24 +134,37 @@ class LastLook:
                 f'{START_TOLERANCE:g} rad',
             )
 
-    def _judge(self, scene: Scene) -> tuple[Disagreement, Scene] | None:
-        """Return what the judges disagree about, round a wearer; both must agree, as at first."""
-        trajectory, escape_time = self.plan.trajectory, self.plan.escape_time
-        assert trajectory is not None
+    def _require_proof(self, scene: Scene) -> World:
+        """Return the world of a wearer, or raise RequestError where the motion is not free."""
         parameters = self.parameters
-        arm, margin = parameters.arm, parameters.margin
-        world = arm_world(arm, scene, margin, parameters.ray_guard_length)
-        reach = reach_to(arm, self.inputs.goal.target, trajectory.positions[-1])
-        if not is_proven_free(world, trajectory, reach, escape_time):
+        world = arm_world(parameters.arm, scene, parameters.margin, parameters.ray_guard_length)
+        if not is_proven_free(world, self._motion, self._reach, self.plan.escape_time):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 'the wearer moved while the motion was planned, and it is no longer proven free '
                 'of the present body',
             )
-        touch = touch_seen(arm, scene, world, trajectory, margin, reach, escape_time)
-        if touch is None:
-            return None
-        return Disagreement(trajectory, touch, escape_time), scene
+        return world
+
+    @property
+    def _motion(self) -> Trajectory:
+        trajectory = self.plan.trajectory
+        assert trajectory is not None
+        return trajectory
+
+    @property
+    def _reach(self) -> float:
+        target = self.inputs.goal.target
+        return reach_to(self.parameters.arm, target, self._motion.positions[-1])
+
+
+def require_news(catch_up: Callable[[], bool]) -> None:
+    """Wait until the bodies that came are heard, or raise RequestError."""
+    if not catch_up():
+        raise RequestError(
+            ErrorCode.SENSOR_INFO_STALE,
+            'the node is busy: the bodies that came while the motion was planned are not read yet',
+        )
 
 
 def _is_same(one: Scene, other: Scene) -> bool:

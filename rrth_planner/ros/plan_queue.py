@@ -18,8 +18,9 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
-from rrth_planner.ros.incidents import cause_of, incident_of, keep, PlanError
-from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.incidents import cause_of, incident_of, keep
+from rrth_planner.ros.inputs import Inputs, RequestError
+from rrth_planner.ros.last_look import require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
@@ -55,8 +56,7 @@ class Response:
 
 # So much longer than its brake an arm may need to come to rest [s].
 LONGEST_SETTLING = 1.0
-# How often a motion is held against the wearer before it is told, who may never stand still.
-MOST_LOOKS = 3
+CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
 class _Ticket:
@@ -164,7 +164,7 @@ class PlanQueue:
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
         """Plan and publish; called in the worker's thread."""
-        figures, shown, incident, outcome = PlanReport(), None, None, None
+        figures, shown, incident = PlanReport(), None, None
         parameters = self._reporter.parameters
         n_brakes, running = self.guard.n_brakes, self.guard.running
         try:
@@ -176,16 +176,13 @@ class PlanQueue:
                 goal,
                 running,
                 self._catch_up,
+                lambda outcome, fits: self._tell(ticket, outcome, fits, parameters, n_brakes),
             )
-            outcome, refusal = self._settle(ticket, outcome, parameters, n_brakes)
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             incident = outcome.incident
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if refusal is not None:
-                if code is not ErrorCode.PREEMPTED:
-                    code, sentence = refusal
-            elif outcome.trajectory is not None:
+            if outcome.trajectory is not None:
                 shown = outcome
                 figures = replace(
                     figures,
@@ -194,13 +191,15 @@ class PlanQueue:
                     length=plan.path.length,
                     clearance=plan.clearance,
                 )
+            elif self._is_cancelled(ticket) and code is not ErrorCode.PREEMPTED:
+                code, sentence = CANCELLED
         except Exception as problem:
             # Whatever it is, the caller gets an answer, and the node lives on.
             self._node.get_logger().error(traceback.format_exc())
             with self._lock:
                 self._open.discard(ticket)
             code, sentence, shown = ErrorCode.FAILURE, _in_a_sentence(problem), None
-            incident = incident_of(_with_question(problem, outcome))
+            incident = incident_of(problem)
         if incident is not None:
             noted, file = keep(incident, parameters.incident_folder)
             sentence += noted
@@ -217,51 +216,48 @@ class PlanQueue:
         is_solved = code is ErrorCode.SUCCESS and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
-    def _settle(
-        self, ticket: _Ticket, outcome: Any, parameters: PlannerParameters, n_brakes: int
-    ) -> tuple[Any, tuple[ErrorCode, str] | None]:
-        """
-        Publish a request's motion, if it has one.
-
-        Return the outcome, which another body may have changed, and why nothing was published of
-        a motion that is still free.
-        """
-        n_looks = 1
-        while True:
-            with self._lock:
-                if ticket.is_cancelled or self._is_closed:
-                    return outcome, (ErrorCode.PREEMPTED, 'the request was cancelled')
-                is_seen = outcome.body is self._heard.body.value or n_looks == MOST_LOOKS
-                if outcome.trajectory is None or is_seen:
-                    self._open.discard(ticket)
-                    return outcome, self._tell(outcome, parameters, n_brakes)
-            # Not while the lock is held: a motion that runs may have to be stopped.
-            outcome, n_looks = outcome.looked_at(), n_looks + 1
-
     def _tell(
-        self, outcome: Any, parameters: PlannerParameters, n_brakes: int
-    ) -> tuple[ErrorCode, str] | None:
-        """Publish a motion, if there is one, or return why not; the lock is held."""
-        if outcome.trajectory is None:
-            return None
-        if n_brakes != self.guard.n_brakes:
-            return (
-                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the arm was stopped for the wearer while its motion was planned',
-            )
+        self,
+        ticket: _Ticket,
+        outcome: Any,
+        fits: Callable[[], bool],
+        parameters: PlannerParameters,
+        n_brakes: int,
+    ) -> bool:
+        """Publish a request's motion if it fits, and return that, or raise RequestError."""
         begin = 0.0 if outcome.start is None else outcome.start.time
-        self._publishers.publish_motion(outcome.trajectory, parameters, begin)
-        self.guard.begin(
-            RunningMotion(
-                trajectory=outcome.trajectory,
-                start_time=begin or self._now(),
-                reach=outcome.plan.reach,
-                escape_time=outcome.plan.escape_time,
-            ),
-            outcome.inputs.goal,
-            parameters,
-        )
-        return None
+        msg = self._publishers.motion(outcome.trajectory, parameters, begin)
+        # The last of all that may take its time.
+        require_news(self._catch_up)
+        with self._lock:
+            if ticket.is_cancelled or self._is_closed:
+                raise RequestError(*CANCELLED)
+            if n_brakes != self.guard.n_brakes:
+                raise RequestError(
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    'the arm was stopped for the wearer while its motion was planned',
+                )
+            if not fits():
+                return False
+            self._open.discard(ticket)
+            self._publishers.tell(msg)
+            self.guard.begin(
+                RunningMotion(
+                    trajectory=outcome.trajectory,
+                    start_time=begin or self._now(),
+                    reach=outcome.plan.reach,
+                    escape_time=outcome.plan.escape_time,
+                ),
+                outcome.inputs.goal,
+                parameters,
+            )
+            return True
+
+    def _is_cancelled(self, ticket: _Ticket) -> bool:
+        """Return whether a request was cancelled before it ended, without a motion."""
+        with self._lock:
+            self._open.discard(ticket)
+            return ticket.is_cancelled or self._is_closed
 
     def _plan_again(self, goal: PointingGoal, wait: float) -> None:
         """Plan for a goal once more as soon as the arm, which brakes, rests."""
@@ -330,12 +326,3 @@ class PlanQueue:
 def _in_a_sentence(problem: Exception) -> str:
     cause = cause_of(problem)
     return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'
-
-
-def _with_question(problem: Exception, outcome: Any) -> Exception:
-    """Return an error with what was asked, where that is known."""
-    if outcome is None or outcome.question is None:
-        return problem
-    known = PlanError(outcome.question, outcome.trajectory)
-    known.__cause__ = problem
-    return known

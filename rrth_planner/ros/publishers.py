@@ -30,11 +30,19 @@ class PlanPublishers:
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
-        self._trajectory.publish(
-            joint_trajectory_to_msg(
-                trajectory, parameters.arm.joint_names, parameters.base_frame, begin
-            )
+        self.tell(self.motion(trajectory, parameters, begin))
+
+    def motion(
+        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+    ) -> JointTrajectory:
+        """Return the message of such a motion."""
+        return joint_trajectory_to_msg(
+            trajectory, parameters.arm.joint_names, parameters.base_frame, begin
         )
+
+    def tell(self, msg: JointTrajectory) -> None:
+        """Publish the message of a motion."""
+        self._trajectory.publish(msg)
 
     def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
         """Return the tool's path along a motion."""

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 import secrets
 
 from rrth_planner.goal import PointingGoal
@@ -11,15 +12,18 @@ from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
-from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
-from rrth_planner.ros.last_look import LastLook
+from rrth_planner.ros.last_look import LastLook, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import LEADS, Start
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.trajectory import Trajectory
+
+# How often both judges are asked about a motion before it is told: the wearer may never stand
+# still.
+MOST_LOOKS = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,10 +42,6 @@ class PlanOutcome:
         What the plan was asked.
     incident : Incident or None
         To be kept in a file, which the answer then names.
-    body : WearerBody or None
-        The one that the motion was last held against.
-    look : LastLook or None
-        What holds it against the body that is heard by now.
 
     """
 
@@ -52,30 +52,13 @@ class PlanOutcome:
     start: Start | None = None
     question: PlanQuestion | None = None
     incident: Incident | None = None
-    body: WearerBody | None = None
-    look: LastLook | None = None
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The motion to publish; None unless the request succeeded."""
+        """The motion that is told; None unless the request succeeded."""
         if self.plan is None or self.code is not ErrorCode.SUCCESS:
             return None
         return self.plan.trajectory
-
-    def looked_at(self) -> 'PlanOutcome':
-        """Return the outcome once its motion is held against the body that is heard by now."""
-        look, plan, question = self.look, self.plan, self.question
-        assert look is not None and plan is not None and question is not None
-        body = look.heard.body.value
-        try:
-            found = look.disagreement()
-        except RequestError as problem:
-            return PlanOutcome(problem.code, str(problem))
-        if found is None:
-            return replace(self, body=body)
-        incident = disagreement_incident(question, *found)
-        sentence = f'{incident.sentence}, seed {plan.seed}'
-        return PlanOutcome(ErrorCode.FAILURE, sentence, plan, self.inputs, incident=incident)
 
 
 def plan_request(
@@ -86,12 +69,13 @@ def plan_request(
     goal: PointingGoal | None = None,
     running: RunningMotion | None = None,
     catch_up: Callable[[], bool] = lambda: True,
+    tell: Callable[[PlanOutcome, Callable[[], bool]], bool] = lambda _, fits: fits(),
 ) -> PlanOutcome:
     """
-    Return the outcome of a request that begins now.
+    Return the outcome of a request that begins now, once its motion is told.
 
     A motion for an arm that moves begins with the state that the arm is going to be in shortly,
-    and this returns not long before.
+    and is told not long before.
 
     Parameters
     ----------
@@ -108,6 +92,9 @@ def plan_request(
         The motion that the arm was last told to follow.
     catch_up : callable, optional
         Returns when the bodies that came are heard, and whether that is so.
+    tell : callable, optional
+        Gets an outcome with a motion, and what says whether it still fits, and returns that; tells
+        the motion if so. May raise RequestError.
 
     Raises
     ------
@@ -116,6 +103,7 @@ def plan_request(
 
     """
     question: PlanQuestion | None = None
+    trajectory: Trajectory | None = None
     try:
         for lead in LEADS:
             now = clock()
@@ -129,7 +117,7 @@ def plan_request(
                 start = Start(
                     now + lead, inputs.ahead(running, now + lead, parameters.arm), running
                 )
-            question = _question(inputs, parameters, start)
+            question, trajectory = _question(inputs, parameters, start), None
             plan = plan_motion(**question.arguments, should_stop=should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
@@ -137,20 +125,19 @@ def plan_request(
                 return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return PlanOutcome(code, plan.sentence, plan, inputs)
-            if start is not None and clock() > start.time:
-                continue
-            _require_news(catch_up)
+            trajectory = plan.trajectory
             if start is not None:
-                start.wait(clock, should_stop)
-                _require_news(catch_up)
-            if should_stop():
-                raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
+                begin = clock()
+                if begin > start.time:
+                    continue
+                require_news(catch_up)
+                # That long it may take again.
+                start.wait(clock, should_stop, clock() - begin)
+            outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
             look = LastLook(heard, clock, parameters, inputs, plan, start)
-            outcome = PlanOutcome(
-                code, plan.sentence, plan, inputs, start, question, look=look
-            ).looked_at()
-            if outcome.trajectory is None or start is None or clock() <= start.latest:
-                return outcome
+            told = _told(outcome, look, should_stop, tell)
+            if told is not None:
+                return told
         raise RequestError(
             ErrorCode.TIMED_OUT,
             f'the arm moves, and no plan was ready within {LEADS[-1]:g} s to take over from its '
@@ -161,7 +148,31 @@ def plan_request(
     except Exception as problem:
         if question is None:
             raise
-        raise PlanError(question) from problem
+        raise PlanError(question, trajectory) from problem
+
+
+def _told(
+    outcome: PlanOutcome,
+    look: LastLook,
+    should_stop: Callable[[], bool],
+    tell: Callable[[PlanOutcome, Callable[[], bool]], bool],
+) -> PlanOutcome | None:
+    """Return the outcome once its motion is told, or why it is not; None: it is too late."""
+    for n_looks in range(1, MOST_LOOKS + 1):
+        if should_stop():
+            raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
+        if look.is_late():
+            return None
+        seen = look.take()
+        if seen.disagreement is not None:
+            assert outcome.question is not None
+            incident = disagreement_incident(outcome.question, seen.disagreement, seen.scene)
+            sentence = f'{incident.sentence}, seed {look.plan.seed}'
+            return replace(outcome, code=ErrorCode.FAILURE, sentence=sentence, incident=incident)
+        fits = partial(look.still_fits, seen, is_last=n_looks == MOST_LOOKS)
+        if tell(outcome, fits):
+            return outcome
+    return None
 
 
 def _question(
@@ -180,12 +191,3 @@ def _question(
         moving=None if start is None else start.takeover,
         escape_depth=parameters.escape_depth,
     )
-
-
-def _require_news(catch_up: Callable[[], bool]) -> None:
-    """Wait until the bodies that came are heard, or raise RequestError."""
-    if not catch_up():
-        raise RequestError(
-            ErrorCode.SENSOR_INFO_STALE,
-            'the node is busy: the bodies that came while the motion was planned are not read yet',
-        )

@@ -49,12 +49,14 @@ class Start:
         """When the motion can still be told [s]."""
         return self.time + (LATE if self.takeover.running is None else 0.0)
 
-    def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
-        """Return when the motion is to be told, or when it is not to be told at all."""
+    def wait(
+        self, clock: Callable[[], float], should_stop: Callable[[], bool], ahead: float
+    ) -> None:
+        """Return so long before the motion is to be told [s], or as soon as it should stop."""
         # A simulated clock may stand still.
         end = time.monotonic() + 2 * LEADS[-1]
         while time.monotonic() < end and not should_stop():
-            left = self.time - self.early - clock()
+            left = self.time - self.early - ahead - clock()
             if left <= 0.0:
                 return
             time.sleep(min(1e-3, max(1e-5, left)))

@@ -21,11 +21,13 @@ def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -
 
 
 def tell(node, publisher, message) -> None:
-    """Publish a message; return once all who hear it reliably have it."""
-    is_heard = pytest.importorskip('rrth_planner.ros.planner_client').is_heard
+    """Publish a message, by a latched publisher; return once all have it who are reliable."""
+    from rclpy.duration import Duration
+    from rrth_planner.ros.planner_client import is_heard
+
     wait_until(lambda: is_heard(node, publisher))
     publisher.publish(message)
-    assert publisher.wait_for_all_acked()
+    assert publisher.wait_for_all_acked(Duration(seconds=LONGEST_WAIT))
 
 
 @contextmanager

@@ -180,7 +180,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
         raise OSError('no publisher')
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
+        patch.setattr(planner._queue._publishers, 'tell', fail)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == (

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a request makes of an arm that follows its motion, on a clock of its own."""
 
-from itertools import cycle
 from threading import Thread
 from types import SimpleNamespace
 
@@ -19,6 +18,7 @@ from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.joints import JointReading  # noqa: E402
+from rrth_planner.ros.last_look import require_news  # noqa: E402
 from rrth_planner.ros.messages import WearerBody  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.requests import plan_request  # noqa: E402
@@ -74,12 +74,13 @@ def _ask(monkeypatch):
             still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
             monkeypatch.setattr(start, 'time', still)
 
-        # What came meanwhile takes long to be read, what comes while the arm is waited for not.
-        takes = cycle([reading, 0.0])
-
         def catch_up():
-            clock.now += next(takes)
+            clock.now += reading
             return reads
+
+        def tell(outcome, fits):
+            require_news(catch_up)
+            return fits()
 
         heard = Inputs('body', 'target', 'joints')
         boxes = worlds.wearer().boxes
@@ -87,7 +88,9 @@ def _ask(monkeypatch):
         heard.body.accept(lambda: WearerBody(parts), clock())
         heard.joints = Following(motion, clock)
         running = RunningMotion(trajectory=motion, start_time=BEGIN) if is_known else None
-        outcome = plan_request(heard, parameters, clock, lambda: False, TARGET, running, catch_up)
+        outcome = plan_request(
+            heard, parameters, clock, lambda: False, TARGET, running, catch_up, tell
+        )
         return outcome, clock.now
 
     yield ask

@@ -501,22 +501,24 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     assert not stranger.heard['joint_trajectory']
 
 
-def test_a_body_that_came_but_was_not_read_yet_counts(start, monkeypatch):
+@pytest.mark.parametrize(('owner', 'step'), [(requests, 'plan_motion'), (LastLook, 'take')])
+def test_a_body_that_came_but_was_not_read_yet_counts(start, monkeypatch, owner, step):
     monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
     planner, stranger = start()
     say_all(planner, stranger)
-    plan_motion = requests.plan_motion
+    original = getattr(owner, step)
 
-    def plan_while_the_node_is_busy(*args, **kwargs):
-        plan = plan_motion(*args, **kwargs)
+    def work_while_the_node_is_busy(*args, **kwargs):
+        monkeypatch.setattr(owner, step, original)
+        result = original(*args, **kwargs)
         begun, end = Event(), Event()
         planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
         assert begun.wait(10.0)
         stranger.publishers['body_boxes'].publish(fenced())
         Timer(0.3, end.set).start()
-        return plan
+        return result
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_node_is_busy)
+    monkeypatch.setattr(owner, step, work_while_the_node_is_busy)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     assert not stranger.heard['joint_trajectory']
@@ -528,38 +530,62 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, check, checked = inputs_of(planner), LastLook.disagreement, []
+    inputs, take, checked = inputs_of(planner), LastLook.take, []
 
     def check_while_a_body_comes(look):
-        found, body = check(look), inputs.body.value
+        seen, body = take(look), inputs.body.value
         checked.append(body)
         far = box('far', len(checked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(fenced() if is_in_the_way else array(far))
         wait_until(lambda: inputs.body.value is not body)
-        return found
+        return seen
 
-    monkeypatch.setattr(LastLook, 'disagreement', check_while_a_body_comes)
+    monkeypatch.setattr(LastLook, 'take', check_while_a_body_comes)
     message = stranger.answer().message
     # Not for ever: the guard holds the motion against the bodies that follow.
-    assert len(checked) == (1 if is_in_the_way else plan_queue.MOST_LOOKS)
+    assert len(checked) == (1 if is_in_the_way else requests.MOST_LOOKS)
     assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
 
 
-def test_a_body_that_comes_when_all_is_checked_is_checked_too(start, monkeypatch, wait_until):
+def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
+    start, monkeypatch, wait_until
+):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, inputs = planner._queue, inputs_of(planner)
-    plan_request = queue._plan_request
+    inputs, take, looks = inputs_of(planner), LastLook.take, []
 
-    def plan_and_dawdle(*args):
-        outcome, body = plan_request(*args), inputs.body.value
-        stranger.publishers['body_boxes'].publish(fenced())
+    def look_while_a_body_comes(look):
+        seen, body = take(look), inputs.body.value
+        looks.append(seen)
+        far = box('far', len(looks), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
+        is_last = len(looks) == requests.MOST_LOOKS
+        stranger.publishers['body_boxes'].publish(fenced() if is_last else array(far))
         wait_until(lambda: inputs.body.value is not body)
-        return outcome
+        return seen
 
-    monkeypatch.setattr(queue, '_plan_request', plan_and_dawdle)
+    monkeypatch.setattr(LastLook, 'take', look_while_a_body_comes)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert not stranger.heard['joint_trajectory']
+    assert len(looks) == requests.MOST_LOOKS
+
+
+def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
+    monkeypatch.setattr(catching_up, 'LONGEST', 0.2)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    take, end = LastLook.take, Event()
+
+    def look_while_the_node_is_busy(look):
+        begun = Event()
+        planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
+        assert begun.wait(10.0)
+        Timer(0.6, end.set).start()
+        return take(look)
+
+    monkeypatch.setattr(LastLook, 'take', look_while_the_node_is_busy)
+    message = stranger.answer().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.heard['joint_trajectory']
 
 
@@ -674,15 +700,16 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
 def test_what_was_cancelled_is_never_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, check = planner._queue, LastLook.disagreement
+    queue, take = planner._queue, LastLook.take
     ended = []
 
     def cancel_after_the_last_look(look):
-        check(look)
+        seen = take(look)
         ended.append(queue.cancel())
+        return seen
 
     with monkeypatch.context() as patch:
-        patch.setattr(LastLook, 'disagreement', cancel_after_the_last_look)
+        patch.setattr(LastLook, 'take', cancel_after_the_last_look)
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
@@ -740,16 +767,17 @@ def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
 def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, check = planner._queue, LastLook.disagreement
+    queue, take = planner._queue, LastLook.take
     closers = []
 
     def close_after_the_last_look(look):
-        check(look)
+        seen = take(look)
         closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
+        return seen
 
-    monkeypatch.setattr(LastLook, 'disagreement', close_after_the_last_look)
+    monkeypatch.setattr(LastLook, 'take', close_after_the_last_look)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
     assert not stranger.heard['joint_trajectory']

@@ -148,6 +148,13 @@ def test_each_fault_misses_its_target():
         assert word in missed
 
 
+def test_the_report_says_how_old_the_bodies_before_a_bad_motion_were():
+    bad = plans(suspects=[('braking: touches', [0.0004, 0.0104])])
+    assert '- braking: touches: published 0.4, 10.4 ms after the bodies before' in report(
+        bad, None, ''
+    )
+
+
 def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
     text = report(plans(is_interrupted=True), GuardRecord(), 'some command')
     assert 'some command' in text

@@ -158,7 +158,7 @@ class Wire:
         self.published, self.complaints = [], Complaints()
         planner.get_logger = lambda: self.complaints
         publishers = planner._queue._publishers
-        publishers.publish_motion = lambda *a: self.published.append(a)
+        publishers.tell = self.published.append
         publishers.publish_view = lambda *a: None
 
     def say(self, name, msg, is_reliable=False):
