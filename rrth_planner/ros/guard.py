@@ -3,9 +3,11 @@
 """While the arm moves the wearer may move too: each new body is held against what is left."""
 
 from collections.abc import Callable
+from copy import copy
 from enum import Enum
 from threading import RLock
 import time
+import traceback
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -95,15 +97,25 @@ class Guard:
         return self._followed.motion
 
     def begin(
-        self, running: RunningMotion, goal: PointingGoal, parameters: PlannerParameters
+        self,
+        running: RunningMotion,
+        goal: PointingGoal,
+        parameters: PlannerParameters,
+        tell: Callable[[], None],
     ) -> None:
-        """Watch a motion from now on by the parameters of its plan; the lock is held."""
+        """Have a motion told, and watch it by the parameters of its plan; the lock is held."""
+        before = copy(self._followed)
         self._followed.begin(running, self._now())
+        try:
+            tell()
+        except Exception:
+            self._followed = before
+            raise
         self._parameters, self._goal = parameters, goal
         self.n_begun += 1
         self._say(Watch.WATCHING, '')
         # The body may have changed since the motion was last looked at.
-        self.on_body(time.time_ns())
+        self._surely(lambda: self.on_body(time.time_ns()))
 
     def close(self) -> None:
         """Watch nothing any more."""
@@ -143,10 +155,19 @@ class Guard:
             else:
                 self._reporter.recertified(time.perf_counter() - begin)
 
+    def _surely(self, look: Callable[[], None]) -> None:
+        """Look at a motion that is under way: whatever is wrong, the next look comes."""
+        try:
+            look()
+        except Exception:
+            self._node.get_logger().error(traceback.format_exc())
+
     def _on_timer(self) -> None:
+        if self._state is not Watch.IDLE:
+            self._surely(self._look_round)
+
+    def _look_round(self) -> None:
         """Stop an arm that nobody sees any more, or whose wearer, or that goes on for all that."""
-        if self._state is Watch.IDLE:
-            return
         with self._lock:
             now = self._now()
             self._insist(now)

@@ -50,7 +50,11 @@ def incident_of(problem: BaseException) -> Incident | None:
         return None
     cause = cause_of(problem)
     where = ''.join(traceback.format_exception(type(cause), cause, cause.__traceback__))
-    return error_incident(problem.question, cause, where, problem.trajectory)
+    try:
+        return error_incident(problem.question, cause, where, problem.trajectory)
+    except Exception:
+        # The answer must not suffer; the error itself is in the log.
+        return None
 
 
 def cause_of(problem: BaseException) -> BaseException:

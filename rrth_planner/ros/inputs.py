@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from threading import RLock
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -24,7 +25,7 @@ CLOCK_STEP = 0.1
 
 
 class RequestError(RrthError):
-    """A request that ends before it is planned, with the code of its answer."""
+    """A request that ends without a motion, with the code of its answer."""
 
     def __init__(self, code: ErrorCode, sentence: str) -> None:
         """Keep the code beside the sentence."""
@@ -157,6 +158,8 @@ class Inputs:
 
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
         """Begin with nothing heard."""
+        # Held while a message is taken, and while a motion is told that fits what was heard.
+        self.lock = RLock()
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.arm import reach_to
 from rrth_planner.judges import is_proven_free, touch_seen
+from rrth_planner.leaving import box_depths
 from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.ros.bodies import scene_of, WearerBody
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
 from rrth_planner.ros.parameters import PlannerParameters
@@ -93,29 +94,26 @@ class LastLook:
         found = None if touch is None else Disagreement(motion, touch, escape_time)
         return Seen(body, scene, found)
 
-    def is_late(self) -> bool:
-        """Return whether it is too late to tell the motion."""
-        return self.start is not None and self.clock() > self.start.latest
+    def is_late(self, ahead: float = 0.0) -> bool:
+        """Return whether it is too late to tell the motion, or will be so much later [s]."""
+        return self.start is not None and self.clock() + ahead > self.start.latest
 
     def still_fits(self, seen: Seen, is_last: bool) -> bool:
         """
         Return whether a motion may be told that fitted what was seen a moment ago.
 
-        Not when it is too late, nor when another body was heard since. After the last look the
-        certificate alone decides about that body: it is quick, and a lock may be held. Raise
-        RequestError where it does not prove the motion free.
+        Not when it is too late, nor when the body has changed since. After the last look the
+        certificate alone decides about that body: it is quick, and a lock is held. Raise
+        RequestError where it does not prove the motion free, or the arm has moved.
         """
-        if self.is_late():
-            return False
-        body = self.heard.body.value
-        if body is seen.body:
-            return True
-        scene = scene_of(body.at(self.clock()))
-        if _is_same(scene, seen.scene):
-            return True
-        if is_last:
-            self._require_proof(scene)
-        return is_last
+        now, body = self.clock(), self.heard.body.value
+        present = self.heard.at(now, self.parameters, self.inputs.goal)
+        self._require_arm(present, now)
+        if body is not seen.body and not _is_same(present.scene, seen.scene):
+            if not is_last:
+                return False
+            self._require_proof(present.scene)
+        return not self.is_late()
 
     def _require_arm(self, present: PlanInputs, now: float) -> None:
         """Raise RequestError where the arm is not where the motion needs it."""
@@ -138,7 +136,12 @@ class LastLook:
         """Return the world of a wearer, or raise RequestError where the motion is not free."""
         parameters = self.parameters
         world = arm_world(parameters.arm, scene, parameters.margin, parameters.ray_guard_length)
-        if not is_proven_free(world, self._motion, self._reach, self.plan.escape_time):
+        escape_time = self.plan.escape_time
+        is_too_deep = (
+            escape_time > 0.0
+            and box_depths(world, self._motion.positions[0]).max() >= parameters.escape_depth
+        )
+        if is_too_deep or not is_proven_free(world, self._motion, self._reach, escape_time):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 'the wearer moved while the motion was planned, and it is no longer proven free '

@@ -119,7 +119,8 @@ class Listener:
 
     def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> bool:
         was_good = heard.received is not None and not heard.is_last_refused
-        is_good = heard.accept(read, now)
+        with self._inputs.lock:
+            is_good = heard.accept(read, now)
         if not is_good:
             self._warn(heard)
         if is_good != was_good:

@@ -5,7 +5,6 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from threading import RLock
 import time
 import traceback
 from typing import Any
@@ -97,7 +96,7 @@ class PlanQueue:
         self._publishers = PlanPublishers(node)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         # Held while a motion is published, so that what was cancelled before never is.
-        self._lock = RLock()
+        self._lock = heard.lock
         self.guard = Guard(node, heard, reporter, self._publishers, self._lock)
         self.guard.plan_again = self._plan_again
         self.guard.judge = self._judge
@@ -240,7 +239,6 @@ class PlanQueue:
             if not fits():
                 return False
             self._open.discard(ticket)
-            self._publishers.tell(msg)
             self.guard.begin(
                 RunningMotion(
                     trajectory=outcome.trajectory,
@@ -250,6 +248,7 @@ class PlanQueue:
                 ),
                 outcome.inputs.goal,
                 parameters,
+                lambda: self._publishers.tell(msg),
             )
             return True
 
@@ -264,11 +263,15 @@ class PlanQueue:
         ticket, n_begun = _Ticket(), self.guard.n_begun
 
         def work() -> None:
-            self._wait_for_rest(ticket, wait)
-            if ticket.is_cancelled or self.guard.n_begun != n_begun:
-                # Whoever asked for the motion that has begun since then wants that one.
-                return
-            response = self._work(goal, time.perf_counter(), ticket)
+            try:
+                self._wait_for_rest(ticket, wait)
+                if ticket.is_cancelled or self.guard.n_begun != n_begun:
+                    # Whoever asked for the motion that has begun since then wants that one.
+                    return
+                response = self._work(goal, time.perf_counter(), ticket)
+            finally:
+                with self._lock:
+                    self._open.discard(ticket)
             response.conclude()
             if not response.is_solved:
                 self.guard.hold(response.text)

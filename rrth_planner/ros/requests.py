@@ -103,9 +103,10 @@ def plan_request(
 
     """
     question: PlanQuestion | None = None
-    trajectory: Trajectory | None = None
+    plan: MotionPlan | None = None
     try:
         for lead in LEADS:
+            question = plan = None
             now = clock()
             inputs = heard.at(now, parameters, goal)
             if should_stop():
@@ -117,7 +118,7 @@ def plan_request(
                 start = Start(
                     now + lead, inputs.ahead(running, now + lead, parameters.arm), running
                 )
-            question, trajectory = _question(inputs, parameters, start), None
+            question = _question(inputs, parameters, start)
             plan = plan_motion(**question.arguments, should_stop=should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
@@ -125,7 +126,6 @@ def plan_request(
                 return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return PlanOutcome(code, plan.sentence, plan, inputs)
-            trajectory = plan.trajectory
             if start is not None:
                 begin = clock()
                 if begin > start.time:
@@ -140,15 +140,15 @@ def plan_request(
                 return told
         raise RequestError(
             ErrorCode.TIMED_OUT,
-            f'the arm moves, and no plan was ready within {LEADS[-1]:g} s to take over from its '
-            'motion',
+            f'the arm moves, and no plan was ready and checked within {LEADS[-1]:g} s to take '
+            'over from its motion',
         )
     except RequestError as problem:
-        return PlanOutcome(problem.code, str(problem))
+        return PlanOutcome(problem.code, str(problem), plan)
     except Exception as problem:
         if question is None:
             raise
-        raise PlanError(question, trajectory) from problem
+        raise PlanError(question, None if plan is None else plan.trajectory) from problem
 
 
 def _told(
@@ -163,14 +163,16 @@ def _told(
             raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
         if look.is_late():
             return None
+        begin = look.clock()
         seen = look.take()
         if seen.disagreement is not None:
             assert outcome.question is not None
             incident = disagreement_incident(outcome.question, seen.disagreement, seen.scene)
             sentence = f'{incident.sentence}, seed {look.plan.seed}'
             return replace(outcome, code=ErrorCode.FAILURE, sentence=sentence, incident=incident)
-        fits = partial(look.still_fits, seen, is_last=n_looks == MOST_LOOKS)
-        if tell(outcome, fits):
+        # Another look, and to hear what came meanwhile, takes about as long again.
+        is_last = n_looks == MOST_LOOKS or look.is_late(2.0 * (look.clock() - begin))
+        if tell(outcome, partial(look.still_fits, seen, is_last)):
             return outcome
     return None
 

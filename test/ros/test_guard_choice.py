@@ -71,7 +71,11 @@ class Watched:
     def begin(self):
         """Let a motion begin."""
         running = RunningMotion(trajectory=self.motion, start_time=100.0)
-        self.guard.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters)
+        self.tell(running)
+
+    def tell(self, running, publish=lambda: None):
+        """Tell the arm a motion."""
+        self.guard.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
 
     def on_time(self, phase):
         """Return positions and velocities of an arm that follows."""
@@ -316,9 +320,36 @@ def _turned(watched, after):
     )
 
 
+def fail(*_):
+    raise OSError('nothing works')
+
+
+def test_a_motion_that_could_not_be_told_is_not_watched(watched):
+    before = watched.guard.running
+    running = RunningMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
+    with pytest.raises(OSError, match='nothing works'):
+        watched.tell(running, fail)
+    assert watched.guard.running is before
+    watched.see(watched.hand(0.15, 0.0))
+    assert len(watched.published) == 1
+
+
+def test_a_look_that_fails_is_not_the_last_one(watched, monkeypatch):
+    hand = watched.hand(0.6, 0.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(watched.guard, 'on_body', fail)
+        # It is told all the same, and watched.
+        watched.begin()
+        patch.setattr(watched.guard, '_look_round', fail)
+        watched.guard._on_timer()
+    assert watched.published == []
+    watched.see(hand)
+    assert len(watched.published) == 1
+
+
 def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
     running = RunningMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
-    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
+    watched.tell(running)
     watched.now += 0.02
     watched.read(*watched.on_time(PHASE + 0.02))
     watched.see(FAR)
@@ -334,7 +365,7 @@ def _told(watched, ahead):
     """Tell a motion that takes over; return it, and arms by whether they take it."""
     turned = _turned(watched, ahead)
     running = RunningMotion(trajectory=turned, start_time=watched.now + ahead)
-    watched.guard.begin(running, PointingGoal(np.ones(3)), watched.reporter.parameters)
+    watched.tell(running)
 
     def taken(after):
         if after < ahead:

@@ -22,7 +22,7 @@ from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.options import RRTStarOptions  # noqa: E402
-from rrth_planner.ros import reporter, requests, second_opinion  # noqa: E402
+from rrth_planner.ros import incidents, reporter, requests, second_opinion  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
@@ -170,6 +170,21 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
+
+
+def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+
+    def fail(*_):
+        raise OSError('nothing works')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(planner._queue._publishers, 'tell', fail)
+        patch.setattr(incidents, 'error_incident', fail)
+        message = stranger.answer().message
+    assert message == 'FAILURE (99999): planning failed unexpectedly: OSError: nothing works'
+    assert stranger.answer().success
 
 
 def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp_path):

@@ -259,12 +259,12 @@ def test_each_obstacle_to_planning_has_its_code(start, messages, answer):
     assert not stranger.heard['joint_trajectory']
 
 
-def leaned():
-    """Return a wearer whose hand the tool of the folded arm is in."""
+def leaned(deeper=0.0):
+    """Return a wearer whose hand the tool of the folded arm is in, so much deeper [m]."""
     arm, body = load_arm(), wearer()
     T = tool_pose(arm, np.array(FOLDED))
     # Behind the ray, 0.5 m down, which runs 0.0075 m inside its edge.
-    center = T[:3, 3] + 0.5 * T[:3, 2] - np.array([0.05 + 0.02 - 0.012, 0.0, 0.0])
+    center = T[:3, 3] + 0.5 * T[:3, 2] - np.array([0.05 + 0.02 - 0.012 - deeper, 0.0, 0.0])
     body.markers.append(box('hand', center=tuple(center), size=(0.1, 0.1, 0.1)))
     return body
 
@@ -317,6 +317,25 @@ def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wai
     assert stranger.answer().success
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+
+
+@pytest.mark.parametrize(('depth', 'answer'), [(0.05, 'SUCCESS'), (0.028, 'MOTION_PLAN_INVAL')])
+def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
+    start, monkeypatch, wait_until, depth, answer
+):
+    # It is 0.0275 m deep at first.
+    planner, stranger = start(escape_depth=depth)
+    say_all(planner, stranger, body_boxes=leaned())
+    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+
+    def plan_while_the_wearer_leans(*args, **kwargs):
+        plan, body = plan_motion(*args, **kwargs), inputs.body.value
+        stranger.publishers['body_boxes'].publish(leaned(0.001))
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_wearer_leans)
+    assert stranger.answer().message.startswith(answer)
 
 
 def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
@@ -501,8 +520,19 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     assert not stranger.heard['joint_trajectory']
 
 
-@pytest.mark.parametrize(('owner', 'step'), [(requests, 'plan_motion'), (LastLook, 'take')])
-def test_a_body_that_came_but_was_not_read_yet_counts(start, monkeypatch, owner, step):
+@pytest.mark.parametrize(
+    ('owner', 'step', 'topic', 'msg', 'answer'),
+    [
+        (requests, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
+        (LastLook, 'take', 'body_boxes', fenced(), 'the wearer moved'),
+        (LastLook, 'take', 'body_boxes', array(command(Marker.DELETEALL)), 'is empty: every box'),
+        (LastLook, 'take', 'joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000'),
+        (LastLook, 'take', 'joint_states', joints(velocity=[0.3] * 4), 'joint_1 moves at 0.300'),
+    ],
+)
+def test_what_came_but_was_not_read_yet_counts(
+    start, monkeypatch, owner, step, topic, msg, answer
+):
     monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
     planner, stranger = start()
     say_all(planner, stranger)
@@ -514,13 +544,14 @@ def test_a_body_that_came_but_was_not_read_yet_counts(start, monkeypatch, owner,
         begun, end = Event(), Event()
         planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
         assert begun.wait(10.0)
-        stranger.publishers['body_boxes'].publish(fenced())
+        stranger.publishers[topic].publish(msg)
         Timer(0.3, end.set).start()
         return result
 
     monkeypatch.setattr(owner, step, work_while_the_node_is_busy)
-    message = stranger.answer().message
-    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    response = stranger.answer()
+    assert not response.success
+    assert answer in response.message
     assert not stranger.heard['joint_trajectory']
 
 
@@ -570,17 +601,43 @@ def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
     assert len(looks) == requests.MOST_LOOKS
 
 
+def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, publishers = inputs_of(planner), planner._queue._publishers
+    tell, known = publishers.tell, []
+
+    def tell_slowly(msg):
+        body = inputs.body.value
+        stranger.publishers['body_boxes'].publish(fenced())
+        time.sleep(0.3)
+        known.append(inputs.body.value is body)
+        tell(msg)
+
+    monkeypatch.setattr(publishers, 'tell', tell_slowly)
+    assert stranger.answer().success
+    assert known[0]
+    # Then it is, and the guard stops the arm.
+    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 2)
+
+
 def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
     monkeypatch.setattr(catching_up, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
-    take, end = LastLook.take, Event()
+    take, end, catch_up = LastLook.take, Event(), planner._queue._catch_up
+
+    def catch_up_until_it_is_over():
+        is_through = catch_up()
+        end.set()
+        return is_through
+
+    monkeypatch.setattr(planner._queue, '_catch_up', catch_up_until_it_is_over)
 
     def look_while_the_node_is_busy(look):
         begun = Event()
         planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
         assert begun.wait(10.0)
-        Timer(0.6, end.set).start()
         return take(look)
 
     monkeypatch.setattr(LastLook, 'take', look_while_the_node_is_busy)
@@ -633,6 +690,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     stranger.publishers['joint_states'].publish(joints())
     planner._queue._worker.submit(lambda: None).result(30.0)
     assert planner._reporter.report.n_requests == 0
+    assert not planner._queue._open
 
 
 def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
