@@ -10,6 +10,8 @@ from rclpy.node import Node
 
 # Longer than this a node is not waited for [s].
 LONGEST = 1.0
+# After so long without a round it is asked for again [s].
+AGAIN = 0.02
 
 
 class CatchUp:
@@ -47,7 +49,10 @@ class CatchUp:
         self._begin, self._n = time.time_ns(), self._handled()[0]
         self._is_over.clear()
         self._round.trigger()
-        is_through = self._is_over.wait(LONGEST)
+        end = time.monotonic() + LONGEST
+        while not (is_through := self._is_over.wait(AGAIN)) and time.monotonic() < end:
+            # Should a wake-up have been lost, nothing but this asks for a round.
+            self._round.trigger()
         self._is_over.set()
         self._is_stale = not is_through
         return is_through

@@ -5,6 +5,7 @@
 from itertools import count
 from threading import Event, Timer
 import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -112,6 +113,16 @@ def test_a_round_that_nobody_waited_for_tells_nothing(node, spinning, wait_until
         assert catch_up()
         # When it began, after the round from before, and after one of its own.
         assert len(handled) == 3
+
+
+def test_a_wake_up_that_got_lost_is_made_up_for(node, spinning, monkeypatch):
+    catch_up = CatchUp(node, lambda: (0, 0))
+    trigger, tries = catch_up._round.trigger, []
+    lossy = SimpleNamespace(trigger=lambda: tries.append(0) or (len(tries) > 1 and trigger()))
+    monkeypatch.setattr(catch_up, '_round', lossy)
+    with spinning(node):
+        assert catch_up()
+    assert len(tries) >= 2
 
 
 def test_nobody_waits_for_ever_for_an_executor_that_is_gone(node, monkeypatch):
