@@ -19,6 +19,8 @@ from benchmarks.draws import random_wearer
 from benchmarks.real_time import put_ahead
 
 FRAME, RATE = 'torso', 100.0
+# A message that is so late counts as on time [s].
+LATE = 1e-3
 # Greatest displacement along one axis [m], and the speed that no box exceeds [m/s].
 SWAY, SPEED = 0.03, 0.05
 # The second axis swings slower, so that the body does not come by the same places.
@@ -79,6 +81,15 @@ def _offsets(n: int, phase: float) -> Array:
     return SWAY * np.stack([np.sin(angle), np.sin(RATIO * angle), np.zeros(n)], axis=1)
 
 
+def next_due(due: float, now: float) -> float:
+    """
+    Return when the message after one that was due at a time, and was sent by now, is due [s].
+
+    Never two in a row: a tracker that was late does not make up for it.
+    """
+    return (due if now - due <= LATE else now) + 1.0 / RATE
+
+
 class BodyStream:
     """
     Publishes the body at 100 Hz from a thread of its own, and remembers each message.
@@ -133,9 +144,7 @@ class BodyStream:
         while not self._end.is_set():
             with self._lock:
                 self._tell()
-            now = time.monotonic()
-            # Never two in a row: a tracker that was late does not make up for it.
-            due = due + 1.0 / RATE if due + 1.0 / RATE > now else now + 1.0 / RATE
+            due = next_due(due, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
 
     def _tell(self) -> None:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of a soak, docs/reliability.md: what was seen in, Markdown out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -95,13 +95,13 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
         ),
         _line('age of the body, at most', '50 ms', f'{1e3 * age:.0f} ms', age < MOST_AGE),
         _line('memory after the first tenth', '< 5 MB', f'{growth:+.2f} MB', growth < MOST_GROWTH),
+        _brake_line('body to braking trajectory in the busy node, p99', plans.figures),
     ]
 
 
 def guard_targets(guard: GuardRecord) -> list[list[str]]:
     """Return the lines of targets of the guard."""
     held = _milliseconds(guard.figures.get('motions held against a new body', ''), 'p50')
-    braked = _milliseconds(guard.figures.get('brakes', ''), 'p99')
     bad = guard.outcomes[contacts.TOUCHED] + guard.outcomes[contacts.MISSED]
     return [
         _line(
@@ -110,12 +110,7 @@ def guard_targets(guard: GuardRecord) -> list[list[str]]:
             f'{held:.3f} ms',
             held <= RECERTIFIED,
         ),
-        _line(
-            'body to braking trajectory in the node, p99',
-            f'{BRAKED:g} ms',
-            f'{braked:.2f} ms',
-            braked <= BRAKED,
-        ),
+        _brake_line('body to braking trajectory in the node, p99', guard.figures),
         _line('contacts that braking could have avoided', '0', bad, bad == 0),
         _line('arm that cannot go on', 'never', guard.stuck or 'never', not guard.stuck),
     ]
@@ -180,6 +175,14 @@ def _percentiles(values: np.ndarray) -> list[str]:
 def _milliseconds(figures: str, name: str) -> float:
     found = [part.split()[-2] for part in figures.split(', ') if part.startswith(name)]
     return float(found[0]) if found else float('nan')
+
+
+def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:
+    """Return the line of the target of the brakes."""
+    braked = figures.get('brakes', '')
+    p99 = _milliseconds(braked, 'p99')
+    measured = f'{p99:.2f} ms, {braked.split(",")[0]} times'
+    return _line(what, f'{BRAKED:g} ms', measured, p99 <= BRAKED)
 
 
 def _line(what: str, target: str, measured: object, is_met: bool) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.path import Path
-from rrth_planner.refusal import depth_sentence, Refusal
+from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import after
 from rrth_planner.timing import parameterize
@@ -96,10 +96,12 @@ def way_out(
         best, longest = None, LONGEST
         # What pushes the arm out directly is mostly the shortest way.
         for look in (_pushed, _scattered):
-            tries = list(look(roomy, q_start, spare, longest, rng))
+            tries = list(look(roomy, q_start, spare, longest, rng, should_stop))
+            if should_stop():
+                return CANCELLED
             for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
                 if should_stop():
-                    return Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+                    return CANCELLED
                 trajectory = parameterize(Path(np.stack([q_start, q_end])), (), limits)
                 if leads_out(trajectory, world, trajectory.duration):
                     best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
@@ -134,7 +136,12 @@ def _said(world: World, depths: Array, hair: float) -> str:
 
 
 def _pushed(
-    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+    roomy: World,
+    q_start: Array,
+    spare: float,
+    longest: float,
+    rng: np.random.Generator,
+    should_stop: Callable[[], bool],
 ) -> Iterator[Array]:
     """
     Yield where the boxes push the arm: to the nearest configuration that is free of all of them.
@@ -144,6 +151,8 @@ def _pushed(
     """
     q = q_start.copy()
     for _ in range(N_ROUNDS):
+        if should_stop():
+            break
         depths, slopes = _slopes(roomy, q)
         is_near = depths > -NEAR
         G, s = slopes[is_near], depths[is_near] + 1e-6 + 0.01 * spare
@@ -186,12 +195,19 @@ def _least(rows: Array, bounds: Array) -> Array:
 
 
 def _scattered(
-    roomy: World, q_start: Array, spare: float, longest: float, rng: np.random.Generator
+    roomy: World,
+    q_start: Array,
+    spare: float,
+    longest: float,
+    rng: np.random.Generator,
+    should_stop: Callable[[], bool],
 ) -> Iterator[Array]:
     """Yield where the arm is first free along each joint and in random directions."""
     dof = len(q_start)
     random = rng.standard_normal((N_DIRECTIONS, dof))
     for direction in np.concatenate([np.eye(dof), -np.eye(dof), random]):
+        if should_stop():
+            break
         u = direction / np.linalg.norm(direction)
         for far in np.arange(LOOK, longest, LOOK).tolist():
             if not roomy.is_in_bounds(q_start + far * u):

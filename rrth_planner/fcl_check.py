@@ -3,7 +3,7 @@
 """The second opinion: the same trajectory judged by the Flexible Collision Library."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 import math
@@ -78,9 +78,16 @@ class _Watch:
     """The looks at a trajectory, and the first touch that they have seen."""
 
     def __init__(
-        self, arm: ArmModel, scene: Scene, trajectory: Trajectory, margin: float, ray_length: float
+        self,
+        arm: ArmModel,
+        scene: Scene,
+        trajectory: Trajectory,
+        margin: float,
+        ray_length: float,
+        pause: Callable[[], object],
     ) -> None:
         self._arm, self._trajectory, self._margin = arm, trajectory, margin
+        self._pause = pause
         self._boxes = boxes_of(scene)
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
@@ -95,6 +102,7 @@ class _Watch:
         poses = forward_kinematics(self._arm, q)
         looks = []
         for (bar, index, others), one_q, one_poses in zip(wanted, q, poses, strict=True):
+            self._pause()
             way = float(self.ways[bar.k, index])
             bounds = self._unknown
             for other in others:
@@ -130,6 +138,7 @@ def first_touch(
     margin: float,
     ray_guard_length: float,
     reach: float,
+    pause: Callable[[], object] = lambda: None,
 ) -> Touch | None:
     """
     Return where a trajectory first comes nearer than the margin, or None.
@@ -151,9 +160,11 @@ def first_touch(
         How much of the ray is guarded in motion [m].
     reach : float
         How much of it must be clear at the end [m].
+    pause : callable
+        Called between looks, each of which takes about a tenth of a millisecond.
 
     """
-    watch = _Watch(arm, scene, trajectory, margin, ray_guard_length)
+    watch = _Watch(arm, scene, trajectory, margin, ray_guard_length, pause)
     end = watch.last
     starts = sorted({0, end // 2, end})
     looks = iter(watch.look([(bar, index, ()) for bar in watch.bars for index in starts]))
@@ -181,6 +192,7 @@ def touch_on_way_out(
     escape_time: float,
     margin: float,
     ray_guard_length: float,
+    pause: Callable[[], object] = lambda: None,
 ) -> Touch | None:
     """
     Return where a motion that leads out of boxes first comes nearer than it may, or None.
@@ -198,6 +210,8 @@ def touch_on_way_out(
         When the arm is out; 0: it was not in [s].
     margin, ray_guard_length : float
         [m].
+    pause : callable
+        As in `first_touch`.
 
     """
     if escape_time == 0.0:
@@ -209,7 +223,7 @@ def touch_on_way_out(
             return Touch(0.0, by, 'the arm', box.name)
         boxes.append(Box(box.name, box.center, size, box.rotation))
     way = until(trajectory, escape_time)
-    touch = first_touch(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0)
+    touch = first_touch(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0, pause)
     if touch is None:
         return None
     by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == touch.box)

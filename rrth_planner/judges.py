@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The two judges of a whole motion: the certificate, and python-fcl, who knows nothing of it."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from rrth_planner.arm import ArmModel
@@ -46,6 +47,7 @@ def touch_seen(
     margin: float,
     reach: float,
     escape_time: float = 0.0,
+    pause: Callable[[], object] = lambda: None,
 ) -> Touch | None:
     """
     Return where python-fcl sees a motion first come nearer than it may, or None.
@@ -62,13 +64,15 @@ def touch_seen(
         Distance to keep from every box [m].
     reach, escape_time : float
         As in `is_proven_free`.
+    pause : callable
+        As in `fcl_check.first_touch`.
 
     """
     ray = world.ray_length
     if escape_time > 0.0:
         depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray)
+        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray, pause)
         if touch is not None:
             return touch
-    touch = first_touch(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
+    touch = first_touch(arm, scene, beyond(trajectory, escape_time), margin, ray, reach, pause)
     return None if touch is None else replace(touch, time=escape_time + touch.time)

@@ -13,7 +13,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import TreeOptions
 from rrth_planner.planner import plan, PlanResult
-from rrth_planner.refusal import goal_refusal, Refusal
+from rrth_planner.refusal import CANCELLED, goal_refusal, Refusal
 from rrth_planner.status import PlanStatus
 from rrth_planner.world import grown, World
 
@@ -83,7 +83,7 @@ def find_path(
     elapsed = time.perf_counter() - begin
     sentence = {
         PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
-        PlanStatus.CANCELLED: 'the plan was cancelled',
+        PlanStatus.CANCELLED: CANCELLED.sentence,
         PlanStatus.SAMPLE_LIMIT: 'the free postures that aim at the target were not reached',
     }[result.status]
     return Refusal(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')

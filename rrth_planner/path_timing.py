@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a path to a motion in time that both judges agree about."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from rrth_planner.escape import Escape
 from rrth_planner.goal import PointingGoal
 from rrth_planner.judges import touch_seen
 from rrth_planner.path import Path
-from rrth_planner.refusal import Refusal
+from rrth_planner.refusal import CANCELLED, Refusal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import joined, Lead, reserved
@@ -40,6 +40,7 @@ def time_path(
     margin: float,
     lead: Lead | None,
     escape: Escape | None,
+    should_stop: Callable[[], bool],
 ) -> Trajectory | Disagreement | Refusal:
     """
     Return the timed path once both judges agree that it is free, with stops if need be.
@@ -61,10 +62,14 @@ def time_path(
         What comes before the path.
     escape : Escape or None
         The lead, where it leads out of boxes that the arm was in.
+    should_stop : callable
+        Polled meanwhile; True cancels.
 
     """
     if lead is not None and lead.speed > 0.0:
         path = _straight_on(lead, path)
+    if should_stop():
+        return CANCELLED
     rounded = round_corners(path, grown(world, HAIR), limits)
     choices = [rounded]
     if lead is not None and lead.speed > 0.0 and rounded:
@@ -81,8 +86,14 @@ def time_path(
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
         )
+    if should_stop():
+        return CANCELLED
     reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = touch_seen(arm, scene, world, trajectory, margin, reach, escape_time)
+    touch = touch_seen(
+        arm, scene, world, trajectory, margin, reach, escape_time, pause=should_stop
+    )
+    if should_stop():
+        return CANCELLED
     if touch is not None:
         return Disagreement(trajectory, touch, escape_time)
     return trajectory

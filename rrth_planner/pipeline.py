@@ -127,10 +127,10 @@ def plan_motion(
     if refusal is None:
         found = find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
         if isinstance(found, PlanResult) and found.path is not None:
-            timed = time_path(arm, scene, goal, world, found.path, limits, margin, lead, escape)
-            if should_stop():
-                refusal = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
-            elif isinstance(timed, Trajectory):
+            timed = time_path(
+                arm, scene, goal, world, found.path, limits, margin, lead, escape, should_stop
+            )
+            if isinstance(timed, Trajectory):
                 return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
             elif isinstance(timed, Disagreement):
                 disagreement = timed

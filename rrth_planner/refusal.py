@@ -41,6 +41,9 @@ class Refusal:
     sentence: str
 
 
+CANCELLED = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+
+
 def within_limits(arm: ArmModel, q: Array) -> Array:
     """Return a configuration, (dof,), with joints that are past a limit by rounding at it."""
     near: Array = np.clip(q, *arm.bounds)

@@ -3,6 +3,7 @@
 """A wearer who leaned into the arm: it comes out by a short way, and never goes in deeper."""
 
 from dataclasses import replace
+import itertools
 import re
 
 from hypothesis import given, strategies
@@ -318,6 +319,17 @@ def test_a_cancelled_request_leads_nowhere():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED, should_stop=lambda: True)
     assert plan.status is PlanStatus.CANCELLED
+
+
+def test_a_search_for_a_way_out_is_cancelled_in_mid_look():
+    arm = table_1_arm()
+    shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
+    hand = Box('hand', shoulder - [0.0, 0.05, 0.0], [0.1, 0.08, 0.1], np.eye(3))
+    n_polls = itertools.count()
+    plan = ask(arm, Scene((hand,)), FOLDED, should_stop=lambda: next(n_polls) >= 5)
+    assert plan.status is PlanStatus.CANCELLED
+    # None of the hundreds of directions is looked at any more.
+    assert next(n_polls) < 12
 
 
 def test_a_target_in_the_wearer_is_refused_wherever_the_arm_is():

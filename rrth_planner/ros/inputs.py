@@ -15,6 +15,7 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
 from rrth_planner.ros.messages import JointReading, scene_of, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.right_of_way import RightOfWay
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.takeover import REST_SPEED, Takeover, takeover
@@ -160,6 +161,8 @@ class Inputs:
         """Begin with nothing heard."""
         # Held while a message is taken, and while a motion is told that fits what was heard.
         self.lock = RLock()
+        # Taken while a body is read and held against the motion that runs.
+        self.way = RightOfWay()
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)

@@ -13,6 +13,7 @@ from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
+from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import Start
 from rrth_planner.scene import Scene
@@ -33,6 +34,7 @@ class Seen:
     ----------
     body : WearerBody
         As it was heard.
+    joints : JointReading
     scene : Scene
         Its boxes.
     disagreement : Disagreement or None
@@ -41,6 +43,7 @@ class Seen:
     """
 
     body: WearerBody
+    joints: JointReading
     scene: Scene
     disagreement: Disagreement | None
 
@@ -63,6 +66,8 @@ class LastLook:
         With a motion.
     start : Start or None
         None: from rest.
+    should_stop : callable
+        Polled while the judges look; what it says is for the caller to ask.
 
     """
 
@@ -72,6 +77,7 @@ class LastLook:
     inputs: PlanInputs
     plan: MotionPlan
     start: Start | None
+    should_stop: Callable[[], bool]
 
     def take(self) -> Seen:
         """
@@ -84,15 +90,22 @@ class LastLook:
         self._require_arm(present, now)
         scene = present.scene
         if _is_same(scene, self.inputs.scene):
-            return Seen(body, scene, None)
+            return Seen(body, present.joints, scene, None)
         world = self._require_proof(scene)
         motion, escape_time = self._motion, self.plan.escape_time
         parameters = self.parameters
         touch = touch_seen(
-            parameters.arm, scene, world, motion, parameters.margin, self._reach, escape_time
+            parameters.arm,
+            scene,
+            world,
+            motion,
+            parameters.margin,
+            self._reach,
+            escape_time,
+            pause=self.should_stop,
         )
         found = None if touch is None else Disagreement(motion, touch, escape_time)
-        return Seen(body, scene, found)
+        return Seen(body, present.joints, scene, found)
 
     def is_late(self, ahead: float = 0.0) -> bool:
         """Return whether it is too late to tell the motion, or will be so much later [s]."""
@@ -108,7 +121,8 @@ class LastLook:
         """
         now, body = self.clock(), self.heard.body.value
         present = self.heard.at(now, self.parameters, self.inputs.goal)
-        self._require_arm(present, now)
+        if present.joints is not seen.joints:
+            self._require_arm(present, now)
         if body is not seen.body and not _is_same(present.scene, seen.scene):
             if not is_last:
                 return False

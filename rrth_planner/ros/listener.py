@@ -3,6 +3,7 @@
 """Keep the planner's inputs up to date with the three topics that it hears."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 import time
 from typing import Any
 
@@ -61,7 +62,12 @@ class Listener:
         self._history = BodyHistory()
         self._subscriptions = [
             self._subscribe(
-                MarkerArray, 'body_boxes', inputs.body, self._on_body, on_late=self._on_body
+                MarkerArray,
+                'body_boxes',
+                inputs.body,
+                self._on_body,
+                on_late=self._on_body,
+                way=inputs.way,
             ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
             self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
@@ -74,6 +80,7 @@ class Listener:
         heard: Input[Any],
         on_message: Callable[[Any, int, int], None],
         on_late: Callable[[Any, int, int], None] | None = None,
+        way: AbstractContextManager[None] | None = None,
     ) -> OpenSubscription:
         def refuse(problem: MessageError) -> None:
             def read() -> Any:
@@ -81,7 +88,7 @@ class Listener:
 
             self._take(heard, read, self._now())
 
-        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse)
+        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse, way)
 
     def body_progress(self) -> tuple[int, int]:
         """Return what `OpenSubscription.progress` says of the bodies."""

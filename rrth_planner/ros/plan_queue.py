@@ -171,7 +171,7 @@ class PlanQueue:
                 self._heard,
                 parameters,
                 self._now,
-                lambda: ticket.is_cancelled,
+                lambda: self._should_stop(ticket),
                 goal,
                 running,
                 self._catch_up,
@@ -208,7 +208,9 @@ class PlanQueue:
             return Path() if shown is None else self._tool_path(shown, parameters)
 
         def conclude() -> None:
+            self._heard.way.give()
             self._reporter.conclude(code, sentence, figures)
+            self._heard.way.give()
             if shown is not None:
                 self._show(shown, parameters)
 
@@ -252,6 +254,11 @@ class PlanQueue:
             )
             return True
 
+    def _should_stop(self, ticket: _Ticket) -> bool:
+        """Return whether a request was cancelled, once whoever hears the wearer is through."""
+        self._heard.way.give()
+        return ticket.is_cancelled
+
     def _is_cancelled(self, ticket: _Ticket) -> bool:
         """Return whether a request was cancelled before it ended, without a motion."""
         with self._lock:
@@ -286,7 +293,7 @@ class PlanQueue:
         """Have the second judge look at a stop that was published."""
 
         def work() -> None:
-            incident = incident_of_stop(stop, scene, goal, parameters)
+            incident = incident_of_stop(stop, scene, goal, parameters, self._heard.way.give)
             if incident is not None:
                 noted, file = keep(incident, parameters.incident_folder)
                 self._reporter.incident(file)
@@ -319,7 +326,11 @@ class PlanQueue:
     def _show(self, outcome: Any, parameters: PlannerParameters) -> None:
         """Publish what shows a motion."""
         self._publishers.publish_view(
-            outcome.trajectory, parameters, outcome.inputs.scene, outcome.inputs.goal.target
+            outcome.trajectory,
+            parameters,
+            outcome.inputs.scene,
+            outcome.inputs.goal.target,
+            self._heard.way.give,
         )
 
     def _now(self) -> float:

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the planner publishes: the motion first, then what shows it."""
 
+from collections.abc import Callable
+
 from nav_msgs.msg import Path
 from rclpy.node import Node
 from rrth_planner.arrays import Array
@@ -49,11 +51,18 @@ class PlanPublishers:
         return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
 
     def publish_view(
-        self, trajectory: Trajectory, parameters: PlannerParameters, scene: Scene, target: Array
+        self,
+        trajectory: Trajectory,
+        parameters: PlannerParameters,
+        scene: Scene,
+        target: Array,
+        pause: Callable[[], None],
     ) -> None:
-        """Publish what shows a motion."""
+        """Publish what shows a motion, with pauses: nothing waits for it."""
         path = self.tool_path(trajectory, parameters)
+        pause()
         self._tool_path.publish(path)
+        pause()
         self._markers.publish(
             plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
         )

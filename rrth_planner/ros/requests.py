@@ -134,8 +134,8 @@ def plan_request(
                 # That long it may take again.
                 start.wait(clock, should_stop, clock() - begin)
             outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
-            look = LastLook(heard, clock, parameters, inputs, plan, start)
-            told = _told(outcome, look, should_stop, tell)
+            look = LastLook(heard, clock, parameters, inputs, plan, start, should_stop)
+            told = _told(outcome, look, tell)
             if told is not None:
                 return told
         raise RequestError(
@@ -154,12 +154,11 @@ def plan_request(
 def _told(
     outcome: PlanOutcome,
     look: LastLook,
-    should_stop: Callable[[], bool],
     tell: Callable[[PlanOutcome, Callable[[], bool]], bool],
 ) -> PlanOutcome | None:
     """Return the outcome once its motion is told, or why it is not; None: it is too late."""
     for n_looks in range(1, MOST_LOOKS + 1):
-        if should_stop():
+        if look.should_stop():
             raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
         if look.is_late():
             return None

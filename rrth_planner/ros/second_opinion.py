@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What python-fcl says of a stop, once it is on its way: a moving arm does not wait for that."""
 
+from collections.abc import Callable
+
 from rrth_planner.fcl_check import first_touch
 from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
@@ -13,7 +15,11 @@ from rrth_planner.trajectory import Trajectory
 
 
 def incident_of_stop(
-    stop: Trajectory, scene: Scene, goal: PointingGoal, parameters: PlannerParameters
+    stop: Trajectory,
+    scene: Scene,
+    goal: PointingGoal,
+    parameters: PlannerParameters,
+    pause: Callable[[], None],
 ) -> Incident | None:
     """
     Return the record of a stop that is proven free and touches for python-fcl, or None.
@@ -27,10 +33,12 @@ def incident_of_stop(
     goal : PointingGoal
         Of the motion that it ends.
     parameters : PlannerParameters
+    pause : callable
+        As in `fcl_check.first_touch`.
 
     """
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
-    touch = first_touch(arm, scene, stop, margin, ray, ray)
+    touch = first_touch(arm, scene, stop, margin, ray, ray, pause)
     if touch is None:
         return None
     question = PlanQuestion(

@@ -3,6 +3,7 @@
 """A subscription that hears every publisher: best effort, reliable, or latched before it began."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 import time
 import traceback
 from typing import Any
@@ -103,6 +104,8 @@ class OpenSubscription:
         without, these are dropped, since the last one wins.
     on_refusal : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
+    way : context manager, optional
+        Entered while a message is read and dealt with, again for each.
 
     """
 
@@ -114,9 +117,10 @@ class OpenSubscription:
         on_message: Callable[[Any, int, int], None],
         on_late: Callable[[Any, int, int], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
+        way: AbstractContextManager[None] | None = None,
     ) -> None:
         """Begin to listen."""
-        self._on_refusal = on_refusal
+        self._on_refusal, self._way = on_refusal, way or nullcontext()
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
@@ -197,18 +201,19 @@ class OpenSubscription:
         info: dict[str, Any],
     ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
-        try:
-            msg = decoded(data, self._msg_type)
-        except MessageError as problem:
-            self._on_refusal(problem)
-            return
-        try:
-            # Not every middleware says when it came.
-            hearer(msg, sent, info.get('received_timestamp') or time.time_ns())
-        except Exception:
-            self._node.get_logger().error(
-                f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
-            )
+        with self._way:
+            try:
+                msg = decoded(data, self._msg_type)
+            except MessageError as problem:
+                self._on_refusal(problem)
+                return
+            try:
+                # Not every middleware says when it came.
+                hearer(msg, sent, info.get('received_timestamp') or time.time_ns())
+            except Exception:
+                self._node.get_logger().error(
+                    f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+                )
 
 
 def _stamp_of(info: dict[str, Any]) -> Stamp:

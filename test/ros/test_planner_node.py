@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from threading import Event, Thread, Timer
+from threading import current_thread, Event, Thread, Timer
 import time
 
 import numpy as np
@@ -36,6 +36,7 @@ from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.last_look import LastLook  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -737,7 +738,7 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    def disagree(*args):
+    def disagree(*args, **_):
         asked.append(args)
         return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
@@ -753,6 +754,39 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
     assert [box.name for box in incident.present.boxes][-1] == 'far/0'
     assert stranger.answer().success
     assert len(asked) == 2
+
+
+def test_a_plan_gives_way_often_and_never_with_a_lock(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    lock, give, places = planner._queue._lock, RightOfWay.give, []
+
+    def note(way):
+        places.append((current_thread().name, lock._is_owned()))
+        give(way)
+
+    monkeypatch.setattr(RightOfWay, 'give', note)
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.heard['rrth_planner/markers'])
+    # The second judge looks at several bars at several instants each.
+    assert len(places) > 20
+    assert {name.split('_')[0] for name, _ in places} == {'planner'}
+    assert not any(is_owned for _, is_owned in places)
+
+
+def test_a_body_is_read_and_guarded_against_on_the_way(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    way, on_body, is_free = inputs_of(planner).way, planner._listener.on_body, []
+
+    def note(arrived):
+        is_free.append(way._is_free.is_set())
+        on_body(arrived)
+
+    planner._listener.on_body = note
+    stranger.say('body_boxes', TOPICS['body_boxes'][1]())
+    stranger.wait_until(lambda: is_free)
+    assert is_free == [False]
 
 
 def test_what_was_cancelled_is_never_published(start, monkeypatch):

@@ -19,7 +19,9 @@ from benchmarks.real_time import put_ahead, scheduling  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
     BodyStream,
+    next_due,
     NO_HAND,
+    RATE,
     scene_of_body,
     SPEED,
 )
@@ -67,6 +69,10 @@ def hand_behind(motion):
     return replace(BODY, hand=(*center.tolist(), 0.05))
 
 
+BRAKES = '3, last 1.000 ms, p50 2.000 ms, p99 4.000 ms, at most 4.000 ms'
+FIGURES = {'good messages, body': '7', 'refused messages, body': '0', 'brakes': BRAKES}
+
+
 def plans(**changes):
     """Return a record of plans without a fault."""
     record = PlansRecord(
@@ -76,7 +82,7 @@ def plans(**changes):
         memory=FLAT,
         ages=[0.01],
         gaps=[0.01],
-        figures={'good messages, body': '7', 'refused messages, body': '0'},
+        figures=FIGURES,
         n_sent=7,
         verdicts=Counter({(judge.FREE, False): 2}),
         n_motions=2,
@@ -116,6 +122,13 @@ def test_the_bodies_before_a_motion_are_found():
     assert judge.newest_before([10, 20], 5, 3) == []
 
 
+def test_bodies_of_a_tracker_that_was_late_keep_their_distance():
+    period, late = 1.0 / RATE, 0.4
+    assert next_due(5.0, 5.0005) == 5.0 + period
+    assert next_due(5.0, 5.0 + late * period) == pytest.approx(5.0 + (1.0 + late) * period)
+    assert next_due(5.0, 7.0) == 7.0 + period
+
+
 def test_memory_that_grows_is_caught():
     # What is taken at first does not count.
     warm = [100.0 + 10.0 * min(k, 5) for k in range(100)]
@@ -139,7 +152,8 @@ def test_each_fault_misses_its_target():
         ({'verdicts': Counter({(judge.FREE, False): 1, (judge.TOUCHES, False): 1})}, 'free'),
         ({'verdicts': Counter({(judge.FREE, False): 1})}, 'free'),
         ({'n_sent': 8}, 'heard'),
-        ({'figures': {'good messages, body': '7', 'refused messages, body': '1'}}, 'heard'),
+        ({'figures': FIGURES | {'refused messages, body': '1'}}, 'heard'),
+        ({'figures': FIGURES | {'brakes': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
         ({'ages': [0.01, 0.06]}, 'age'),
         ({'ages': []}, 'age'),
         ({'memory': leaking}, 'memory'),
@@ -167,7 +181,7 @@ def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
 def test_figures_of_the_guard_are_held_to_its_targets():
     figures = {
         'motions held against a new body': '9, last 1 ms, p50 0.200 ms, p99 1 ms, at most 2 ms',
-        'brakes': '3, last 1.000 ms, p50 2.000 ms, p99 4.000 ms, at most 4.000 ms',
+        'brakes': BRAKES,
     }
     assert unmet(guard_targets(GuardRecord(figures=figures))) == []
     slow = {key: value.replace('p99 4', 'p99 6') for key, value in figures.items()}

@@ -1,0 +1,46 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whoever holds the wearer against a motion goes before whoever plans the next one."""
+
+from threading import Event
+import time
+from types import TracebackType
+
+# Longer than this the planner does not wait [s].
+LONGEST = 0.02
+# Nor again so soon: bodies that come one upon another would keep it from planning [s].
+APART = 5e-3
+
+
+class RightOfWay:
+    """
+    Lets one thread hold up another that works beside it, at places where that one gives way.
+
+    Both share an interpreter, which passes to and fro between them: each then takes twice as long
+    and more. What is entered is a few milliseconds of work that a person waits for.
+    """
+
+    def __init__(self) -> None:
+        """Begin with the way free."""
+        self._is_free = Event()
+        self._is_free.set()
+        self._given = -APART
+
+    def __enter__(self) -> None:
+        """Take the way."""
+        self._is_free.clear()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave it."""
+        self._is_free.set()
+
+    def give(self) -> None:
+        """Return when the way is free, or soon; never to be called while a lock is held."""
+        if not self._is_free.is_set() and time.monotonic() - self._given > APART:
+            self._is_free.wait(LONGEST)
+            self._given = time.monotonic()

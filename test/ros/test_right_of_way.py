@@ -1,0 +1,92 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A planner gives way to whoever holds the wearer against a motion that runs."""
+
+from threading import Event, Thread
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from rclpy.node import Node  # noqa: E402
+from rrth_planner.ros import right_of_way  # noqa: E402
+from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
+from rrth_planner.ros.subscriptions import OpenSubscription  # noqa: E402
+from std_msgs.msg import Int32  # noqa: E402
+
+# What waits is seen to wait for this long [s].
+SOON = 0.1
+
+
+@pytest.fixture(name='patient')
+def _patient(monkeypatch):
+    """Have nobody give up waiting within a test, nor wait seldom."""
+    monkeypatch.setattr(right_of_way, 'LONGEST', 60.0)
+    monkeypatch.setattr(right_of_way, 'APART', -1.0)
+
+
+def giving(way):
+    """Return what is set once a thread has given way."""
+    given = Event()
+
+    def give():
+        way.give()
+        given.set()
+
+    Thread(target=give, daemon=True).start()
+    return given
+
+
+def test_who_plans_waits_until_the_way_is_left(patient):
+    way = RightOfWay()
+    assert giving(way).wait(30.0)
+    for _ in range(3):
+        with way:
+            given = giving(way)
+            assert not given.wait(SOON)
+        assert given.wait(30.0)
+
+
+def test_a_way_is_left_whatever_goes_wrong_in_it(patient):
+    way = RightOfWay()
+    with pytest.raises(ValueError, match='wrong'), way:
+        raise ValueError('wrong')
+    assert giving(way).wait(30.0)
+
+
+def test_nobody_waits_long(monkeypatch, patient):
+    monkeypatch.setattr(right_of_way, 'LONGEST', 1e-3)
+    way = RightOfWay()
+    with way:
+        assert giving(way).wait(30.0)
+
+
+def test_nobody_waits_again_and_again(monkeypatch, patient):
+    way = RightOfWay()
+    with way:
+        given = giving(way)
+        assert not given.wait(SOON)
+    assert given.wait(30.0)
+    monkeypatch.setattr(right_of_way, 'APART', 1e6)
+    with way:
+        assert giving(way).wait(30.0)
+
+
+def test_a_message_is_read_and_dealt_with_on_the_way(ros_context, wait_until, spinning):
+    node, way, heard = Node('walker'), RightOfWay(), []
+
+    def deal(msg, *_):
+        heard.append((msg.data, way._is_free.is_set()))
+        raise ValueError('nobody deals with that')
+
+    subscription = OpenSubscription(node, Int32, 'walked', deal, way=way)
+    publisher = node.create_publisher(Int32, subscription.topic_name, 10)
+    with spinning(node):
+        wait_until(lambda: publisher.get_subscription_count() > 0)
+        for k in range(2):
+            publisher.publish(Int32(data=k))
+            wait_until(lambda k=k: len(heard) > k)
+        wait_until(way._is_free.is_set)
+    assert heard == [(0, False), (1, False)]
+    node.destroy_node()
