@@ -30,7 +30,7 @@ from std_srvs.srv import Trigger
 NAME = 'rrth_planner'
 BEGIN = time.monotonic()
 # After so long a thread lets another one run [s].
-SWITCH_INTERVAL = 2e-3
+SWITCH_INTERVAL = 5e-4
 
 
 class PlannerNode(Node):
