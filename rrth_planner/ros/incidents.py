@@ -62,3 +62,9 @@ def cause_of(problem: BaseException) -> BaseException:
     if isinstance(problem, PlanError) and problem.__cause__ is not None:
         return problem.__cause__
     return problem
+
+
+def sentence_of(problem: BaseException) -> str:
+    """Return what is said of an error that nobody expected."""
+    cause = cause_of(problem)
+    return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'

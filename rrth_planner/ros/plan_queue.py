@@ -4,57 +4,31 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import time
 import traceback
 from typing import Any
 
 from nav_msgs.msg import Path
-import numpy as np
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
-from rrth_planner.ros.incidents import cause_of, incident_of, keep
+from rrth_planner.ros.incidents import incident_of, keep, sentence_of
 from rrth_planner.ros.inputs import Inputs, RequestError
 from rrth_planner.ros.last_look import require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
+from rrth_planner.ros.response import Response
+from rrth_planner.ros.resting import wait_for_rest
 from rrth_planner.ros.second_opinion import incident_of_stop
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import REST_SPEED
 from rrth_planner.trajectory import Trajectory
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Response:
-    """
-    What a request is answered.
-
-    Parameters
-    ----------
-    is_solved : bool
-        Whether a motion was published.
-    text : str
-    tool_path : callable
-        Returns the tool's path; empty where no motion was published.
-    conclude : callable
-        What is left to do when it has been answered: to show and to report it.
-
-    """
-
-    is_solved: bool
-    text: str
-    tool_path: Callable[[], Path]
-    conclude: Callable[[], None]
-
-
-# So much longer than its brake an arm may need to come to rest [s].
-LONGEST_SETTLING = 1.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -197,7 +171,7 @@ class PlanQueue:
             self._node.get_logger().error(traceback.format_exc())
             with self._lock:
                 self._open.discard(ticket)
-            code, sentence, shown = ErrorCode.FAILURE, _in_a_sentence(problem), None
+            code, sentence, shown = ErrorCode.FAILURE, sentence_of(problem), None
             incident = incident_of(problem)
         if incident is not None:
             noted, file = keep(incident, parameters.incident_folder)
@@ -271,7 +245,7 @@ class PlanQueue:
 
         def work() -> None:
             try:
-                self._wait_for_rest(ticket, wait)
+                wait_for_rest(self._heard.joints, self._now, wait, lambda: ticket.is_cancelled)
                 if ticket.is_cancelled or self.guard.n_begun != n_begun:
                     # Whoever asked for the motion that has begun since then wants that one.
                     return
@@ -301,20 +275,6 @@ class PlanQueue:
 
         self.prepare(work)
 
-    def _wait_for_rest(self, ticket: _Ticket, wait: float) -> None:
-        """Return when the arm has come to rest, or the time for it is over [s]."""
-        end = time.monotonic() + wait + LONGEST_SETTLING
-        begin = self._now()
-        while time.monotonic() < end and not ticket.is_cancelled:
-            reading = self._heard.joints.value
-            if (
-                reading is not None
-                and reading.received >= begin + wait
-                and (np.abs(reading.velocities) <= REST_SPEED).all()
-            ):
-                return
-            time.sleep(0.005)
-
     def _tool_path(self, outcome: Any, parameters: PlannerParameters) -> Path:
         """Return the tool's path; a failure of this does not unsay the motion."""
         try:
@@ -335,8 +295,3 @@ class PlanQueue:
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9
-
-
-def _in_a_sentence(problem: Exception) -> str:
-    cause = cause_of(problem)
-    return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'

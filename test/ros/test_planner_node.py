@@ -30,7 +30,7 @@ from rrth_planner import judges  # noqa: E402
 from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import catching_up, last_look, plan_queue, requests  # noqa: E402
+from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.last_look import LastLook  # noqa: E402
@@ -648,7 +648,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
-    monkeypatch.setattr(plan_queue, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
@@ -683,7 +683,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
 
 
 def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
-    monkeypatch.setattr(plan_queue, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
