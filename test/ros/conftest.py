@@ -10,6 +10,9 @@ import time
 import pytest
 
 LONGEST_WAIT = 30.0
+# Answers of a planner that has not heard everything yet, or whose machine is too busy to plan in
+# time for an arm that moves.
+AGAIN = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'TIMED_OUT')
 
 
 def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -> None:
@@ -28,6 +31,18 @@ def tell(node, publisher, message) -> None:
     wait_until(lambda: is_heard(node, publisher))
     publisher.publish(message)
     assert publisher.wait_for_all_acked(Duration(seconds=LONGEST_WAIT))
+
+
+def ask(plan, note=lambda: None):
+    """Return the answer of a planner's service; asked again while a busy machine is the reason."""
+    end = time.monotonic() + LONGEST_WAIT
+    while True:
+        note()
+        future = plan.call_async(plan.srv_type.Request())
+        wait_until(future.done)
+        if not future.result().message.startswith(AGAIN) or time.monotonic() > end:
+            return future.result()
+        time.sleep(0.05)
 
 
 @contextmanager
@@ -67,6 +82,12 @@ def _wait_until() -> Callable[..., None]:
 def _tell() -> Callable[..., None]:
     """Give `tell` to tests."""
     return tell
+
+
+@pytest.fixture(name='ask')
+def _ask() -> Callable[..., object]:
+    """Give `ask` to tests."""
+    return ask
 
 
 @pytest.fixture(name='spinning')

@@ -54,7 +54,7 @@ def _body(scene):
     return samples.array(*boxes)
 
 
-def test_both_nodes_work_with_another_arm(wait_until, tell, spinning):
+def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
     file = resource_path(ARM)
     arm, scene = load_arm(file), load_body(resource_path(BODY))
     client, said = Client(), []
@@ -72,9 +72,8 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, spinning):
         for target in TARGETS:
             tell(client, client.target, samples.target(*target))
             n_states, n_motions = len(client.states), len(client.motions)
-            future = client.plan.call_async(Trigger.Request())
-            wait_until(future.done, 60.0)
-            assert future.result().success, (target, future.result().message)
+            answer = ask(client.plan)
+            assert answer.success, (target, answer.message)
             wait_until(lambda n=n_motions: len(client.motions) > n)
             motion = client.motions[-1]
             assert motion.joint_names == list(arm.joint_names)

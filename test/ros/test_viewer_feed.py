@@ -46,7 +46,14 @@ def test_the_feed_shows_what_the_nodes_say_and_asks_for_the_newest_target():
                     time.sleep(0.05)
                 wait_until(lambda: feed.said.startswith('SUCCESS'))
                 wait_until(lambda: np.allclose(feed.target, TARGETS[-1]))
-                wait_until(lambda: not feed.is_asking)
+
+                def is_answered():
+                    # A busy machine may not plan in time for an arm that moves.
+                    if not feed.is_asking and feed.said.startswith('TIMED_OUT'):
+                        feed.ask()
+                    return not feed.is_asking
+
+                wait_until(is_answered)
                 # The motion that is shown is the one that the arm follows to its end.
                 wait_until(
                     lambda: np.allclose(feed.trajectory.positions[-1], feed.positions, atol=1e-6)
