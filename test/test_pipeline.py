@@ -17,6 +17,7 @@ from rrth_planner.oracle import first_contact
 from rrth_planner.refusal import goal_refusal
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
+from rrth_planner.touch import Touch
 from rrth_planner.trajectory import sample
 from rrth_planner.world import arm_world
 from worlds import (
@@ -34,6 +35,7 @@ from worlds import (
 )
 
 pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+path_timing = pytest.importorskip('rrth_planner.path_timing', exc_type=ImportError)
 OPTIONS = RRTHOptions(club_attempts=2, improve_time=1000.0, time_limit=1000.0, max_samples=4000)
 
 
@@ -272,6 +274,22 @@ def test_a_request_that_is_cancelled_gives_no_motion(answers):
 def test_a_request_cancelled_before_it_began_gives_no_motion():
     # The straight edge to this target is free, so nothing is ever grown.
     plan = ask(wearer(), FOLDED, [-2.0, -0.3, 0.2], should_stop=lambda: True)
+    assert plan.status is PlanStatus.CANCELLED
+    assert plan.trajectory is None
+
+
+@pytest.mark.parametrize('opinion', [None, Touch(0.1, 0.01, 'ray', 'torso')])
+def test_what_is_cancelled_while_the_second_judge_looks_ends_so(monkeypatch, opinion):
+    looked = []
+
+    def look(*_, **__):
+        looked.append(opinion)
+        return opinion
+
+    monkeypatch.setattr(path_timing, 'touch_seen', look)
+    target = [1.5, 0.3, 0.4]
+    plan = ask(wearer(), FOLDED, target, should_stop=lambda: bool(looked))
+    assert looked == [opinion]
     assert plan.status is PlanStatus.CANCELLED
     assert plan.trajectory is None
 
