@@ -183,13 +183,14 @@ def _lead(arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits) -
     """Return what an arm in motion does first, straight on or along its present motion."""
     straight = lead_in(moving.state, limits)
     refusal = lead_refusal(arm, world, straight, limits)
-    if refusal is None:
-        return straight
-    stop = stop_first(moving, limits)
-    if stop is not None and certify(stop.trajectory, world).is_proven:
-        # Rounding may have put a joint past its limit.
-        return replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
-    return refusal
+    lead = straight
+    if refusal is not None:
+        stop = stop_first(moving, limits)
+        if stop is None or not certify(stop.trajectory, world).is_proven:
+            return refusal
+        lead = stop
+    # Rounding may have put a joint past its limit.
+    return replace(lead, q_stop=np.clip(lead.q_stop, *arm.bounds))
 
 
 def _solved(

@@ -17,6 +17,7 @@ from rrth_planner.oracle import first_contact
 from rrth_planner.refusal import goal_refusal
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import lead_in, MotionState, Takeover
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import sample
 from rrth_planner.world import arm_world
@@ -276,6 +277,25 @@ def test_a_request_cancelled_before_it_began_gives_no_motion():
     plan = ask(wearer(), FOLDED, [-2.0, -0.3, 0.2], should_stop=lambda: True)
     assert plan.status is PlanStatus.CANCELLED
     assert plan.trajectory is None
+
+
+@pytest.mark.parametrize('excess', [1e-15, 1e-14])
+def test_an_arm_that_moves_may_stop_past_a_limit_by_rounding(excess):
+    arm, world = table_1_arm(), wearer_world()
+    rng, v, still = np.random.default_rng(5), np.array([0.1, 0.02, 0.05, 0.0]), np.zeros(4)
+    n_solved = 0
+    for _ in range(60):
+        q = rng.uniform(*arm.bounds)
+        state = MotionState(positions=q, velocities=v, accelerations=still)
+        way = lead_in(state, limits()).q_stop[1] - q[1]
+        q[1] = arm.bounds[1, 1] - way + excess
+        if world.clearances(q).min() < 0.05:
+            continue
+        state = MotionState(positions=q, velocities=v, accelerations=still)
+        assert 0.0 < lead_in(state, limits()).q_stop[1] - arm.bounds[1, 1] < 1e-6
+        plan = ask(wearer(), q, [1.5, 0.3, 0.4], moving=Takeover(state=state))
+        n_solved += plan.status is PlanStatus.SOLVED
+    assert n_solved > 2
 
 
 @pytest.mark.parametrize('opinion', [None, Touch(0.1, 0.01, 'ray', 'torso')])

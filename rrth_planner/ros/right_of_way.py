@@ -16,8 +16,9 @@ class RightOfWay:
     """
     Lets one thread hold up another that works beside it, at places where that one gives way.
 
-    Both share an interpreter, which passes to and fro between them: each then takes twice as long
-    and more. What is entered is a few milliseconds of work that a person waits for.
+    Both share an interpreter, which each of them hands to the other again and again: both then
+    take twice as long and more. What is entered is a few milliseconds of work that a person waits
+    for.
     """
 
     def __init__(self) -> None:

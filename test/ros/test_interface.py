@@ -413,6 +413,8 @@ def test_a_planner_that_was_killed_is_replaced_in_mid_motion(spinning, wait_unti
     assert np.abs(watcher.motions[-1].points[0].velocities).max() > 0.02
     assert not [line for line in said if 'refused' in line], said
     q = np.array([state.position for state in watcher.states])
-    assert np.abs(np.diff(q, axis=0)).max() < 0.05
+    stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in watcher.states])
+    # Where a busy machine lost messages the steps are long.
+    assert (np.abs(np.diff(q, axis=0)).max(axis=1) < 0.03 + 2.0 * np.diff(stamps)).all()
     assert pointing_error(load_arm(), q[-1], np.array([1.2, 0.9, 0.6])) < 1e-3
     watcher.destroy_node()
