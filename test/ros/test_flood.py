@@ -30,9 +30,8 @@ TOPICS = {
     'joint_states': (JointState, samples.joints),
 }
 RATE, N_ASKED = 2000.0, 25
-# Half of the answers, and nine in ten, come within this [s]; a machine that tests many things at
-# once is noisy.
-MEDIAN, MOST = 0.1, 0.3
+# Median and worst of the answers [s]; machines that test many things at once are noisy.
+MEDIAN, WORST = 0.1, 0.3
 
 
 def flood(topic, namespace):
@@ -110,11 +109,11 @@ def test_requests_are_answered_while_a_topic_is_flooded(
                 it.check()
                 planner.check()
                 time.sleep(0.02)
-    median, most = np.quantile(times, (0.5, 0.9))
-    print(f'{topic} at {min(rates):.0f} Hz: median {median * 1e3:.1f} ms, {most * 1e3:.1f} ms')
+    median, worst = np.median(times), max(times)
+    print(f'{topic} at {min(rates):.0f} Hz: median {median * 1e3:.1f} ms, {worst * 1e3:.1f} ms')
     assert all(a.success for a in answers), [a.message for a in answers]
     assert median <= MEDIAN
-    assert most <= MOST
+    assert worst <= WORST
 
 
 if __name__ == '__main__':

@@ -75,8 +75,7 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, tel
             one.check()
             other.check()
         wait_until(lambda: client.speed() == 0.0)
-    # One that a busy machine hands on too late is refused; the arm then keeps to its motion.
-    assert len([line for line in said if 'refused' in line]) <= 2
+    assert not [line for line in said if 'refused' in line]
     moving = [answer for was_moving, answer in answers if was_moving]
     assert len(moving) >= 3
     assert all(answer.success for answer in moving), [a.message for a in moving]
@@ -86,17 +85,12 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, tel
     )
     step = np.diff(stamps)[:, None]
     limits = worlds.limits()
-    # A hundredth more than the limits.
+    # A hundredth more than the limits, and what the stamps are off by.
     assert (np.abs(v) <= 1.01 * limits.velocity).all()
-    # And what the stamps are off by, which on a busy machine now and then is more.
-    excess = np.abs(np.diff(v, axis=0)) - 1.01 * limits.acceleration * step
-    assert np.quantile(excess.max(axis=1), 0.99) <= 5e-3
-    assert excess.max() <= 0.1
+    assert (np.abs(np.diff(v, axis=0)) <= 1.01 * limits.acceleration * step + 5e-3).all()
     jump = np.diff(q, axis=0) - 0.5 * step * (v[1:] + v[:-1])
     # Where the busy machine lost messages the steps are long; the velocity bends within them.
-    excess = np.abs(jump) - limits.jerk * step**3 / 12.0
-    assert np.quantile(excess.max(axis=1), 0.99) <= 1e-3
-    assert excess.max() <= 0.02
+    assert (np.abs(jump) <= 1e-3 + limits.jerk * step**3 / 12.0).all()
     last = [t for t, (_, answer) in zip(TARGETS * ROUNDS, answers, strict=True) if answer.success]
     tool = oracle.frames(worlds.table_1_arm(), q[-1:])[0, -1]
     past = last[-1] - tool[:3, 3]
