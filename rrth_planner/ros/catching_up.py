@@ -12,6 +12,8 @@ from rclpy.node import Node
 LONGEST = 1.0
 # After so long without a round it is asked for again [s].
 AGAIN = 0.02
+# That a node was through is news for so long [s].
+NEWS = 0.01
 
 
 class CatchUp:
@@ -36,6 +38,7 @@ class CatchUp:
         """Begin with nobody who waits."""
         self._node, self._handled = node, handled
         self._begin = self._n = 0
+        self._through = 0.0
         # Whether somebody waits; whether a round was asked for that nobody waits for any more.
         self._is_over, self._is_stale = Event(), False
         self._is_over.set()
@@ -45,6 +48,7 @@ class CatchUp:
         """Wait, one thread at a time; return whether the executor is through."""
         if self._node.executor is None:
             # Whoever calls its callbacks by hand has handed over what there is.
+            self._through = time.monotonic()
             return True
         self._begin, self._n = time.time_ns(), self._handled()[0]
         self._is_over.clear()
@@ -57,12 +61,17 @@ class CatchUp:
         self._is_stale = not is_through
         return is_through
 
+    def is_news(self) -> bool:
+        """Return whether the executor was through just now; not if the machine stood still."""
+        return time.monotonic() - self._through <= NEWS
+
     def _on_round(self) -> None:
         is_stale, self._is_stale = self._is_stale, False
         if self._is_over.is_set():
             return
         before, (self._n, came) = self._n, self._handled()
         if not is_stale and (came >= self._begin or self._n == before):
+            self._through = time.monotonic()
             self._is_over.set()
         else:
             self._round.trigger()

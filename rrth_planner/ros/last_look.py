@@ -178,10 +178,15 @@ class LastLook:
 def require_news(catch_up: Callable[[], bool]) -> None:
     """Wait until the bodies that came are heard, or raise RequestError."""
     if not catch_up():
-        raise RequestError(
-            ErrorCode.SENSOR_INFO_STALE,
-            'the node is busy: the bodies that came while the motion was planned are not read yet',
-        )
+        raise busy()
+
+
+def busy() -> RequestError:
+    """Return what is said where bodies that came cannot be heard in time."""
+    return RequestError(
+        ErrorCode.SENSOR_INFO_STALE,
+        'the node is busy: the bodies that came while the motion was planned are not read yet',
+    )
 
 
 def _is_same(one: Scene, other: Scene) -> bool:

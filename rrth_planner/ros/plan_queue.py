@@ -13,12 +13,13 @@ from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.guard import Guard
 from rrth_planner.ros.incidents import incident_of, keep, sentence_of
 from rrth_planner.ros.inputs import Inputs, RequestError
-from rrth_planner.ros.last_look import require_news
+from rrth_planner.ros.last_look import busy, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
@@ -29,6 +30,8 @@ from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 
+# So often is a moment sought to tell a motion in.
+MOST_TRIES = 20
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -50,8 +53,8 @@ class PlanQueue:
         Its parameters, as they are when a request's turn begins, are those of the plan.
     plan_request : callable
         `requests.plan_request`, which is loaded late.
-    catch_up : callable
-        Returns when the bodies that came are read, and whether that is so.
+    catch_up : CatchUp
+        Returns when the bodies that came are read.
 
     """
 
@@ -61,7 +64,7 @@ class PlanQueue:
         heard: Inputs,
         reporter: Reporter,
         plan_request: Callable[..., Any],
-        catch_up: Callable[[], bool],
+        catch_up: CatchUp,
     ) -> None:
         """Start with nothing to do."""
         self._catch_up = catch_up
@@ -202,31 +205,39 @@ class PlanQueue:
         """Publish a request's motion if it fits, and return that, or raise RequestError."""
         begin = 0.0 if outcome.start is None else outcome.start.time
         msg = self._publishers.motion(outcome.trajectory, parameters, begin)
-        # The last of all that may take its time.
-        require_news(self._catch_up)
-        with self._lock:
-            if ticket.is_cancelled or self._is_closed:
-                raise RequestError(*CANCELLED)
-            if n_brakes != self.guard.n_brakes:
-                raise RequestError(
-                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                    'the arm was stopped for the wearer while its motion was planned',
-                )
-            if not fits():
-                return False
-            self._open.discard(ticket)
-            self.guard.begin(
-                RunningMotion(
-                    trajectory=outcome.trajectory,
-                    start_time=begin or self._now(),
-                    reach=outcome.plan.reach,
-                    escape_time=outcome.plan.escape_time,
-                ),
-                outcome.inputs.goal,
-                parameters,
-                lambda: self._publishers.tell(msg),
+        for _ in range(MOST_TRIES):
+            # The last of all that may take its time.
+            require_news(self._catch_up)
+            with self._lock:
+                self._require_use(ticket, n_brakes)
+                if not fits():
+                    return False
+                # Where the machine stood still others have come, and wait for the lock.
+                if self._catch_up.is_news():
+                    self._open.discard(ticket)
+                    self.guard.begin(
+                        RunningMotion(
+                            trajectory=outcome.trajectory,
+                            start_time=begin or self._now(),
+                            reach=outcome.plan.reach,
+                            escape_time=outcome.plan.escape_time,
+                        ),
+                        outcome.inputs.goal,
+                        parameters,
+                        lambda: self._publishers.tell(msg),
+                    )
+                    return True
+        raise busy()
+
+    def _require_use(self, ticket: _Ticket, n_brakes: int) -> None:
+        """Raise RequestError where a motion is of no use any more; the lock is held."""
+        if ticket.is_cancelled or self._is_closed:
+            raise RequestError(*CANCELLED)
+        if n_brakes != self.guard.n_brakes:
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'the arm was stopped for the wearer while its motion was planned',
             )
-            return True
 
     def _should_stop(self, ticket: _Ticket) -> bool:
         """Return whether a request was cancelled, once whoever hears the wearer is through."""

@@ -31,6 +31,7 @@ from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
+from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.last_look import LastLook  # noqa: E402
@@ -626,14 +627,14 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
     monkeypatch.setattr(catching_up, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
-    take, end, catch_up = LastLook.take, Event(), planner._queue._catch_up
+    take, end, catch_up = LastLook.take, Event(), CatchUp.__call__
 
-    def catch_up_until_it_is_over():
-        is_through = catch_up()
+    def catch_up_until_it_is_over(self):
+        is_through = catch_up(self)
         end.set()
         return is_through
 
-    monkeypatch.setattr(planner._queue, '_catch_up', catch_up_until_it_is_over)
+    monkeypatch.setattr(CatchUp, '__call__', catch_up_until_it_is_over)
 
     def look_while_the_node_is_busy(look):
         begun = Event()
@@ -642,6 +643,36 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
         return take(look)
 
     monkeypatch.setattr(LastLook, 'take', look_while_the_node_is_busy)
+    message = stranger.answer().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_a_motion_is_not_told_where_the_machine_stood_still_before(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    still_fits, looks = LastLook.still_fits, []
+
+    def look_while_all_stands_still(look, *args):
+        fits = still_fits(look, *args)
+        if not looks:
+            # Nobody reads it meanwhile: the lock is held.
+            stranger.publishers['body_boxes'].publish(fenced())
+            time.sleep(0.3)
+        looks.append(fits)
+        return fits
+
+    monkeypatch.setattr(LastLook, 'still_fits', look_while_all_stands_still)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert looks[0]
+    assert not stranger.heard['joint_trajectory']
+
+
+def test_a_motion_is_not_told_where_the_machine_stands_still_again_and_again(start, monkeypatch):
+    monkeypatch.setattr(catching_up, 'NEWS', -1.0)
+    planner, stranger = start()
+    say_all(planner, stranger)
     message = stranger.answer().message
     assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.heard['joint_trajectory']
