@@ -4,6 +4,7 @@
 
 import argparse
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 import gc
 from importlib.util import find_spec
 from pathlib import Path
@@ -40,9 +41,11 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 def _run(options: argparse.Namespace) -> int:
     from rrth_planner.campaign.store import replace_file
 
+    from benchmarks.real_time import is_real_time
     from benchmarks.soak_guard import soak_guard
     from benchmarks.soak_plans import soak_plans
     from benchmarks.soak_report import draw_memory, report
+    from benchmarks.standstill import StandstillWatch
 
     # Whatever ends this process, its nodes do not go on in the same domain.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -54,7 +57,12 @@ def _run(options: argparse.Namespace) -> int:
     n_hands = QUICK_HANDS if options.quick else options.hands
     longest = 60.0 * options.minutes if options.minutes else FOREVER
     plans = guard = None
-    with tempfile.TemporaryDirectory(prefix='rrth-soak-') as name:
+    watch = StandstillWatch()
+    # Only what goes before all others is late for no other reason.
+    with (
+        watch if is_real_time() else nullcontext(),
+        tempfile.TemporaryDirectory(prefix='rrth-soak-') as name,
+    ):
         if n_plans:
             plans = soak_plans(n_plans, longest, Path(name))
         if n_hands and not (plans and plans.is_interrupted):
@@ -64,7 +72,7 @@ def _run(options: argparse.Namespace) -> int:
     target.parent.mkdir(parents=True, exist_ok=True)
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
-    text = report(plans, guard, _command(options), options.remark)
+    text = report(plans, guard, _command(options), options.remark, watch.found)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')

@@ -23,9 +23,9 @@ from trajectory_msgs.msg import JointTrajectory
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
-from benchmarks.soak_body import BodyStream, NO_HAND
+from benchmarks.soak_body import BodyAt, BodyStream, NO_HAND
 from benchmarks.soak_client import Published, SoakClient, threads_of
-from benchmarks.soak_contacts import Episode, judge_episode
+from benchmarks.soak_contacts import Episode, judge_episode, MISSED, TOUCHED
 from benchmarks.soak_judge import RAY
 
 PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
@@ -52,6 +52,9 @@ class GuardRecord:
         A hand each.
     outcomes : Counter
         Of the words of `judge_episode`, and of how the motions went on.
+    suspects : list of (str, BodyAt, float, float)
+        Of each hand that was missed or touched though it need not be: the word, the body with it,
+        and when it came since the motion began, which takes so long [s].
     said : Counter
         What the logs of both nodes say of brakes that are not safe and of refusals.
     figures : dict
@@ -66,6 +69,7 @@ class GuardRecord:
     n_refused: int = 0
     episodes: list[Episode] = field(default_factory=list)
     outcomes: Counter = field(default_factory=Counter)
+    suspects: list[tuple[str, BodyAt, float, float]] = field(default_factory=list)
     said: Counter = field(default_factory=Counter)
     figures: dict[str, str] = field(default_factory=dict)
     is_interrupted: bool = False
@@ -103,7 +107,11 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
         record.figures = client.figures
     client.close()
     for episode in record.episodes:
-        record.outcomes.update(judge_episode(load_arm(), episode))
+        words = judge_episode(load_arm(), episode)
+        record.outcomes.update(words)
+        for word in {MISSED, TOUCHED}.intersection(words):
+            times = episode.phase, episode.motion.duration
+            record.suspects.append((word, episode.body, *times))
     return record
 
 
@@ -157,8 +165,7 @@ def _episode(
     arm = load_arm()
     client.hear(rng.uniform(*SHARE) * trajectory.duration)
     phase = (time.time_ns() - motion.published) * 1e-9
-    hand = _in_the_way(arm, rng, trajectory, phase)
-    put = bodies.put(hand)
+    put = bodies.put(_in_the_way(arm, rng, trajectory, phase))
     n_before = len(client.motions)
     _wait_for_rest(client)
     found = client.motions[n_before:]
@@ -170,7 +177,7 @@ def _episode(
     return Episode(
         body=put,
         motion=trajectory,
-        phase=phase,
+        phase=(put.sent - motion.published) * 1e-9,
         published=tuple((m.published, m.received) for m in found),
         followed=tuple(_trajectory(client, m) for m in found),
         times=np.array([s[0] for s in states]),

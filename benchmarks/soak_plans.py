@@ -63,9 +63,9 @@ class PlansRecord:
         Bodies.
     verdicts : Counter
         Of (verdict, whether it is a brake).
-    suspects : list of (str, list of float)
-        Of each motion that is not free of the body: the verdict, and how long before it the bodies
-        were sent, the newest first [s].
+    suspects : list of (str, int, list of float)
+        Of each motion that is not free of the body: the verdict, when it was published [ns], and
+        how long before that the bodies were sent, the newest first [s].
     n_motions : int
         That were published.
     elapsed : float
@@ -85,7 +85,7 @@ class PlansRecord:
     figures: dict[str, str] = field(default_factory=dict)
     n_sent: int = 0
     verdicts: Counter = field(default_factory=Counter)
-    suspects: list[tuple[str, list[float]]] = field(default_factory=list)
+    suspects: list[tuple[str, int, list[float]]] = field(default_factory=list)
     n_motions: int = 0
     elapsed: float = 0.0
     is_interrupted: bool = False
@@ -196,7 +196,7 @@ def judge_all(
     client: SoakClient,
     log: list[BodyAt],
     verdicts: Counter,
-    suspects: list[tuple[str, list[float]]],
+    suspects: list[tuple[str, int, list[float]]],
 ) -> None:
     """Judge every motion against the bodies before it, in all processors."""
     from multiprocessing import get_context
@@ -219,5 +219,5 @@ def judge_all(
             if word[0] != FREE:
                 before = newest_before(sent, motion.published, LOOKED_AT + 1)
                 ages = [1e-9 * (motion.published - sent[i]) for i in before]
-                suspects.append((name_of(word), ages))
+                suspects.append((name_of(word), motion.published, ages))
             bar.update()

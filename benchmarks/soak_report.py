@@ -15,8 +15,13 @@ from benchmarks.real_time import scheduling
 from benchmarks.soak_guard import GuardRecord
 from benchmarks.soak_judge import FREE, growth_of, name_of
 from benchmarks.soak_plans import PlansRecord
+from benchmarks.standstill import Standstills
 from benchmarks.task import origin
 
+# A brake is to be published within this after its body was sent [ns].
+MOMENT = 5_000_000
+# For so long after a hand came that was missed it is said whether the machine ran [ns].
+AFTERWARDS = 1_000_000_000
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
 MOST_GROWTH, MOST_AGE, RECERTIFIED, BRAKED = 5.0, 0.05, 0.3, 5.0
@@ -43,12 +48,20 @@ METHOD = """\
 
 
 def report(
-    plans: PlansRecord | None, guard: GuardRecord | None, command: str, remark: str = ''
+    plans: PlansRecord | None,
+    guard: GuardRecord | None,
+    command: str,
+    remark: str = '',
+    still: Standstills | None = None,
 ) -> str:
     """Return the report in Markdown; a part that was not run is left out."""
     made = origin()
     commit = f', commit {made["commit"]}' if made['commit'] else ''
-    lines = [*(plan_targets(plans) if plans else []), *(guard_targets(guard) if guard else [])]
+    lines = [
+        *(plan_targets(plans) if plans else []),
+        *(guard_targets(guard) if guard else []),
+        *([_running_line(guard, still)] if guard and still else []),
+    ]
     parts = [
         '# Reliability',
         f'Written by `{command}`; do not edit.\n{made["machine"]} ({made["n_cores"]} cores); '
@@ -59,15 +72,16 @@ def report(
             if any(part and part.is_interrupted for part in (plans, guard))
             else []
         ),
+        *([still.sentence()] if still else []),
         *([remark] if remark else []),
         '## Targets',
         markdown_table(HEADER, lines),
     ]
     if plans:
-        parts += ['## Plans round a body that moves', _plans_text(plans)]
+        parts += ['## Plans round a body that moves', _plans_text(plans, still)]
         parts += [f'![Memory of the planner node](images/reliability/{PICTURE})']
     if guard:
-        parts += ['## Hands in the way of running motions', _guard_text(guard)]
+        parts += ['## Hands in the way of running motions', _guard_text(guard, still)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
 
 
@@ -116,7 +130,7 @@ def guard_targets(guard: GuardRecord) -> list[list[str]]:
     ]
 
 
-def _plans_text(plans: PlansRecord) -> str:
+def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
     codes = [[code, str(n), plans.examples.get(code, '')] for code, n in plans.codes.most_common()]
     verdicts = [[name_of(verdict), str(n)] for verdict, n in sorted(plans.verdicts.items())]
     gaps = np.array(plans.gaps or [np.nan]) * 1e3
@@ -130,7 +144,8 @@ def _plans_text(plans: PlansRecord) -> str:
             *(
                 f'- {word}: published {", ".join(f"{1e3 * age:.1f}" for age in ages)} ms after '
                 'the bodies before it'
-                for word, ages in plans.suspects
+                + _stillness(still, published - round(1e9 * max(ages[:2], default=0.0)), published)
+                for word, published, ages in plans.suspects
             ),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
@@ -141,10 +156,11 @@ def _plans_text(plans: PlansRecord) -> str:
     )
 
 
-def _guard_text(guard: GuardRecord) -> str:
+def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
     shown = [e for e in guard.episodes if e.published]
-    sent = np.array([(e.published[0][0] - e.body.sent) * 1e-6 for e in shown])
-    came = np.array([(e.published[0][1] - e.body.sent) * 1e-6 for e in shown])
+    sent, came = (
+        np.array([(e.published[0][k] - e.body.sent) * 1e-6 for e in shown]) for k in (0, 1)
+    )
     counts = [[word, str(n)] for word, n in (*guard.outcomes.items(), *guard.said.items())]
     figures = [
         [name, guard.figures.get(name, '')]
@@ -154,6 +170,11 @@ def _guard_text(guard: GuardRecord) -> str:
         [
             f'{len(guard.episodes)} hands in {guard.n_motions} motions.',
             markdown_table(('what', 'times'), counts),
+            *(
+                f'- {word}: the hand came {phase:.3f} s after the begin of a motion of '
+                f'{duration:.3f} s{_stillness(still, body.sent, body.sent + AFTERWARDS)}'
+                for word, body, phase, duration in guard.suspects
+            ),
             markdown_table(("the node's own figures", ''), figures),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
@@ -164,6 +185,33 @@ def _guard_text(guard: GuardRecord) -> str:
             ),
         ]
     )
+
+
+def _running_line(guard: GuardRecord, still: Standstills) -> list[str]:
+    """Return the line of the target of the brakes in whose first moment the machine ran."""
+    taken = [e.published[0][0] - e.body.sent for e in guard.episodes if e.published]
+    begins = [e.body.sent for e in guard.episodes if e.published]
+    runs = [
+        1e-6 * t
+        for t, begin in zip(taken, begins, strict=True)
+        if not still.within(begin, begin + MOMENT)
+    ]
+    p99 = float(np.percentile(runs, 99)) if runs else np.nan
+    return _line(
+        'body sent to braking trajectory published, p99, unless the machine stood still in the '
+        f'{MOMENT * 1e-6:g} ms after the body',
+        f'{BRAKED:g} ms',
+        f'{p99:.2f} ms, {len(runs)} of {len(taken)} times',
+        p99 <= BRAKED,
+    )
+
+
+def _stillness(still: Standstills | None, begin: int, end: int) -> str:
+    """Return for how long the machine stood still between two times [ns]; empty: unknown."""
+    if still is None:
+        return ''
+    span = 1e-6 * (end - begin)
+    return f' (the machine stood still for {1e-6 * still.within(begin, end):.1f} of {span:.1f} ms)'
 
 
 def _percentiles(values: np.ndarray) -> list[str]:

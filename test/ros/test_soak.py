@@ -5,6 +5,8 @@
 from collections import Counter
 from dataclasses import replace
 import os
+import signal
+import time
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
 from benchmarks import soak, soak_contacts as contacts, soak_judge as judge  # noqa: E402
-from benchmarks.real_time import put_ahead, scheduling  # noqa: E402
+from benchmarks.real_time import is_real_time, put_ahead, scheduling  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
     BodyStream,
@@ -28,6 +30,7 @@ from benchmarks.soak_body import (  # noqa: E402
 from benchmarks.soak_guard import GuardRecord  # noqa: E402
 from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
 from benchmarks.soak_report import draw_memory, guard_targets, plan_targets, report  # noqa: E402
+from benchmarks.standstill import StandstillWatch, united  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
@@ -163,7 +166,7 @@ def test_each_fault_misses_its_target():
 
 
 def test_the_report_says_how_old_the_bodies_before_a_bad_motion_were():
-    bad = plans(suspects=[('braking: touches', [0.0004, 0.0104])])
+    bad = plans(suspects=[('braking: touches', 10**9, [0.0004, 0.0104])])
     assert '- braking: touches: published 0.4, 10.4 ms after the bodies before' in report(
         bad, None, ''
     )
@@ -263,6 +266,62 @@ def test_the_command_says_what_is_missing(capsys):
         soak.main(['--plans', '-1'])
 
 
+def test_moments_in_which_a_processor_stood_still_are_found():
+    with StandstillWatch() as watch:
+        begin = time.time_ns()
+        os.kill(watch.pids[0], signal.SIGSTOP)
+        time.sleep(0.2)
+        os.kill(watch.pids[0], signal.SIGCONT)
+        end = time.time_ns()
+        time.sleep(0.1)
+    found = watch.found
+    assert found.within(begin, end) >= 190_000_000
+    assert end - begin <= found.span
+    assert (found.begins[1:] > found.ends[:-1]).all()
+    assert 'at most' in found.sentence()
+
+
+def test_moments_of_several_processors_are_united():
+    found = united([(50, 60), (10, 20), (15, 30), (16, 18), (30, 31)], 100)
+    assert found.begins.tolist() == [10, 50]
+    assert found.ends.tolist() == [31, 60]
+    assert found.within(0, 100) == 31
+    assert found.within(25, 55) == 11
+    assert found.within(31, 50) == 0
+    assert '31.00 %' in found.sentence()
+    nothing = united([], 100)
+    assert nothing.within(0, 100) == 0
+    assert '0 times' in nothing.sentence()
+
+
+def test_brakes_are_judged_apart_where_the_machine_ran(motion):
+    figures = {'motions held against a new body': 'p50 0.2 ms', 'brakes': BRAKES}
+    ms = 1_000_000
+
+    def braked(sent, after):
+        return episode(
+            motion, replace(BODY, sent=sent * ms), published=(((sent + after) * ms, 0),)
+        )
+
+    # One that was slow since the machine stood still, and one that was not.
+    still = united([(1003 * ms, 1020 * ms)], 10**10)
+    quick = [braked(100 * k, 3) for k in range(20, 220)]
+    for slow, missed in ((braked(1000, 21), []), (braked(1500, 21), ['unless'])):
+        guard = GuardRecord(figures=figures, episodes=[*quick, slow, slow, slow])
+        text = report(None, guard, '', still=still)
+        assert unmet(guard_targets(guard)) == []
+        bad = [line for line in text.splitlines() if '**no**' in line]
+        assert len(bad) == len(missed)
+        assert all('unless the machine stood still' in line for line in bad)
+        assert f'3.00 ms, {200} of 203 times' in text or missed
+    suspects = [(contacts.MISSED, replace(BODY, sent=1000 * ms), 0.25, 2.0)]
+    text = report(None, GuardRecord(figures=figures, suspects=suspects), '', still=still)
+    assert '0.250 s after the begin of a motion of 2.000 s' in text
+    assert 'stood still for 17.0 of 1000.0 ms' in text
+    bad = plans(suspects=[('touches', 1010 * ms, [0.001, 0.011, 0.5])])
+    assert 'stood still for 7.0 of 11.0 ms' in report(bad, None, '', still=still)
+
+
 @pytest.mark.parametrize('kind', [os.SCHED_RR, os.SCHED_FIFO, os.SCHED_OTHER])
 def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind):
     put = []
@@ -272,6 +331,8 @@ def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind
         os, 'sched_setscheduler', lambda *given: put.append((*given[:2], given[2].sched_priority))
     )
     put_ahead(7, 8)
+    put_ahead(9, by=2)
     is_ordinary = kind == os.SCHED_OTHER
-    assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 11)])
+    assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 11), (9, kind, 12)])
+    assert is_real_time() != is_ordinary
     assert ('in real time' in scheduling()) != is_ordinary
