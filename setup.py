@@ -27,7 +27,7 @@ setup(
     # Names only: the versions come from rosdep or from requirements/.
     install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
     extras_require={
-        'node': ['python-fcl', 'matplotlib'],
+        'node': ['python-fcl', 'rosbags', 'matplotlib'],
         'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
         'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'trimesh', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],

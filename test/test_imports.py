@@ -28,6 +28,7 @@ OWN = {
     'arm_file': {'yaml'},
     'motion_files': {'yaml'},
     'urdf_chain': {'yourdfpy', 'trimesh'},
+    'quick_decoding': {'rosbags'},
     # Tools to look at motions, in the layers of ROS and of the viewers.
     'recorder': {'mcap'},
     'recordings': {'mcap', 'mcap_ros2'},

@@ -17,6 +17,7 @@ from rrth_planner.ros.frames import Frames
 from rrth_planner.ros.inputs import Input, Inputs
 from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
+from rrth_planner.ros.quick_decoding import quick_decoder
 from rrth_planner.ros.subscriptions import OpenSubscription
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
@@ -68,6 +69,8 @@ class Listener:
                 self._on_body,
                 on_late=self._on_body,
                 way=inputs.way,
+                # A person waits for it.
+                decode=quick_decoder(MarkerArray),
             ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
             self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
@@ -81,6 +84,7 @@ class Listener:
         on_message: Callable[[Any, int, int], None],
         on_late: Callable[[Any, int, int], None] | None = None,
         way: AbstractContextManager[None] | None = None,
+        decode: Callable[[bytes], Any] | None = None,
     ) -> OpenSubscription:
         def refuse(problem: MessageError) -> None:
             def read() -> Any:
@@ -88,7 +92,7 @@ class Listener:
 
             self._take(heard, read, self._now())
 
-        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse, way)
+        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse, way, decode)
 
     def body_progress(self) -> tuple[int, int]:
         """Return what `OpenSubscription.progress` says of the bodies."""

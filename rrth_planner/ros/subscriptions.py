@@ -29,13 +29,18 @@ POLL_PERIOD = 0.2
 Stamp = tuple[int, int]
 
 
-def decoded(data: bytes, msg_type: type, most_bytes: int = MOST_BYTES) -> Any:
+def decoded(
+    data: bytes,
+    msg_type: type,
+    most_bytes: int = MOST_BYTES,
+    decode: Callable[[bytes], Any] | None = None,
+) -> Any:
     """Return a message as it came from the wire, or raise MessageError."""
     name = msg_type.__name__
     if len(data) > most_bytes:
         raise MessageError(f'{len(data)} bytes, expected a {name} of at most {most_bytes}')
     try:
-        return deserialize_message(data, msg_type)
+        return deserialize_message(data, msg_type) if decode is None else decode(data)
     except Exception as problem:
         # Whoever may write to a topic may write anything.
         raise MessageError(f'{len(data)} bytes that are no {name}: {problem}') from problem
@@ -106,6 +111,8 @@ class OpenSubscription:
         Gets the MessageError of each message that is too long, or is none of this type.
     way : context manager, optional
         Entered while a message is read and dealt with, again for each.
+    decode : callable, optional
+        Turns the bytes of a message into one; without, rclpy does.
 
     """
 
@@ -118,9 +125,11 @@ class OpenSubscription:
         on_late: Callable[[Any, int, int], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
         way: AbstractContextManager[None] | None = None,
+        decode: Callable[[bytes], Any] | None = None,
     ) -> None:
         """Begin to listen."""
         self._on_refusal, self._way = on_refusal, way or nullcontext()
+        self._decode = decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
@@ -203,7 +212,7 @@ class OpenSubscription:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
         with self._way:
             try:
-                msg = decoded(data, self._msg_type)
+                msg = decoded(data, self._msg_type, decode=self._decode)
             except MessageError as problem:
                 self._on_refusal(problem)
                 return
