@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.depths import depths
+from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.takeover import until
 from rrth_planner.trajectory import positions_at, Trajectory
 from rrth_planner.world import World
@@ -17,8 +18,6 @@ from rrth_planner.world import World
 STRETCHES = 12
 # What it may get deeper all the same: the proof needs a gap, however small [m].
 GAP = 1e-6
-# A bar as good as parallel to a face of the box has no axis across both there.
-PARALLEL = 1e-12
 
 
 def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Array:
@@ -39,25 +38,14 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
     """
     rows = world.obstacles[(len(world.obstacles) - 1) // LANES :].reshape(-1, BOX_ROWS, LANES)
     rows = rows.transpose(1, 0, 2).reshape(BOX_ROWS, -1)[:, np.asarray(world.lanes, np.int64)]
-    axes = rows[:BOX_OFFSET].T.reshape(-1, 3, 3)
     n_bars = len(world.bar_names)
     points = np.empty((len(np.atleast_2d(q)), n_bars + 1, 4))
     rays = np.full(len(points), world.ray_length) if ray_lengths is None else ray_lengths
     for i, one in enumerate(np.atleast_2d(q)):
         world.chain(np.ascontiguousarray(one), float(rays[i]), points[i].reshape(-1), 0)
-    local = np.einsum('mij,nkj->nkmi', axes, points[:, :, :3]) + rows[BOX_OFFSET:BOX_HALF].T
-    middle, f = 0.5 * (local[:, 1:] + local[:, :-1]), 0.5 * (local[:, 1:] - local[:, :-1])
-    half = rows[BOX_HALF:].T + points[:, 1:, None, 3:]
-    depths = (half + np.abs(f) - np.abs(middle)).min(axis=-1)
-    for i, j in ((1, 2), (2, 0), (0, 1)):
-        a, b = np.abs(f[..., i]), np.abs(f[..., j])
-        offset = np.abs(middle[..., i] * f[..., j] - middle[..., j] * f[..., i])
-        overlap = half[..., i] * b + half[..., j] * a - offset
-        across = np.full_like(overlap, np.inf)
-        np.divide(overlap, a + b, out=across, where=a + b > PARALLEL)
-        depths = np.minimum(depths, across)
-    result: Array = depths if np.ndim(q) == 2 else depths[0]
-    return result
+    found = np.empty((len(points), n_bars, rows.shape[1]))
+    depths(np.ascontiguousarray(rows), points, found)
+    return found if np.ndim(q) == 2 else found[0]
 
 
 def relaxed(world: World, by: Array) -> World | None:
@@ -95,13 +83,13 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
 
     """
     times = np.linspace(min(max(begin, 0.0), end), end, STRETCHES + 1)
-    depths = box_depths(world, positions_at(trajectory, times)).max(axis=1, initial=-np.inf)
-    if depths.size == 0:
+    deep = box_depths(world, positions_at(trajectory, times)).max(axis=1, initial=-np.inf)
+    if deep.size == 0:
         return True
-    is_in = depths[0] > -GAP
-    if (depths[-1] > 0.0).any():
+    is_in = deep[0] > -GAP
+    if (deep[-1] > 0.0).any():
         return False
-    allowed = np.where(is_in, np.maximum(depths + GAP, 0.0), 0.0)
+    allowed = np.where(is_in, np.maximum(deep + GAP, 0.0), 0.0)
     if (np.diff(allowed, axis=0) > 0.0).any():
         return False
     for by, (start, stop) in zip(allowed, pairwise(times.tolist()), strict=False):
