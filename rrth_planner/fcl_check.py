@@ -92,6 +92,7 @@ class _Watch:
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.ways = travelled(arm, trajectory, self._times, ray_length)
+        pause()
         self.bars = [Bar(arm, k, ray_length) for k in range(len(self.ways))]
         self._unknown = np.full(len(scene.boxes), -math.inf)
         self.touch: Touch | None = None

@@ -71,6 +71,8 @@ def time_path(
     if should_stop():
         return CANCELLED
     rounded = round_corners(path, grown(world, HAIR), limits)
+    if should_stop():
+        return CANCELLED
     choices = [rounded]
     if lead is not None and lead.speed > 0.0 and rounded:
         # The arm must be slow enough where the first blend begins: a smaller one begins later.

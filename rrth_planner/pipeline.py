@@ -23,6 +23,7 @@ from rrth_planner.path_search import find_path, SPARES
 from rrth_planner.path_timing import time_path
 from rrth_planner.planner import PlanResult
 from rrth_planner.refusal import (
+    CANCELLED,
     depth_sentence,
     lead_refusal,
     Refusal,
@@ -117,7 +118,7 @@ def plan_motion(
             else:
                 refusal = out
     if refusal is None:
-        refusal = target_refusal(scene, goal, margin)
+        refusal = CANCELLED if should_stop() else target_refusal(scene, goal, margin)
     if refusal is None and moving is not None:
         led = _lead(arm, world, moving, limits)
         if isinstance(led, Refusal):

@@ -67,7 +67,7 @@ class LastLook:
     start : Start or None
         None: from rest.
     should_stop : callable
-        Polled while the judges look; what it says is for the caller to ask.
+        Polled between and while the judges look; what it says is for the caller to ask.
 
     """
 
@@ -91,7 +91,9 @@ class LastLook:
         scene = present.scene
         if _is_same(scene, self.inputs.scene):
             return Seen(body, present.joints, scene, None)
+        self.should_stop()
         world = self._require_proof(scene)
+        self.should_stop()
         motion, escape_time = self._motion, self.plan.escape_time
         parameters = self.parameters
         touch = touch_seen(

@@ -63,6 +63,6 @@ class PlanPublishers:
         pause()
         self._tool_path.publish(path)
         pause()
-        self._markers.publish(
-            plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
-        )
+        markers = plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
+        pause()
+        self._markers.publish(markers)
