@@ -41,6 +41,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 def _run(options: argparse.Namespace) -> int:
     from rrth_planner.campaign.store import replace_file
 
+    from benchmarks.processors import OnEachProcessor, stay_awake
     from benchmarks.real_time import is_real_time
     from benchmarks.soak_guard import soak_guard
     from benchmarks.soak_plans import soak_plans
@@ -58,8 +59,9 @@ def _run(options: argparse.Namespace) -> int:
     longest = 60.0 * options.minutes if options.minutes else FOREVER
     plans = guard = None
     watch = StandstillWatch()
-    # Only what goes before all others is late for no other reason.
     with (
+        OnEachProcessor(stay_awake) if options.awake else nullcontext(),
+        # Only what goes before all others is late for no other reason.
         watch if is_real_time() else nullcontext(),
         tempfile.TemporaryDirectory(prefix='rrth-soak-') as name,
     ):
@@ -85,6 +87,7 @@ def _command(options: argparse.Namespace) -> str:
     parts += ['--quick'] if options.quick else []
     parts += [f'--plans {options.plans}'] if options.plans != PLANS else []
     parts += [f'--hands {options.hands}'] if options.hands != HANDS else []
+    parts += ['--awake'] if options.awake else []
     parts += [f'--minutes {options.minutes:g}'] if options.minutes else []
     return ' '.join(parts)
 
@@ -105,6 +108,11 @@ def _parser() -> argparse.ArgumentParser:
         help=f'held into the way of running motions ({HANDS}; 0: none)',
     )
     parser.add_argument('--minutes', type=float, help='the longest time for each of the two parts')
+    parser.add_argument(
+        '--awake',
+        action='store_true',
+        help='keep the processors from sleeping, as `idle=poll` of the kernel does',
+    )
     parser.add_argument(
         '--remark', default='', metavar='TEXT', help='to stand in the report, of the machine say'
     )

@@ -2,13 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Moments in which a processor ran nothing at all: its host, or its kernel, held it up."""
 
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Iterable
 from dataclasses import dataclass
-from multiprocessing import get_context
 from multiprocessing.connection import Connection
-import os
-import signal
 from threading import get_native_id
 import time
 from typing import Any
@@ -16,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.processors import OnEachProcessor
 from benchmarks.real_time import put_ahead
 
 # The clock is looked at so often; the machine stood still where that was so late [ns].
@@ -79,45 +76,30 @@ class StandstillWatch:
     def __init__(self) -> None:
         """Begin with nobody who watches."""
         self.found: Standstills | None = None
-        self._watchers: list[tuple[Any, Connection]] = []
+        self._watchers = OnEachProcessor(watch)
 
     def __enter__(self) -> 'StandstillWatch':
         """Begin to watch."""
-        context = get_context('spawn')
-        for core in sorted(os.sched_getaffinity(0)):
-            ours, theirs = context.Pipe()
-            process = context.Process(target=_watch, args=(core, theirs), daemon=True)
-            process.start()
-            theirs.close()
-            self._watchers.append((process, ours))
-        for _, pipe in self._watchers:
-            pipe.recv()
+        self._watchers.__enter__()
         self._begin = time.time_ns()
         return self
 
     def __exit__(self, *_: Any) -> None:
         """End it; then it is known what was found."""
-        span, found = time.time_ns() - self._begin, []
-        for process, pipe in self._watchers:
-            pipe.send(None)
-            found += pipe.recv()
-            process.join()
-        self.found = united(found, span)
+        span = time.time_ns() - self._begin
+        self._watchers.__exit__()
+        self.found = united((moment for found in self._watchers.results for moment in found), span)
 
     @property
-    def pids(self) -> Sequence[int]:
+    def pids(self) -> list[int]:
         """The numbers of the processes that watch."""
-        return [process.pid for process, _ in self._watchers]
+        return self._watchers.pids
 
 
-def _watch(core: int, pipe: Connection) -> None:
-    """Look at the clock until something comes through a pipe, then send when it was late."""
-    # Whoever interrupts the soak wants to know it, too.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.sched_setaffinity(0, {core})
+def watch(pipe: Connection) -> list[tuple[int, int]]:
+    """Look at the clock until something comes through a pipe; return when it was late [ns]."""
     put_ahead(get_native_id(), by=AHEAD)
     found = []
-    pipe.send(None)
     before = time.monotonic_ns()
     while not pipe.poll():
         time.sleep(PERIOD * 1e-9)
@@ -126,5 +108,4 @@ def _watch(core: int, pipe: Connection) -> None:
             present = time.time_ns()
             found.append((present - (now - before), present))
         before = now
-    with suppress(BrokenPipeError):
-        pipe.send(found)
+    return found

@@ -17,6 +17,7 @@ pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
 from benchmarks import soak, soak_contacts as contacts, soak_judge as judge  # noqa: E402
+from benchmarks.processors import OnEachProcessor, stay_awake  # noqa: E402
 from benchmarks.real_time import is_real_time, put_ahead, scheduling  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
@@ -31,6 +32,7 @@ from benchmarks.soak_guard import GuardRecord  # noqa: E402
 from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
 from benchmarks.soak_report import draw_memory, guard_targets, plan_targets, report  # noqa: E402
 from benchmarks.standstill import StandstillWatch, united  # noqa: E402
+import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
@@ -279,6 +281,21 @@ def test_moments_in_which_a_processor_stood_still_are_found():
     assert end - begin <= found.span
     assert (found.begins[1:] > found.ends[:-1]).all()
     assert 'at most' in found.sentence()
+
+
+def test_processors_are_kept_awake_by_what_gives_way_to_all_others():
+    with OnEachProcessor(stay_awake) as awake:
+        pids = awake.pids
+        assert {os.sched_getscheduler(pid) for pid in pids} <= {os.SCHED_IDLE, os.SCHED_OTHER}
+        end = time.monotonic() + 20.0
+        while min(sum(psutil.Process(pid).cpu_times()[:2]) for pid in pids) < 0.5:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        assert {os.sched_getscheduler(pid) for pid in pids} == {os.SCHED_IDLE}
+        cores = [os.sched_getaffinity(pid) for pid in pids]
+    assert sorted(core for one in cores for core in one) == sorted(os.sched_getaffinity(0))
+    assert not any(psutil.pid_exists(pid) for pid in pids)
+    assert awake.results == [None] * len(pids)
 
 
 def test_moments_of_several_processors_are_united():
