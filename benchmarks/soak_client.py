@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+import re
 import time
 from typing import Any
 
@@ -23,6 +24,8 @@ from benchmarks.client import Client, LATCHED
 # A call that is not answered within this counts as unanswered [s].
 PATIENCE = 10.0
 DEPTH = 1000
+# What the node logs of a brake: when [s], and how long after the body came it was published [ms].
+BRAKE = re.compile(r'\[(\d+\.\d+)\].*: the arm brakes.*; published after ([\d.]+) ms')
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +131,15 @@ class SoakClient(Client):
     def _on_diagnostics(self, msg: DiagnosticArray) -> None:
         self.figures = {pair.key: pair.value for pair in msg.status[0].values}
         self.on_figures(self.figures)
+
+
+def brakes_in(line: str) -> list[tuple[int, float]]:
+    """Return when the body came of a brake that a line of the log tells of, and what it took."""
+    found = BRAKE.search(line)
+    if found is None:
+        return []
+    logged, took = round(1e9 * float(found[1])), float(found[2])
+    return [(logged - round(1e6 * took), took)]
 
 
 def process_of(module: str) -> psutil.Process:

@@ -24,7 +24,7 @@ from benchmarks.client import ros_client
 from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, NO_HAND
-from benchmarks.soak_client import Published, SoakClient, threads_of
+from benchmarks.soak_client import brakes_in, Published, SoakClient, threads_of
 from benchmarks.soak_contacts import Episode, judge_episode, MISSED, TOUCHED
 from benchmarks.soak_judge import RAY
 
@@ -55,6 +55,8 @@ class GuardRecord:
     suspects : list of (str, BodyAt, float, float)
         Of each hand that was missed or touched though it need not be: the word, the body with it,
         and when it came since the motion began, which takes so long [s].
+    brakes : list of (int, float)
+        As from `brakes_in`.
     said : Counter
         What the logs of both nodes say of brakes that are not safe and of refusals.
     figures : dict
@@ -70,6 +72,7 @@ class GuardRecord:
     episodes: list[Episode] = field(default_factory=list)
     outcomes: Counter = field(default_factory=Counter)
     suspects: list[tuple[str, BodyAt, float, float]] = field(default_factory=list)
+    brakes: list[tuple[int, float]] = field(default_factory=list)
     said: Counter = field(default_factory=Counter)
     figures: dict[str, str] = field(default_factory=dict)
     is_interrupted: bool = False
@@ -81,6 +84,7 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
     record = GuardRecord()
 
     def listen(line: str) -> None:
+        record.brakes += brakes_in(line)
         if 'not proven safe either' in line:
             record.said['braking not proven safe'] += 1
         if 'the arm goes on' in line:

@@ -19,12 +19,12 @@ from benchmarks.client import ros_client
 from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
-from benchmarks.soak_client import process_of, SoakClient, threads_of
+from benchmarks.soak_client import brakes_in, process_of, SoakClient, threads_of
 from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, name_of, newest_before, RAY
 
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
-ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'replan:=false', '--log-level', 'error']
+ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'replan:=false', '--log-level', 'warn']
 # Plans round one wearer, fewest starts of so many drawn, plans between looks at the memory.
 PER_WEARER, STARTS, DRAWS, SAMPLE = 1000, 30, 2000, 20
 # Bodies before a motion that it may have been planned round.
@@ -68,6 +68,8 @@ class PlansRecord:
         how long before that the bodies were sent, the newest first [s].
     n_motions : int
         That were published.
+    brakes : list of (int, float)
+        As from `brakes_in`.
     elapsed : float
         [s].
     is_interrupted : bool
@@ -87,6 +89,7 @@ class PlansRecord:
     verdicts: Counter = field(default_factory=Counter)
     suspects: list[tuple[str, int, list[float]]] = field(default_factory=list)
     n_motions: int = 0
+    brakes: list[tuple[int, float]] = field(default_factory=list)
     elapsed: float = 0.0
     is_interrupted: bool = False
 
@@ -109,7 +112,7 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
     record = PlansRecord()
     with (
         ros_client(lambda: SoakClient(folder)) as client,
-        ChildProcess(NODE, ARGUMENTS, lambda _: None) as child,
+        ChildProcess(NODE, ARGUMENTS, lambda line: record.brakes.extend(brakes_in(line))) as child,
     ):
         client.wait_for_service(child)
         put_ahead(*threads_of(NODE))

@@ -18,8 +18,9 @@ from benchmarks.soak_plans import PlansRecord
 from benchmarks.standstill import Standstills
 from benchmarks.task import origin
 
-# A brake is to be published within this after its body was sent [ns].
-MOMENT = 5_000_000
+# A brake came while the machine ran where nothing stood still from so long before its body, whose
+# time is known from the log a little late, until so long after [ns].
+EARLIER, MOMENT = 1_000_000, 5_000_000
 # For so long after a hand came that was missed it is said whether the machine ran [ns].
 AFTERWARDS = 1_000_000_000
 HEADER = ('what', 'target', 'measured', 'met')
@@ -57,10 +58,11 @@ def report(
     """Return the report in Markdown; a part that was not run is left out."""
     made = origin()
     commit = f', commit {made["commit"]}' if made['commit'] else ''
+    brakes = [brake for part in (plans, guard) if part for brake in part.brakes]
     lines = [
         *(plan_targets(plans) if plans else []),
         *(guard_targets(guard) if guard else []),
-        *([_running_line(guard, still)] if guard and still else []),
+        *([_running_line(brakes, still)] if brakes and still else []),
     ]
     parts = [
         '# Reliability',
@@ -187,21 +189,15 @@ def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
     )
 
 
-def _running_line(guard: GuardRecord, still: Standstills) -> list[str]:
-    """Return the line of the target of the brakes in whose first moment the machine ran."""
-    taken = [e.published[0][0] - e.body.sent for e in guard.episodes if e.published]
-    begins = [e.body.sent for e in guard.episodes if e.published]
-    runs = [
-        1e-6 * t
-        for t, begin in zip(taken, begins, strict=True)
-        if not still.within(begin, begin + MOMENT)
-    ]
-    p99 = float(np.percentile(runs, 99)) if runs else np.nan
+def _running_line(brakes: Sequence[tuple[int, float]], still: Standstills) -> list[str]:
+    """Return the line of the target of the brakes while the machine ran."""
+    # Whether it did is asked of the same time of each, however long it took.
+    runs = [took for came, took in brakes if not still.within(came - EARLIER, came + MOMENT)]
+    p99 = float(np.percentile(runs, 99, method='higher')) if runs else np.nan
     return _line(
-        'body sent to braking trajectory published, p99, unless the machine stood still in the '
-        f'{MOMENT * 1e-6:g} ms after the body',
+        'body to braking trajectory in either part, p99, of those that came while the machine ran',
         f'{BRAKED:g} ms',
-        f'{p99:.2f} ms, {len(runs)} of {len(taken)} times',
+        f'{p99:.2f} ms, {len(runs)} of {len(brakes)} times',
         p99 <= BRAKED,
     )
 

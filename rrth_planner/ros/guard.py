@@ -254,11 +254,12 @@ class Guard:
         )
         self._say(Watch.BRAKING, sentence)
         self._reporter.braked(took)
+        logged = f'{sentence}; published after {1e3 * took:.2f} ms'
         # A line each: rclpy raises where one and the same line logs at another severity.
         if warning:
-            self._node.get_logger().error(sentence)
+            self._node.get_logger().error(logged)
         else:
-            self._node.get_logger().warning(sentence)
+            self._node.get_logger().warning(logged)
         if not warning and goal is not None and len(scene.boxes):
             self.judge(stopped.trajectory, scene, goal, parameters)
         if self._reporter.parameters.replan and goal is not None:

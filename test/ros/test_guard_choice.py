@@ -3,6 +3,7 @@
 """What the guard does with arms that lag, lie or do not hear, and with stops that touch."""
 
 from dataclasses import replace
+import re
 from threading import RLock
 import time
 from types import SimpleNamespace
@@ -49,13 +50,13 @@ class Watched:
             accelerations=still,
         )
         self.now = 100.0 + PHASE
-        self.published, self.said = [], []
+        self.published, self.said, self.took = [], [], []
         self.reporter = SimpleNamespace(
             parameters=replace(declare_parameters(node), replan=False),
             guard=('', ''),
             publish_soon=lambda: None,
             recertified=lambda took: self.said.append('free'),
-            braked=lambda took: self.said.append('braked'),
+            braked=lambda took: self.said.append('braked') or self.took.append(took),
         )
         self.heard = Inputs('body', 'target', 'joints')
         publishers = SimpleNamespace(
@@ -138,6 +139,8 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     assert judged == ([] if ahead < 0.3 else [stop])
     level = 'ERROR' if ahead < 0.3 else 'WARN'
     (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
+    took = float(re.search('; published after (.*) ms$', line)[1])
+    assert took == pytest.approx(1e3 * watched.took[0], abs=0.01)
     assert level in line
 
 
