@@ -313,12 +313,14 @@ def test_moments_of_several_processors_are_united():
 
 
 def test_a_brake_is_read_from_the_log():
-    line = '[WARN] [1700000000.500000000] [rrth_planner]: the wearer moved into the way: the arm '
-    told = 'brakes, at rest in 0.12 s; published after 2.50 ms'
-    assert brakes_in(line + told) == [(1_700_000_000_497_500_000, 2.5)]
+    line = 'WARN: the wearer moved into the way: the arm '
+    told = 'brakes, at rest in 0.12 s; published after 20.50 ms'
+    before = time.time_ns()
+    ((came, took),) = brakes_in(line + told)
+    assert took == 20.5
+    assert before <= came + 20_500_000 <= time.time_ns()
     assert brakes_in(line + told.replace('; published', '; braking is not proven; published'))
     assert brakes_in(line + 'goes on') == []
-    assert brakes_in('the arm brakes') == []
 
 
 def test_brakes_are_judged_apart_where_the_machine_ran():
