@@ -15,12 +15,18 @@ def quick_decoder(msg_type: type) -> Callable[[bytes], Any]:
 
     rosbags makes its code from the definition of the type that is installed here; its messages
     are of its own types. What it does not take, rclpy is asked for, which raises where it does
-    not either; it does all where rosbags is not installed.
+    not either; it does all where rosbags or the definition is not installed.
     """
     try:
-        from rosbags.typesys import get_types_from_msg, get_typestore, Stores
-    except ImportError:
+        return _decoder_of(msg_type)
+    except Exception:
+        # It is quicker, that is all: no node stays away for it.
         return lambda data: deserialize_message(data, msg_type)
+
+
+def _decoder_of(msg_type: type) -> Callable[[bytes], Any]:
+    from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+
     store, name = get_typestore(Stores.EMPTY), type_name(msg_type)
     types = get_types_from_msg(definition_of(msg_type), name)
     # Constants would be set anew in each message.

@@ -12,6 +12,7 @@ pytest.importorskip('rosbags')
 
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.ros import quick_decoding  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402
 from rrth_planner.ros.quick_decoding import quick_decoder  # noqa: E402
 from rrth_planner.ros.subscriptions import decoded  # noqa: E402
@@ -114,8 +115,15 @@ def test_boxes_are_read_from_it_bit_by_bit():
     assert any(e.part is not None for e in one)
 
 
-def test_without_rosbags_rclpy_decodes(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'rosbags.typesys', None)
+@pytest.mark.parametrize('missing', ['rosbags', 'definition'])
+def test_without_rosbags_or_the_definition_rclpy_decodes(monkeypatch, missing):
+    def not_found(_):
+        raise MessageError('not found')
+
+    if missing == 'rosbags':
+        monkeypatch.setitem(sys.modules, 'rosbags.typesys', None)
+    else:
+        monkeypatch.setattr(quick_decoding, 'definition_of', not_found)
     found = quick_decoder(MarkerArray)(serialize_message(wearer()))
     assert found == wearer()
     assert isinstance(found.markers[0], Marker)
