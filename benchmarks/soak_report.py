@@ -225,8 +225,10 @@ def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:
     """Return the line of the target of the brakes."""
     braked = figures.get('brakes', '')
     p99 = _milliseconds(braked, 'p99')
-    measured = f'{p99:.2f} ms, {braked.split(",")[0]} times'
-    return _line(what, f'{BRAKED:g} ms', measured, p99 <= BRAKED)
+    n_brakes = braked.split(',')[0]
+    # Where nothing was measured nothing is met.
+    is_met = n_brakes != '0' and p99 <= BRAKED
+    return _line(what, f'{BRAKED:g} ms', f'{p99:.2f} ms, {n_brakes} times', is_met)
 
 
 def _line(what: str, target: str, measured: object, is_met: bool) -> list[str]:

@@ -160,6 +160,7 @@ def test_each_fault_misses_its_target():
         ({'n_sent': 8}, 'heard'),
         ({'figures': FIGURES | {'refused messages, body': '1'}}, 'heard'),
         ({'figures': FIGURES | {'brakes': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
+        ({'figures': FIGURES | {'brakes': '0, last 0 ms, p50 0 ms, p99 0 ms'}}, 'busy'),
         ({'ages': [0.01, 0.06]}, 'age'),
         ({'ages': []}, 'age'),
         ({'memory': leaking}, 'memory'),
