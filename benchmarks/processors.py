@@ -7,11 +7,14 @@ from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 import os
+from pathlib import Path
 import signal
 from typing import Any
 
 # Of nothing at all between two looks at whether it is over.
 SPINS = 100_000
+# What the kernel says of the processors, and of what a container may have of them.
+CPUINFO, CPU_MAX = Path('/proc/cpuinfo'), Path('/sys/fs/cgroup/cpu.max')
 
 
 class OnEachProcessor:
@@ -48,7 +51,9 @@ class OnEachProcessor:
     def __exit__(self, *_: Any) -> None:
         """End it; `results` are what it returned."""
         for process, pipe in self._processes:
-            pipe.send(None)
+            # It may be over by itself.
+            with suppress(BrokenPipeError):
+                pipe.send(None)
             self.results.append(pipe.recv())
             process.join()
 
@@ -70,7 +75,24 @@ def _do(core: int, work: Callable[[Connection], Any], pipe: Connection) -> None:
 
 def stay_awake(pipe: Connection) -> None:
     """Keep a processor from sleeping; whatever else is to run on it goes first."""
-    os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    try:
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+    except OSError:
+        # A container may forbid it, and at any other priority others would have to wait.
+        return
     while not pipe.poll():
         for _ in range(SPINS):
             pass
+
+
+def lose_time_asleep() -> bool:
+    """
+    Return whether processors that sleep come back late, and may be kept awake.
+
+    The host of a virtual machine hands a halted processor to others, and takes up to tens of
+    milliseconds to give it back. In a container with a quota keeping awake would use that up.
+    """
+    if not hasattr(os, 'SCHED_IDLE') or not CPUINFO.exists():
+        return False
+    has_quota = CPU_MAX.exists() and not CPU_MAX.read_text().startswith('max')
+    return not has_quota and ' hypervisor' in CPUINFO.read_text()

@@ -9,3 +9,21 @@ _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
 _run = os.getppid() if 'PYTEST_XDIST_WORKER' in os.environ else os.getpid()
 os.environ['ROS_DOMAIN_ID'] = str(1 + (7 * _run + int(_worker.removeprefix('gw'))) % 100)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from contextlib import ExitStack  # noqa: E402
+
+from benchmarks.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
+
+_session = ExitStack()
+
+
+def pytest_sessionstart(session):
+    """Keep a virtual machine's processors awake, so that tests of several processes are not late."""
+    # Workers are of a session that does so.
+    if 'PYTEST_XDIST_WORKER' not in os.environ and lose_time_asleep():
+        _session.enter_context(OnEachProcessor(stay_awake))
+
+
+def pytest_sessionfinish(session):
+    """Let them sleep again."""
+    _session.close()

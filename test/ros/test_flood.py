@@ -30,12 +30,13 @@ TOPICS = {
     'joint_states': (JointState, samples.joints),
 }
 RATE, N_ASKED = 2000.0, 25
-# Median and worst of the answers [s]; machines that test many things at once are noisy.
-MEDIAN, WORST = 0.1, 0.3
+# So many messages of the flood may come before an answer, in the median and the worst: those of
+# 0.1 s and 0.3 s. In seconds it would be the machine that is tested.
+MEDIAN, WORST = 200, 600
 
 
-def flood(topic, namespace):
-    """Publish on a topic at the rate until the process is ended, and say how fast that was."""
+def flood(topic, namespace, counter):
+    """Publish on a topic at the rate until the process is ended, and count in a file."""
     import rclpy
 
     rclpy.init()
@@ -43,20 +44,16 @@ def flood(topic, namespace):
     kind, make = TOPICS[topic]
     profile = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
     publisher, msg = node.create_publisher(kind, topic, profile), make()
-    begin = told = time.monotonic()
-    n = n_told = 0
+    count = np.memmap(counter, dtype=np.int64, mode='r+', shape=())
+    due = time.monotonic()
     while True:
         publisher.publish(msg)
-        n += 1
+        count[...] += 1
         now = time.monotonic()
-        if now - told > 1.0:
-            print((n - n_told) / (now - told), flush=True)
-            told, n_told = now, n
-        ahead = begin + n / RATE - now
-        if ahead > 0.0:
-            time.sleep(ahead)
-        elif ahead < -0.1:
-            begin, n, n_told = now, 0, 0
+        # What it could not publish in time it does not make up for.
+        due = max(due + 1.0 / RATE, now - 0.1)
+        if due > now:
+            time.sleep(due - now)
 
 
 @pytest.fixture(name='client', scope='module')
@@ -89,31 +86,30 @@ def _planner(ros_context, udp):
 
 @pytest.mark.parametrize('topic', TOPICS)
 def test_requests_are_answered_while_a_topic_is_flooded(
-    client, planner, spinning, tell, wait_until, monkeypatch, topic
+    client, planner, spinning, tell, wait_until, monkeypatch, tmp_path, topic
 ):
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join(sys.path))
-    rates, answers, times = [], [], []
-    arguments = [topic, '/flooded']
+    count = np.memmap(tmp_path / 'count', dtype=np.int64, mode='w+', shape=())
+    arguments = [topic, '/flooded', str(tmp_path / 'count')]
+    answers, waits = [], []
     with spinning(client):
         wait_until(client.plan.service_is_ready, 120.0)
         for name, (_, make) in TOPICS.items():
             tell(client, client.publishers_of[name], make())
-        with ChildProcess('test_flood', arguments, lambda line: rates.append(float(line))) as it:
-            wait_until(lambda: rates)
+        with ChildProcess('test_flood', arguments, lambda _: None) as it:
+            wait_until(lambda: count > RATE)
             for _ in range(N_ASKED):
-                begin = time.monotonic()
+                begin = int(count)
                 future = client.plan.call_async(Trigger.Request())
                 wait_until(future.done)
-                times.append(time.monotonic() - begin)
+                waits.append(int(count) - begin)
                 answers.append(future.result())
                 it.check()
                 planner.check()
                 time.sleep(0.02)
-    median, worst = np.median(times), max(times)
-    print(f'{topic} at {min(rates):.0f} Hz: median {median * 1e3:.1f} ms, {worst * 1e3:.1f} ms')
     assert all(a.success for a in answers), [a.message for a in answers]
-    assert median <= MEDIAN
-    assert worst <= WORST
+    assert 0 < np.median(waits) <= MEDIAN, waits
+    assert max(waits) <= WORST, waits
 
 
 if __name__ == '__main__':
