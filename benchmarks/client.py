@@ -39,6 +39,8 @@ class Client(Node):
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = self.create_publisher(JointState, 'joint_states', LATCHED)
         self._plan = self.create_client(Trigger, 'rrth_planner/plan')
+        # What was told last of each topic.
+        self.told: dict[str, Any] = {}
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
@@ -100,6 +102,7 @@ class Client(Node):
             time.sleep(0.002)
         publisher.publish(message)
         publisher.wait_for_all_acked()
+        self.told[publisher.topic.rpartition('/')[2]] = message
 
 
 T = TypeVar('T', bound=Client)

@@ -17,6 +17,7 @@ MISSING = """{}: not installed, and nothing can be soaked without; install what 
     ./run exec python -m pip install -r requirements/benchmark.txt"""
 PLANS, QUICK = 100_000, 500
 HANDS, QUICK_HANDS = 300, 15
+FLOODED, QUICK_FLOODED = 200, 20
 FOREVER = 1e9
 SWITCH_INTERVAL = 2e-4
 
@@ -43,6 +44,7 @@ def _run(options: argparse.Namespace) -> int:
 
     from benchmarks.processors import OnEachProcessor, stay_awake
     from benchmarks.real_time import is_real_time
+    from benchmarks.soak_flood import FloodRecord, soak_floods
     from benchmarks.soak_guard import soak_guard
     from benchmarks.soak_plans import soak_plans
     from benchmarks.soak_report import draw_memory, report
@@ -56,8 +58,10 @@ def _run(options: argparse.Namespace) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL)
     n_plans = QUICK if options.quick else options.plans
     n_hands = QUICK_HANDS if options.quick else options.hands
+    n_flooded = QUICK_FLOODED if options.quick else options.flooded
     longest = 60.0 * options.minutes if options.minutes else FOREVER
     plans = guard = None
+    floods: list[FloodRecord] = []
     watch = StandstillWatch()
     with (
         OnEachProcessor(stay_awake) if options.awake else nullcontext(),
@@ -69,16 +73,19 @@ def _run(options: argparse.Namespace) -> int:
             plans = soak_plans(n_plans, longest, Path(name))
         if n_hands and not (plans and plans.is_interrupted):
             guard = soak_guard(n_hands, longest, Path(name))
+        parts = [part for part in (plans, guard) if part]
+        if n_flooded and not any(part.is_interrupted for part in parts):
+            floods = soak_floods(n_flooded, Path(name))
     default = Path('build/reliability.md' if options.quick else 'docs/reliability.md')
     target = options.output or default
     target.parent.mkdir(parents=True, exist_ok=True)
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
-    text = report(plans, guard, _command(options), options.remark, watch.found)
+    text = report(plans, guard, _command(options), options.remark, watch.found, floods)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')
-    return 130 if any(part and part.is_interrupted for part in (plans, guard)) else 0
+    return 130 if any(part.is_interrupted for part in (*parts, *floods)) else 0
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -87,6 +94,7 @@ def _command(options: argparse.Namespace) -> str:
     parts += ['--quick'] if options.quick else []
     parts += [f'--plans {options.plans}'] if options.plans != PLANS else []
     parts += [f'--hands {options.hands}'] if options.hands != HANDS else []
+    parts += [f'--flooded {options.flooded}'] if options.flooded != FLOODED else []
     parts += ['--awake'] if options.awake else []
     parts += [f'--minutes {options.minutes:g}'] if options.minutes else []
     return ' '.join(parts)
@@ -95,7 +103,9 @@ def _command(options: argparse.Namespace) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog='python -m benchmarks.soak', description=__doc__)
     parser.add_argument(
-        '--quick', action='store_true', help=f'{QUICK} plans, {QUICK_HANDS} hands: two minutes'
+        '--quick',
+        action='store_true',
+        help=f'{QUICK} plans, {QUICK_HANDS} hands, {QUICK_FLOODED} requests: two minutes',
     )
     parser.add_argument(
         '--plans', type=_count, default=PLANS, metavar='N', help=f'how many ({PLANS}; 0: none)'
@@ -107,7 +117,14 @@ def _parser() -> argparse.ArgumentParser:
         metavar='N',
         help=f'held into the way of running motions ({HANDS}; 0: none)',
     )
-    parser.add_argument('--minutes', type=float, help='the longest time for each of the two parts')
+    parser.add_argument(
+        '--flooded',
+        type=_count,
+        default=FLOODED,
+        metavar='N',
+        help=f'requests while a topic is flooded, for each ({FLOODED}; 0: none)',
+    )
+    parser.add_argument('--minutes', type=float, help='the longest time for plans, and for hands')
     parser.add_argument(
         '--awake',
         action='store_true',

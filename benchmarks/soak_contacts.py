@@ -89,6 +89,24 @@ def word_of_going_on(arm: ArmModel, scene: Scene, left: Array) -> str:
     return LED_AWAY if min(gaps) > gaps[0] - NEARER and gaps[-1] > MARGIN - SLACK else MISSED
 
 
+def sentence_on(arm: ArmModel, episode: Episode) -> str:
+    """Return when a hand came, what was published then, and what it touched."""
+    sent = episode.body.sent
+    told = ', '.join(f'{1e-6 * (published - sent):.1f}' for published, _ in episode.published)
+    after = episode.times >= sent
+    scene, q = scene_of_body(episode.body), episode.positions[after]
+    touch = first_contact(arm, scene, q, 0.0, 0.0)
+    contact = ''
+    if touch is not None:
+        late = 1e-6 * (episode.times[after][touch.index] - sent)
+        contact = f'; bar {touch.bar} seen to touch box "{touch.box}" {late:.1f} ms after it'
+    return (
+        f'the hand came {episode.phase:.3f} s after the begin of a motion of '
+        f'{episode.motion.duration:.3f} s, motions were published {told or "no"} ms after it'
+        f'{contact}'
+    )
+
+
 def touch_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
     """Return how the arm touched the body after the hand came; empty where it did not."""
     after = episode.times >= episode.body.sent

@@ -23,9 +23,9 @@ from trajectory_msgs.msg import JointTrajectory
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
 from benchmarks.real_time import put_ahead
-from benchmarks.soak_body import BodyAt, BodyStream, NO_HAND
+from benchmarks.soak_body import BodyStream, NO_HAND
 from benchmarks.soak_client import brakes_in, Published, SoakClient, threads_of
-from benchmarks.soak_contacts import Episode, judge_episode, MISSED, TOUCHED
+from benchmarks.soak_contacts import Episode, judge_episode, MISSED, sentence_on, TOUCHED
 from benchmarks.soak_judge import RAY
 
 PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
@@ -52,9 +52,9 @@ class GuardRecord:
         A hand each.
     outcomes : Counter
         Of the words of `judge_episode`, and of how the motions went on.
-    suspects : list of (str, BodyAt, float, float)
-        Of each hand that was missed or touched though it need not be: the word, the body with it,
-        and when it came since the motion began, which takes so long [s].
+    suspects : list of (str, int, str)
+        Of each hand that was missed or touched though it need not be: the word, when it came
+        [ns], and `sentence_on` it.
     brakes : list of (int, float)
         As from `brakes_in`.
     said : Counter
@@ -71,7 +71,7 @@ class GuardRecord:
     n_refused: int = 0
     episodes: list[Episode] = field(default_factory=list)
     outcomes: Counter = field(default_factory=Counter)
-    suspects: list[tuple[str, BodyAt, float, float]] = field(default_factory=list)
+    suspects: list[tuple[str, int, str]] = field(default_factory=list)
     brakes: list[tuple[int, float]] = field(default_factory=list)
     said: Counter = field(default_factory=Counter)
     figures: dict[str, str] = field(default_factory=dict)
@@ -114,8 +114,8 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
         words = judge_episode(load_arm(), episode)
         record.outcomes.update(words)
         for word in {MISSED, TOUCHED}.intersection(words):
-            times = episode.phase, episode.motion.duration
-            record.suspects.append((word, episode.body, *times))
+            sentence = sentence_on(load_arm(), episode)
+            record.suspects.append((word, episode.body.sent, sentence))
     return record
 
 

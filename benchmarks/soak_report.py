@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of a soak, docs/reliability.md: what was seen in, Markdown out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -10,22 +10,19 @@ import numpy as np
 from rrth_planner.campaign.statistics import markdown_table
 from rrth_planner.campaign.store import replace_file
 
-from benchmarks import soak_contacts as contacts
 from benchmarks.real_time import scheduling
+from benchmarks.soak_flood import FloodRecord
 from benchmarks.soak_guard import GuardRecord
-from benchmarks.soak_judge import FREE, growth_of, name_of
+from benchmarks.soak_judge import name_of
 from benchmarks.soak_plans import PlansRecord
+from benchmarks.soak_targets import flood_target, guard_targets, plan_targets, running_target
 from benchmarks.standstill import Standstills
 from benchmarks.task import origin
 
-# A brake came while the machine ran where nothing stood still from so long before its body, whose
-# time is known from the log a little late, until so long after [ns].
-EARLIER, MOMENT = 5_000_000, 5_000_000
 # For so long after a hand came that was missed it is said whether the machine ran [ns].
 AFTERWARDS = 1_000_000_000
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
-MOST_GROWTH, MOST_AGE, RECERTIFIED, BRAKED = 5.0, 0.05, 0.3, 5.0
 METHOD = """\
 - **Plans**: the planner node is a process of its own, with `replan:=false`. The client
   publishes the body at 100 Hz from a thread, boxes that sway at no more than 5 cm/s, limbs
@@ -45,7 +42,9 @@ METHOD = """\
   judged against the boxes without any margin until the arm rests. The time from the body to the
   brake as the client sees it counts from the first body with the hand, even where going on was
   less bad for a while; the node's own counts from when the middleware received the body that it
-  braked for, to when the trajectory was published."""
+  braked for, to when the trajectory was published.
+- **Flooded**: another process repeats one message 2,000 times a second while the client asks
+  for plans from where the arm is to a target, 20 ms after each answer."""
 
 
 def report(
@@ -54,6 +53,7 @@ def report(
     command: str,
     remark: str = '',
     still: Standstills | None = None,
+    floods: Sequence[FloodRecord] = (),
 ) -> str:
     """Return the report in Markdown; a part that was not run is left out."""
     made = origin()
@@ -62,7 +62,8 @@ def report(
     lines = [
         *(plan_targets(plans) if plans else []),
         *(guard_targets(guard) if guard else []),
-        *([_running_line(brakes, still)] if brakes and still else []),
+        *([running_target(brakes, still)] if brakes and still else []),
+        *([flood_target(floods)] if floods else []),
     ]
     parts = [
         '# Reliability',
@@ -71,7 +72,7 @@ def report(
         f'{made["numba_version"]}{commit}. Client and nodes run {scheduling()}.',
         *(
             ['**Interrupted**: what stands here is what had been seen until then.']
-            if any(part and part.is_interrupted for part in (plans, guard))
+            if any(part and part.is_interrupted for part in (plans, guard, *floods))
             else []
         ),
         *([still.sentence()] if still else []),
@@ -84,52 +85,9 @@ def report(
         parts += [f'![Memory of the planner node](images/reliability/{PICTURE})']
     if guard:
         parts += ['## Hands in the way of running motions', _guard_text(guard, still)]
+    if floods:
+        parts += ['## Topics that are flooded', _flood_text(floods)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
-
-
-def plan_targets(plans: PlansRecord) -> list[list[str]]:
-    """Return the lines of targets of the plans."""
-    unsafe = sum(n for (word, _), n in plans.verdicts.items() if word != FREE)
-    n_judged = sum(plans.verdicts.values())
-    heard = int(plans.figures.get('good messages, body', 0))
-    refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('refused messages'))
-    growth = growth_of([m for _, m in plans.memory]).growth if plans.memory else np.nan
-    age = max(plans.ages, default=np.nan)
-    return [
-        _line('calls without an answer', '0', plans.n_unanswered, plans.n_unanswered == 0),
-        _line(
-            'published motions that are not free of the body',
-            '0',
-            f'{unsafe} of {n_judged} judged',
-            unsafe == 0 and n_judged == plans.n_motions,
-        ),
-        _line(
-            'bodies that were sent and not heard, or refused',
-            '0',
-            f'{plans.n_sent - heard} of {plans.n_sent}, {refused} messages refused',
-            plans.n_sent == heard and refused == 0,
-        ),
-        _line('age of the body, at most', '50 ms', f'{1e3 * age:.0f} ms', age < MOST_AGE),
-        _line('memory after the first tenth', '< 5 MB', f'{growth:+.2f} MB', growth < MOST_GROWTH),
-        _brake_line('body to braking trajectory in the busy node, p99', plans.figures),
-    ]
-
-
-def guard_targets(guard: GuardRecord) -> list[list[str]]:
-    """Return the lines of targets of the guard."""
-    held = _milliseconds(guard.figures.get('motions held against a new body', ''), 'p50')
-    bad = guard.outcomes[contacts.TOUCHED] + guard.outcomes[contacts.MISSED]
-    return [
-        _line(
-            'holding a running motion against a body, median',
-            f'{RECERTIFIED} ms',
-            f'{held:.3f} ms',
-            held <= RECERTIFIED,
-        ),
-        _brake_line('body to braking trajectory in the node, p99', guard.figures),
-        _line('contacts that braking could have avoided', '0', bad, bad == 0),
-        _line('arm that cannot go on', 'never', guard.stuck or 'never', not guard.stuck),
-    ]
 
 
 def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
@@ -173,9 +131,8 @@ def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
             f'{len(guard.episodes)} hands in {guard.n_motions} motions.',
             markdown_table(('what', 'times'), counts),
             *(
-                f'- {word}: the hand came {phase:.3f} s after the begin of a motion of '
-                f'{duration:.3f} s{_stillness(still, body.sent, body.sent + AFTERWARDS)}'
-                for word, body, phase, duration in guard.suspects
+                f'- {word}: {sentence}{_stillness(still, sent_at, sent_at + AFTERWARDS)}'
+                for word, sent_at, sentence in guard.suspects
             ),
             markdown_table(("the node's own figures", ''), figures),
             markdown_table(
@@ -189,17 +146,12 @@ def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
     )
 
 
-def _running_line(brakes: Sequence[tuple[int, float]], still: Standstills) -> list[str]:
-    """Return the line of the target of the brakes while the machine ran."""
-    # Whether it did is asked of the same time of each, however long it took.
-    runs = [took for came, took in brakes if not still.within(came - EARLIER, came + MOMENT)]
-    p99 = float(np.percentile(runs, 99, method='higher')) if runs else np.nan
-    return _line(
-        'body to braking trajectory in either part, p99, of those that came while the machine ran',
-        f'{BRAKED:g} ms',
-        f'{p99:.2f} ms, {len(runs)} of {len(brakes)} times',
-        p99 <= BRAKED,
-    )
+def _flood_text(floods: Sequence[FloodRecord]) -> str:
+    rows = [
+        [flood.topic, f'{flood.rate:.0f}', *_percentiles(np.array(flood.calls) * 1e3)]
+        for flood in floods
+    ]
+    return markdown_table(('topic', 'messages [1/s]', *('p50', 'p90', 'p99', 'most [ms]')), rows)
 
 
 def _stillness(still: Standstills | None, begin: int, end: int) -> str:
@@ -214,25 +166,6 @@ def _percentiles(values: np.ndarray) -> list[str]:
     if not len(values):
         return ['-'] * 4
     return [f'{value:.2f}' for value in np.percentile(values, (50, 90, 99, 100))]
-
-
-def _milliseconds(figures: str, name: str) -> float:
-    found = [part.split()[-2] for part in figures.split(', ') if part.startswith(name)]
-    return float(found[0]) if found else float('nan')
-
-
-def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:
-    """Return the line of the target of the brakes."""
-    braked = figures.get('brakes', '')
-    p99 = _milliseconds(braked, 'p99')
-    n_brakes = braked.split(',')[0]
-    # Where nothing was measured nothing is met.
-    is_met = n_brakes != '0' and p99 <= BRAKED
-    return _line(what, f'{BRAKED:g} ms', f'{p99:.2f} ms, {n_brakes} times', is_met)
-
-
-def _line(what: str, target: str, measured: object, is_met: bool) -> list[str]:
-    return [what, target, str(measured), 'yes' if is_met else '**no**']
 
 
 def draw_memory(memory: Sequence[tuple[float, float]], folder: Path) -> None:

@@ -18,7 +18,7 @@ _session = ExitStack()
 
 
 def pytest_sessionstart(session):
-    """Keep a virtual machine's processors awake, so that tests of several processes are not late."""
+    """Keep a virtual machine's processors awake, so that no test has to wait for them."""
     # Workers are of a session that does so.
     if 'PYTEST_XDIST_WORKER' not in os.environ and lose_time_asleep():
         _session.enter_context(OnEachProcessor(stay_awake))

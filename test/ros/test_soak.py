@@ -16,8 +16,14 @@ pytest.importorskip('tqdm')
 pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
-from benchmarks import soak, soak_contacts as contacts, soak_judge as judge  # noqa: E402
-from benchmarks.processors import OnEachProcessor, stay_awake  # noqa: E402
+from benchmarks import (  # noqa: E402
+    processors,
+    soak,
+    soak_contacts as contacts,
+    soak_flood,
+    soak_judge as judge,
+)
+from benchmarks.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
 from benchmarks.real_time import is_real_time, put_ahead, scheduling  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
@@ -29,9 +35,11 @@ from benchmarks.soak_body import (  # noqa: E402
     SPEED,
 )
 from benchmarks.soak_client import brakes_in  # noqa: E402
+from benchmarks.soak_flood import FloodRecord  # noqa: E402
 from benchmarks.soak_guard import GuardRecord  # noqa: E402
 from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
-from benchmarks.soak_report import draw_memory, guard_targets, plan_targets, report  # noqa: E402
+from benchmarks.soak_report import draw_memory, report  # noqa: E402
+from benchmarks.soak_targets import guard_targets, plan_targets  # noqa: E402
 from benchmarks.standstill import StandstillWatch, united  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
@@ -229,6 +237,7 @@ def test_contacts_are_told_apart():
     for brake, word in ((far, contacts.TOO_LATE), (swing(q, q), contacts.TOUCHED)):
         found = episode(far, there, published=((1, 2),), followed=(brake,))
         assert contacts.judge_episode(ARM, found)[-1] == word
+        assert 'motions were published 0.0 ms after it; bar ' in contacts.sentence_on(ARM, found)
     # The ray turns out of a hand that is held beside it.
     turned = swing(q, q + [0.0, 0.0, 0.6, 0.0])
     words = contacts.judge_episode(ARM, episode(turned, hand_behind(turned)))
@@ -300,6 +309,36 @@ def test_processors_are_kept_awake_by_what_gives_way_to_all_others():
     assert awake.results == [None] * len(pids)
 
 
+@pytest.mark.parametrize(
+    ('cpuinfo', 'quota', 'is_so'),
+    [
+        ('flags : fpu hypervisor lm', None, True),
+        ('flags : fpu hypervisor lm', 'max 100000', True),
+        # What a container uses up by keeping awake its work has no more.
+        ('flags : fpu hypervisor lm', '150000 100000', False),
+        ('flags : fpu lm', None, False),
+        (None, None, False),
+    ],
+)
+def test_processors_are_kept_awake_where_their_host_takes_them_away(
+    monkeypatch, tmp_path, cpuinfo, quota, is_so
+):
+    for name, text in (('CPUINFO', cpuinfo), ('CPU_MAX', quota)):
+        monkeypatch.setattr(processors, name, tmp_path / name)
+        if text is not None:
+            (tmp_path / name).write_text(text)
+    assert lose_time_asleep() is is_so
+
+
+def test_where_idle_priority_is_refused_nothing_is_kept_awake(monkeypatch):
+    def refuse(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    # It would not return otherwise: nobody ends it.
+    assert stay_awake(None) is None
+
+
 def test_moments_of_several_processors_are_united():
     found = united([(50, 60), (10, 20), (15, 30), (16, 18), (30, 31)], 100)
     assert found.begins.tolist() == [10, 50]
@@ -339,9 +378,9 @@ def test_brakes_are_judged_apart_where_the_machine_ran():
         assert f'{p99} ms, {n} of 102 times' in line
         assert ('**no**' in line) != is_met
     assert 'in either part' not in report(plans(), GuardRecord(), '', still=still)
-    suspects = [(contacts.MISSED, replace(BODY, sent=1000 * ms), 0.25, 2.0)]
+    suspects = [(contacts.MISSED, 1000 * ms, 'it came soon')]
     text = report(None, GuardRecord(figures=figures, suspects=suspects), '', still=still)
-    assert '0.250 s after the begin of a motion of 2.000 s' in text
+    assert '- no brake, though the rest of the motion came too near: it came soon (' in text
     assert 'stood still for 17.0 of 1000.0 ms' in text
     bad = plans(suspects=[('touches', 1010 * ms, [0.001, 0.011, 0.5])])
     assert 'stood still for 7.0 of 11.0 ms' in report(bad, None, '', still=still)
@@ -361,3 +400,25 @@ def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind
     assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 11), (9, kind, 12)])
     assert is_real_time() != is_ordinary
     assert ('in real time' in scheduling()) != is_ordinary
+
+
+@pytest.mark.parametrize(
+    ('calls', 'n_unanswered', 'is_met'),
+    [([0.05] * 9, 0, True), ([0.05] * 9, 1, False), ([0.2] * 9, 0, False), ([], 0, False)],
+)
+def test_answers_under_a_flood_are_held_to_their_target(calls, n_unanswered, is_met):
+    floods = [
+        FloodRecord('body_boxes', 2000.0, [0.01] * 9),
+        FloodRecord('target', 2000.0, calls, n_unanswered),
+    ]
+    text = report(None, None, '', floods=floods)
+    (line,) = [line for line in text.splitlines() if 'while any topic is flooded' in line]
+    assert ('**no**' in line) != is_met
+    assert '| body_boxes | 2000 | 10.00 |' in text
+
+
+@pytest.mark.slow
+def test_requests_under_a_flood_are_timed(tmp_path):
+    floods = soak_flood.soak_floods(2, tmp_path)
+    assert [flood.topic for flood in floods] == ['body_boxes', 'joint_states', 'target']
+    assert all(len(flood.calls) == 2 and flood.rate > 0.0 for flood in floods)
