@@ -10,7 +10,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import tree_depth
 from rrth_planner.certificate import bounds_of, certify, FINENESS
-from rrth_planner.kernels.pieces import is_rest_free
+from rrth_planner.kernels import pieces
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
@@ -156,11 +156,25 @@ def leads_away(
 
     """
     trajectory = running.trajectory
+    here = positions_at(trajectory, [phase])[0]
+    # Most often it is; an arm that is to be stopped waits for the answer.
+    if is_place_free(here, arm, scene, margin, ray_guard_length):
+        return False
     world = arm_world(arm, scene, margin, ray_guard_length)
-    return (
-        not world.is_valid(positions_at(trajectory, [phase])[0])
-        and world.is_valid(trajectory.positions[-1], max(ray_guard_length, running.reach))
-        and leads_out(trajectory, world, trajectory.duration, phase)
+    return world.is_valid(
+        trajectory.positions[-1], max(ray_guard_length, running.reach)
+    ) and leads_out(trajectory, world, trajectory.duration, phase)
+
+
+def is_place_free(
+    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
+) -> bool:
+    """Return whether the arm is free at q, shape (dof,), whatever its joints' limits [rad]."""
+    _, chain = arm_rows(arm, ray_guard_length)
+    boxes, T_arm_base = scene.numbers, mount_inverse(arm)
+    depth = tree_depth(len(scene.boxes))
+    return bool(
+        pieces.is_place_free(q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth)
     )
 
 
@@ -179,7 +193,7 @@ def _is_rest_free(
         return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
-        is_rest_free(
+        pieces.is_rest_free(
             piece_coefficients(trajectory),
             trajectory.times,
             *bounds_of(trajectory),

@@ -19,7 +19,14 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import joined
 from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
-from rrth_planner.underway import between, box_speed, is_still_free, leads_away, taken_over
+from rrth_planner.underway import (
+    between,
+    box_speed,
+    is_place_free,
+    is_still_free,
+    leads_away,
+    taken_over,
+)
 from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
@@ -244,6 +251,17 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         assert not (found and min(gaps) < gaps[0] - 1e-3)
         assert not leads_away(running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY)
     assert min(told.values()) >= 5, told
+
+
+def test_a_place_is_free_by_the_boxes_of_a_moment_as_by_the_world():
+    rng, arm, told = np.random.default_rng(8), table_1_arm(), {True: 0, False: 0}
+    low, high = arm.bounds
+    for _ in range(300):
+        q, ray = rng.uniform(low, high), rng.uniform(0.0, 1.0)
+        found = is_place_free(q, arm, wearer(), MARGIN, ray)
+        assert found == arm_world(arm, wearer(), MARGIN, ray).is_valid(q)
+        told[found] += 1
+    assert min(told.values()) >= 20, told
 
 
 @functools.cache

@@ -62,6 +62,23 @@ def prove_pieces(curves, speeds, bends, first, begin, resolution, chain, robot, 
     return -1
 
 
+@kernel(void(MAT, MAT, float64, int64, OUT_MAT))
+def pack_seen(boxes, T_arm_base, growth, depth, groups):
+    """Write boxes (m, 15) that were just seen as groups, as `rows_of` and `pack` in `boxes` do."""
+    n = boxes.shape[0]
+    rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
+    rows_of(boxes, T_arm_base, growth, rows)
+    pack(rows, depth, groups, lanes)
+
+
+@kernel(boolean(VEC, float64, CHAIN, MAT, MAT, float64, int64), is_short=True)
+def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
+    """Return whether the arm at q (dof,) is free of boxes that were just seen, as below."""
+    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
+    pack_seen(boxes, T_arm_base, growth, depth, groups)
+    return is_configuration_free(q, ray_length, chain, groups)
+
+
 @kernel(
     boolean(CUBE, VEC, MAT, MAT, float64, float64, float64, CHAIN, MAT, MAT, MAT, float64, int64),
     is_short=True,
@@ -89,11 +106,9 @@ def is_rest_free(
     for `prove_pieces`, of which only what comes after `begin` counts [s]; boxes (m, 15),
     T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`.
     """
-    n, n_pieces = boxes.shape[0], curves.shape[0]
-    rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
+    n_pieces = curves.shape[0]
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    rows_of(boxes, T_arm_base, growth, rows)
-    pack(rows, depth, groups, lanes)
+    pack_seen(boxes, T_arm_base, growth, depth, groups)
     q_end = np.empty(curves.shape[2])
     for k in range(curves.shape[2]):
         q_end[k] = 0.0
