@@ -70,12 +70,12 @@ def _run(options: argparse.Namespace) -> int:
         tempfile.TemporaryDirectory(prefix='rrth-soak-') as name,
     ):
         if n_plans:
-            plans = soak_plans(n_plans, longest, Path(name))
+            plans = soak_plans(n_plans, longest, Path(name), is_alone=options.alone)
         if n_hands and not (plans and plans.is_interrupted):
-            guard = soak_guard(n_hands, longest, Path(name))
+            guard = soak_guard(n_hands, longest, Path(name), is_alone=options.alone)
         parts = [part for part in (plans, guard) if part]
         if n_flooded and not any(part.is_interrupted for part in parts):
-            floods = soak_floods(n_flooded, Path(name))
+            floods = soak_floods(n_flooded, Path(name), is_alone=options.alone)
     default = Path('build/reliability.md' if options.quick else 'docs/reliability.md')
     target = options.output or default
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -96,6 +96,7 @@ def _command(options: argparse.Namespace) -> str:
     parts += [f'--hands {options.hands}'] if options.hands != HANDS else []
     parts += [f'--flooded {options.flooded}'] if options.flooded != FLOODED else []
     parts += ['--awake'] if options.awake else []
+    parts += ['--alone'] if options.alone else []
     parts += [f'--minutes {options.minutes:g}'] if options.minutes else []
     return ' '.join(parts)
 
@@ -129,6 +130,11 @@ def _parser() -> argparse.ArgumentParser:
         '--awake',
         action='store_true',
         help='keep the processors from sleeping, as `idle=poll` of the kernel does',
+    )
+    parser.add_argument(
+        '--alone',
+        action='store_true',
+        help='keep the last processor for the planner node, as `taskset` does',
     )
     parser.add_argument(
         '--remark', default='', metavar='TEXT', help='to stand in the report, of the machine say'

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Part three of the soak: requests while another process floods a topic."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 import sys
@@ -15,7 +16,7 @@ from tqdm import tqdm
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
 from benchmarks.flood import Flood, RATE
-from benchmarks.real_time import put_ahead
+from benchmarks.real_time import put_ahead, staying_off
 from benchmarks.soak_body import BodyAt, scene_of_body
 from benchmarks.soak_client import SoakClient, threads_of
 from benchmarks.soak_plans import ARGUMENTS, free_starts, NODE
@@ -47,8 +48,12 @@ class FloodRecord:
     is_interrupted: bool = False
 
 
-def soak_floods(n: int, folder: Path, seed: int = 1) -> list[FloodRecord]:
-    """Return how n requests are answered while each topic is flooded in its turn."""
+def soak_floods(n: int, folder: Path, seed: int = 1, is_alone: bool = False) -> list[FloodRecord]:
+    """
+    Return how n requests are answered while each topic is flooded in its turn.
+
+    Where it is alone the planner has a processor for itself.
+    """
     records = []
     with (
         ros_client(lambda: SoakClient(folder)) as client,
@@ -60,7 +65,10 @@ def soak_floods(n: int, folder: Path, seed: int = 1) -> list[FloodRecord]:
         wearer, starts = free_starts(rng, 1)
         client.tell_body(scene_of_body(BodyAt(0, -wearer, 0.0)))
         client.tell_start(load_arm().joint_names, starts[0], random_target(rng))
-        with tqdm(total=n * len(client.told), unit='plan', file=sys.stderr) as bar:
+        with (
+            staying_off(threads_of(NODE)) if is_alone else nullcontext(),
+            tqdm(total=n * len(client.told), unit='plan', file=sys.stderr) as bar,
+        ):
             for topic, message in list(client.told.items()):
                 records.append(FloodRecord(topic))
                 try:

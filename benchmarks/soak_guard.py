@@ -3,6 +3,7 @@
 """Part two of the soak: a hand is held into the way of running motions."""
 
 from collections import Counter
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 import sys
@@ -22,7 +23,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
-from benchmarks.real_time import put_ahead
+from benchmarks.real_time import put_ahead, staying_off
 from benchmarks.soak_body import BodyStream, NO_HAND
 from benchmarks.soak_client import brakes_in, Published, SoakClient, threads_of
 from benchmarks.soak_contacts import Episode, judge_episode, MISSED, sentence_on, TOUCHED
@@ -79,8 +80,14 @@ class GuardRecord:
     stuck: str = ''
 
 
-def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardRecord:
-    """Return what was seen of the guard within a time [s], with a hand for each of n motions."""
+def soak_guard(
+    n: int, longest: float, folder: Path, seed: int = 1, is_alone: bool = False
+) -> GuardRecord:
+    """
+    Return what was seen of the guard within a time [s], with a hand for each of n motions.
+
+    Where it is alone the planner has a processor for itself.
+    """
     record = GuardRecord()
 
     def listen(line: str) -> None:
@@ -101,7 +108,10 @@ def soak_guard(n: int, longest: float, folder: Path, seed: int = 1) -> GuardReco
         client.wait_for_service(one)
         client.hear(30.0, lambda: client.states)
         put_ahead(*threads_of(PLANNER), *threads_of(PLAYBACK))
-        with BodyStream(client.stream.publish, -1) as bodies:
+        with (
+            staying_off(threads_of(PLANNER), threads_of(PLAYBACK)) if is_alone else nullcontext(),
+            BodyStream(client.stream.publish, -1) as bodies,
+        ):
             client.hear(1.0)
             try:
                 _run(client, bodies, record, n, longest, seed, (one, other))

@@ -3,6 +3,7 @@
 """Part one of the soak: plan after plan from anywhere to anywhere, round a body that moves."""
 
 from collections import Counter
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 import sys
@@ -17,7 +18,7 @@ from tqdm import tqdm
 
 from benchmarks.client import ros_client
 from benchmarks.draws import random_target
-from benchmarks.real_time import put_ahead
+from benchmarks.real_time import put_ahead, staying_off
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import brakes_in, process_of, SoakClient, threads_of
 from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, name_of, newest_before, RAY
@@ -94,7 +95,9 @@ class PlansRecord:
     is_interrupted: bool = False
 
 
-def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansRecord:
+def soak_plans(
+    n: int, longest: float, folder: Path, seed: int = 1, is_alone: bool = False
+) -> PlansRecord:
     """
     Return what was seen of some plans, each published motion judged.
 
@@ -107,6 +110,8 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
     folder : Path
         For what is kept until it is judged.
     seed : int
+    is_alone : bool
+        Whether the node has a processor for itself.
 
     """
     record = PlansRecord()
@@ -116,7 +121,10 @@ def soak_plans(n: int, longest: float, folder: Path, seed: int = 1) -> PlansReco
     ):
         client.wait_for_service(child)
         put_ahead(*threads_of(NODE))
-        with BodyStream(client.stream.publish, 1) as bodies:
+        with (
+            staying_off(threads_of(NODE)) if is_alone else nullcontext(),
+            BodyStream(client.stream.publish, 1) as bodies,
+        ):
             client.hear(2.0)
             client.on_figures = lambda f: record.ages.append(float(f['age of body [s]']))
             try:

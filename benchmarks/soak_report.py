@@ -43,6 +43,9 @@ METHOD = """\
   brake as the client sees it counts from the first body with the hand, even where going on was
   less bad for a while; the node's own counts from when the middleware received the body that it
   braked for, to when the trajectory was published.
+- `--awake`: a process of idle priority keeps each processor from falling asleep, as `idle=poll`
+  of the kernel does. `--alone`: the planner node runs on the last processor, all else on the
+  others, as with `taskset`; without, all run where the system puts them.
 - **Flooded**: another process repeats one message 2,000 times a second while the client asks
   for plans from where the arm is to a target, 20 ms after each answer."""
 

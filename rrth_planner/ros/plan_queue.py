@@ -25,6 +25,7 @@ from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.ros.response import Response
 from rrth_planner.ros.resting import wait_for_rest
+from rrth_planner.ros.right_of_way import stand_back
 from rrth_planner.ros.second_opinion import incident_of_stop
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
@@ -71,7 +72,9 @@ class PlanQueue:
         self._node, self._heard, self._reporter = node, heard, reporter
         self._plan_request = plan_request
         self._publishers = PlanPublishers(node)
-        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
+        self._worker = ThreadPoolExecutor(
+            max_workers=1, thread_name_prefix='planner', initializer=stand_back
+        )
         # Held while a motion is published, so that what was cancelled before never is.
         self._lock = heard.lock
         self.guard = Guard(node, heard, reporter, self._publishers, self._lock)

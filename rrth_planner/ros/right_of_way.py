@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whoever holds the wearer against a motion goes before whoever plans the next one."""
 
+from contextlib import suppress
+import os
 from threading import Event
 import time
 from types import TracebackType
@@ -45,3 +47,18 @@ class RightOfWay:
         if not self._is_free.is_set() and time.monotonic() - self._given > APART:
             self._is_free.wait(LONGEST)
             self._given = time.monotonic()
+
+
+def stand_back() -> None:
+    """
+    Let threads of the same process go before this one, where the system runs them in real time.
+
+    Among equals this one would keep its processor until it sleeps, whoever else wakes up.
+    """
+    if not hasattr(os, 'sched_setparam'):
+        return
+    # A system that forbids it leaves all as it is.
+    with suppress(OSError):
+        priority = os.sched_getparam(0).sched_priority
+        if priority > 1:
+            os.sched_setparam(0, os.sched_param(priority - 1))

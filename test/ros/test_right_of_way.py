@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A planner gives way to whoever holds the wearer against a motion that runs."""
 
-from threading import Event, Thread
+import os
+from threading import Event, get_ident, Thread
 
 import pytest
 
@@ -10,7 +11,8 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
-from rrth_planner.ros import right_of_way  # noqa: E402
+from rrth_planner.ros import plan_queue, right_of_way  # noqa: E402
+from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
 from rrth_planner.ros.subscriptions import OpenSubscription  # noqa: E402
 from std_msgs.msg import Int32  # noqa: E402
@@ -90,3 +92,34 @@ def test_a_message_is_read_and_dealt_with_on_the_way(ros_context, wait_until, sp
         wait_until(way._is_free.is_set)
     assert heard == [(0, False), (1, False)]
     node.destroy_node()
+
+
+@pytest.mark.parametrize(('priority', 'put'), [(10, 9), (2, 1), (1, None), (0, None)])
+def test_who_plans_stands_back_where_threads_run_in_real_time(monkeypatch, priority, put):
+    told = []
+    monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(priority))
+    monkeypatch.setattr(os, 'sched_setparam', lambda k, p: told.append((k, p.sched_priority)))
+    right_of_way.stand_back()
+    assert told == ([] if put is None else [(0, put)])
+
+
+def test_who_may_not_stand_back_plans_all_the_same(monkeypatch):
+    def refuse(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(10))
+    monkeypatch.setattr(os, 'sched_setparam', refuse)
+    right_of_way.stand_back()
+
+
+def test_the_planner_stands_back(monkeypatch):
+    stood = []
+    monkeypatch.setattr(plan_queue, 'stand_back', lambda: stood.append(get_ident()))
+    node = PlannerNode(namespace='/standing_back')
+    try:
+        ran = []
+        node._queue.prepare(lambda: ran.append(get_ident()))
+        node.close()
+        assert stood == ran != [get_ident()]
+    finally:
+        node.destroy_node()

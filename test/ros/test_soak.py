@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import replace
 import os
 import signal
+import threading
 import time
 
 import numpy as np
@@ -24,7 +25,7 @@ from benchmarks import (  # noqa: E402
     soak_judge as judge,
 )
 from benchmarks.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
-from benchmarks.real_time import is_real_time, put_ahead, scheduling  # noqa: E402
+from benchmarks.real_time import is_real_time, put_ahead, scheduling, staying_off  # noqa: E402
 from benchmarks.soak_body import (  # noqa: E402
     BodyAt,
     BodyStream,
@@ -390,16 +391,32 @@ def test_brakes_are_judged_apart_where_the_machine_ran():
 def test_the_client_gives_way_to_what_it_measures_in_real_time(monkeypatch, kind):
     put = []
     monkeypatch.setattr(os, 'sched_getscheduler', lambda _: kind)
-    monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(10))
+    # A thread of the planner stands back of the others, and goes on to do so.
+    priorities = {0: 10, 7: 10, 8: 9, 9: 0}
+    monkeypatch.setattr(os, 'sched_getparam', lambda k: os.sched_param(priorities[k]))
     monkeypatch.setattr(
         os, 'sched_setscheduler', lambda *given: put.append((*given[:2], given[2].sched_priority))
     )
     put_ahead(7, 8)
     put_ahead(9, by=2)
     is_ordinary = kind == os.SCHED_OTHER
-    assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 11), (9, kind, 12)])
+    assert put == ([] if is_ordinary else [(7, kind, 11), (8, kind, 10), (9, kind, 12)])
     assert is_real_time() != is_ordinary
     assert ('in real time' in scheduling()) != is_ordinary
+
+
+def test_a_node_may_have_a_processor_for_itself(monkeypatch):
+    placed = {}
+    monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {4, 2, 3})
+    monkeypatch.setattr(os, 'sched_setaffinity', lambda k, cores: placed.update({k: list(cores)}))
+    own = threading.get_native_id()
+    with staying_off([7, 8], [9]):
+        assert placed == placed | {7: [4], 8: [4], 9: [2, 3], own: [2, 3]}
+    assert placed == placed | {7: [4], 8: [4], own: [2, 3, 4]}
+    # Of a single one nobody stays off.
+    monkeypatch.setattr(os, 'sched_getaffinity', lambda _: {2})
+    with staying_off([7]):
+        assert placed[7] == placed[own] == [2]
 
 
 @pytest.mark.parametrize(
