@@ -18,6 +18,7 @@ from rrth_planner.ros.inputs import Input, Inputs
 from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.quick_decoding import quick_decoder
+from rrth_planner.ros.right_of_way import Breather
 from rrth_planner.ros.subscriptions import OpenSubscription
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
@@ -60,7 +61,7 @@ class Listener:
         self._inputs = inputs
         # Called after each good body with when it came [ns]; set once there is somebody to tell.
         self.on_body: Callable[[int], None] = lambda arrived: None
-        self._history = BodyHistory()
+        self._history, self._rest = BodyHistory(), Breather()
         self._subscriptions = [
             self._subscribe(
                 MarkerArray,
@@ -92,7 +93,9 @@ class Listener:
 
             self._take(heard, read, self._now())
 
-        return OpenSubscription(self._node, kind, topic, on_message, on_late, refuse, way, decode)
+        return OpenSubscription(
+            self._node, kind, topic, on_message, on_late, refuse, way, decode, self._rest
+        )
 
     def body_progress(self) -> tuple[int, int]:
         """Return what `OpenSubscription.progress` says of the bodies."""

@@ -12,6 +12,8 @@ from types import TracebackType
 LONGEST = 0.02
 # Nor again so soon: bodies that come one upon another would keep it from planning [s].
 APART = 5e-3
+# Who has run without rest for a time, but for so small a share of it, rests for a time [s, -, s].
+RUN, SHARE, REST = 5e-3, 0.2, 5e-3
 
 
 class RightOfWay:
@@ -47,6 +49,29 @@ class RightOfWay:
         if not self._is_free.is_set() and time.monotonic() - self._given > APART:
             self._is_free.wait(LONGEST)
             self._given = time.monotonic()
+
+
+class Breather:
+    """
+    Has the thread that hears messages rest where they come without end.
+
+    It goes before the one that plans; on a processor that both share that one would never run.
+    """
+
+    def __init__(self) -> None:
+        """Begin rested."""
+        self._since = self._ran = 0.0
+
+    def __call__(self) -> None:
+        """Rest if need be; called by that thread, after each message."""
+        now = time.monotonic()
+        if now - self._since < RUN:
+            return
+        ran = time.thread_time()
+        if ran - self._ran > (1.0 - SHARE) * (now - self._since):
+            time.sleep(REST)
+            now = time.monotonic()
+        self._since, self._ran = now, ran
 
 
 def stand_back() -> None:

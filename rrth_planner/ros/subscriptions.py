@@ -113,6 +113,8 @@ class OpenSubscription:
         Entered while a message is read and dealt with, again for each.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
+    rest : callable, optional
+        Called after each copy of a message.
 
     """
 
@@ -126,10 +128,11 @@ class OpenSubscription:
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
         way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
+        rest: Callable[[], None] = lambda: None,
     ) -> None:
         """Begin to listen."""
         self._on_refusal, self._way = on_refusal, way or nullcontext()
-        self._decode = decode
+        self._decode, self._rest = decode, rest
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._filter = DuplicateFilter()
@@ -190,17 +193,18 @@ class OpenSubscription:
         self._n_read += 1
         if self._filter.counts_live(_stamp_of(info)):
             self._hand_on(data, self._on_message, self._filter.newest, info)
+        self._rest()
 
     def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
         self._n_read += 1
         stamp = _stamp_of(info)
         is_late = self._filter.is_late(stamp)
-        if not self._filter.counts_reliable(stamp):
-            return
-        if not is_late:
-            self._hand_on(data, self._on_message, self._filter.newest, info)
-        elif self._on_late is not None:
-            self._hand_on(data, self._on_late, stamp[0], info)
+        if self._filter.counts_reliable(stamp):
+            if not is_late:
+                self._hand_on(data, self._on_message, self._filter.newest, info)
+            elif self._on_late is not None:
+                self._hand_on(data, self._on_late, stamp[0], info)
+        self._rest()
 
     def _hand_on(
         self,

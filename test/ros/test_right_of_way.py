@@ -11,6 +11,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
+from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.ros import plan_queue, right_of_way  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
@@ -103,6 +104,23 @@ def test_who_plans_stands_back_where_threads_run_in_real_time(monkeypatch, prior
     assert told == ([] if put is None else [(0, put)])
 
 
+def test_who_hears_may_rest_after_each_copy_of_a_message():
+    node, n_heard, n_rested = Node('resting'), [], []
+    try:
+        heard = OpenSubscription(
+            node, Int32, 'rests', lambda *_: n_heard.append(1), rest=lambda: n_rested.append(1)
+        )
+        data = serialize_message(Int32(data=1))
+        for k in range(3):
+            info = {'source_timestamp': k, 'publication_sequence_number': k}
+            heard._on_live(data, info)
+            # A copy that does not count takes its time, too.
+            heard._on_reliable(data, info)
+        assert (len(n_heard), len(n_rested)) == (3, 6)
+    finally:
+        node.destroy_node()
+
+
 def test_who_may_not_stand_back_plans_all_the_same(monkeypatch):
     def refuse(*_):
         raise PermissionError
@@ -123,3 +141,35 @@ def test_the_planner_stands_back(monkeypatch):
         assert stood == ran != [get_ident()]
     finally:
         node.destroy_node()
+
+
+@pytest.mark.parametrize(
+    ('spacing', 'work', 'rests'),
+    [
+        # A body each 10 ms, one that asks for a brake, and a flood.
+        (10e-3, 1e-3, False),
+        (10e-3, 6e-3, False),
+        (0.5e-3, 0.45e-3, True),
+        (0.5e-3, 0.5e-3, True),
+    ],
+)
+def test_who_hears_rests_where_messages_come_without_end(monkeypatch, spacing, work, rests):
+    now, ran, slept = [0.0], [0.0], []
+
+    def sleep(seconds):
+        now[0] += seconds
+        slept.append(seconds)
+
+    for name, function in (
+        ('monotonic', lambda: now[0]),
+        ('thread_time', lambda: ran[0]),
+        ('sleep', sleep),
+    ):
+        monkeypatch.setattr(right_of_way.time, name, function)
+    rest = right_of_way.Breather()
+    for _ in range(2000):
+        now[0], ran[0] = now[0] + spacing, ran[0] + work
+        rest()
+    assert bool(slept) == rests
+    # About half of the time is left to who plans.
+    assert not rests or 0.4 < sum(slept) / now[0] < 0.6
