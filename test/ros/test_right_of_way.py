@@ -144,16 +144,16 @@ def test_the_planner_stands_back(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ('spacing', 'work', 'rests'),
+    ('spacing', 'works', 'rests'),
     [
-        # A body each 10 ms, one that asks for a brake, and a flood.
-        (10e-3, 1e-3, False),
-        (10e-3, 6e-3, False),
-        (0.5e-3, 0.45e-3, True),
-        (0.5e-3, 0.5e-3, True),
+        # A body each 10 ms, one in four of which asks for much, and a flood.
+        (10e-3, [1e-3], False),
+        (10e-3, [10e-3, 10e-3, 10e-3, 1e-3], False),
+        (0.5e-3, [0.45e-3], True),
+        (0.5e-3, [0.5e-3], True),
     ],
 )
-def test_who_hears_rests_where_messages_come_without_end(monkeypatch, spacing, work, rests):
+def test_who_hears_rests_where_messages_come_without_end(monkeypatch, spacing, works, rests):
     now, ran, slept = [0.0], [0.0], []
 
     def sleep(seconds):
@@ -167,8 +167,8 @@ def test_who_hears_rests_where_messages_come_without_end(monkeypatch, spacing, w
     ):
         monkeypatch.setattr(right_of_way.time, name, function)
     rest = right_of_way.Breather()
-    for _ in range(2000):
-        now[0], ran[0] = now[0] + spacing, ran[0] + work
+    for k in range(2000):
+        now[0], ran[0] = now[0] + spacing, ran[0] + works[k % len(works)]
         rest()
     assert bool(slept) == rests
     # About half of the time is left to who plans.
