@@ -24,8 +24,8 @@ class OnEachProcessor:
     Parameters
     ----------
     work : callable
-        Of a module, so that another process finds it; called there with a pipe, from which it
-        returns once something comes through it, or its other end is gone.
+        Of a module, so that another process finds it; called there with a pipe. It sends None
+        once it has begun, and returns once something comes through it, or its other end is gone.
 
     """
 
@@ -67,7 +67,6 @@ def _do(core: int, work: Callable[[Connection], Any], pipe: Connection) -> None:
     # Whoever interrupts all of it wants to hear of it, too.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.sched_setaffinity(0, {core})
-    pipe.send(None)
     # Perhaps nobody is left who would want it.
     with suppress(BrokenPipeError):
         pipe.send(work(pipe))
@@ -75,12 +74,14 @@ def _do(core: int, work: Callable[[Connection], Any], pipe: Connection) -> None:
 
 def stay_awake(pipe: Connection) -> None:
     """Keep a processor from sleeping; whatever else is to run on it goes first."""
+    is_last = True
     try:
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     except OSError:
         # A container may forbid it, and at any other priority others would have to wait.
-        return
-    while not pipe.poll():
+        is_last = False
+    pipe.send(None)
+    while is_last and not pipe.poll():
         for _ in range(SPINS):
             pass
 

@@ -103,6 +103,7 @@ def watch(pipe: Connection) -> list[tuple[int, int]]:
     put_ahead(get_native_id(), by=AHEAD)
     found = []
     before = time.monotonic_ns()
+    pipe.send(None)
     while not pipe.poll():
         for _ in range(LOOKS):
             time.sleep(PERIOD * 1e-9)

@@ -11,6 +11,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.bernstein import to_bernstein
 from rrth_planner.kernels.arm_clearance import least_along
 from rrth_planner.kernels.pieces import prove_pieces
+from rrth_planner.kernels.quintics import bound
 from rrth_planner.trajectory import piece_coefficients, Trajectory
 from rrth_planner.world import World
 
@@ -60,13 +61,10 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
         [rad].
 
     """
-    powers = np.arange(1, 6)[None, :, None]
-    first = coefficients[:, 1:] * powers
-    second = first[:, 1:] * powers[:, :4]
-    speed = np.abs(_BERNSTEIN_4 @ first).max(axis=1)
-    bend = np.abs(_BERNSTEIN_3 @ second).max(axis=1)
-    # Rounding of the conversion.
-    return speed * (1 + 1e-12) + 1e-15, bend * (1 + 1e-12) + 1e-15
+    n, _, dof = coefficients.shape
+    speed, bend = np.empty((2, n, dof))
+    bound(np.ascontiguousarray(coefficients), _BERNSTEIN_4, _BERNSTEIN_3, speed, bend)
+    return speed, bend
 
 
 def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certificate:

@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
+from rrth_planner.kernels.quintics import are_points, fit
+
+# Of a trajectory.
+_FIELDS = ('times', 'positions', 'velocities', 'accelerations')
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -74,29 +78,42 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
+        for name, value in zip(_FIELDS, self._sound() or self._checked(), strict=True):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def _sound(self) -> list[Array] | None:
+        """Return copies of all fields where nothing is wrong with them: a brake waits for it."""
+        try:
+            fields = [
+                np.array(getattr(self, name), dtype=np.float64, order='C') for name in _FIELDS
+            ]
+        except (TypeError, ValueError):
+            return None
+        times, *rows = fields
+        shape = rows[0].shape
+        fits = len(shape) == 2 and times.shape == shape[:1]
+        is_sound = fits and all(row.shape == shape for row in rows) and are_points(*fields)
+        return fields if is_sound else None
+
+    def _checked(self) -> list[Array]:
+        """Return copies of all fields, or raise RrthError for the first that is wrong."""
         times = frozen_array(self.times, (None,), 'times', 's', RrthError)
         if len(times) == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
-        object.__setattr__(self, 'times', times)
+        fields: list[Array] = [times]
         dof: int | None = None
-        for name, unit in (
-            ('positions', 'rad'),
-            ('velocities', 'rad/s'),
-            ('accelerations', 'rad/s^2'),
-        ):
-            value = frozen_array(getattr(self, name), (len(times), dof), name, unit, RrthError)
-            object.__setattr__(self, name, value)
+        for name, unit in zip(_FIELDS[1:], ('rad', 'rad/s', 'rad/s^2'), strict=True):
+            shape = (len(times), dof)
+            value = frozen_array(getattr(self, name), shape, name, unit, RrthError)
+            fields.append(value)
             dof = value.shape[1]
+        return fields
 
     @property
     def duration(self) -> float:
         """Time of the last point [s]."""
         return float(self.times[-1])
-
-
-# The terms u^3, u^4 and u^5 that add a position, a velocity and an acceleration at u = 1, and
-# nothing at u = 0.
-_QUINTIC = np.array([[10.0, -4.0, 0.5], [-15.0, 7.0, -1.0], [6.0, -3.0, 0.5]])
 
 
 @functools.lru_cache(maxsize=8)
@@ -111,19 +128,9 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
         read-only, since timing and both checks share it.
 
     """
-    p, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
-    T = (trajectory.times[1:] - trajectory.times[:-1])[:, None]
-    square = T * T
-    c = np.empty((len(T), 6, p.shape[1]))
-    c[:, 0], c[:, 1] = p[:-1], v[:-1] * T
-    a0 = a[:-1] * square
-    c[:, 2] = 0.5 * a0
-    # What position, velocity and acceleration at u = 1 still lack after these three terms.
-    lacks = np.empty((len(T), 3, p.shape[1]))
-    lacks[:, 0] = p[1:] - p[:-1] - c[:, 1] - c[:, 2]
-    lacks[:, 1] = v[1:] * T - c[:, 1] - a0
-    lacks[:, 2] = a[1:] * square - a0
-    np.matmul(_QUINTIC, lacks, out=c[:, 3:])
+    positions = trajectory.positions
+    c = np.empty((len(positions) - 1, 6, positions.shape[1]))
+    fit(trajectory.times, positions, trajectory.velocities, trajectory.accelerations, c)
     c.setflags(write=False)
     return c
 

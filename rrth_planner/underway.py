@@ -169,7 +169,11 @@ def leads_away(
 def is_place_free(
     q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
 ) -> bool:
-    """Return whether the arm is free at q, shape (dof,), whatever its joints' limits [rad]."""
+    """
+    Return whether the arm is free at q, shape (dof,) [rad], whatever its joints' limits.
+
+    With the margin and with as much of the pointing ray as is to be clear of the wearer [m].
+    """
     _, chain = arm_rows(arm, ray_guard_length)
     boxes, T_arm_base = scene.numbers, mount_inverse(arm)
     depth = tree_depth(len(scene.boxes))

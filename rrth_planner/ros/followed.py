@@ -113,8 +113,12 @@ class Followed:
         motion, reading = self.motion, self._joints.value
         if motion is None or reading is None:
             return False
+        since = now - motion.start_time - motion.trajectory.duration
+        if since <= GRACE - 2.0 * STILL:
+            # Whether the arm stands still is not asked yet, and a brake may wait for the answer.
+            return False
         is_moving = self._pace.is_moving(reading, now)
-        return now - motion.start_time - motion.trajectory.duration > GRACE and not is_moving
+        return since > GRACE and not is_moving
 
     def phase(self, now: float) -> float | None:
         """Return the time within the motion; None where the arm is nowhere on it [s]."""

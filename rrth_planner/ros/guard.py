@@ -141,7 +141,7 @@ class Guard:
                 return
             assert self.running is not None
             if not scene.boxes:
-                self._stop(scene, 'the body is empty', arrived)
+                self._stop(phase, now, scene, 'the body is empty', arrived)
             elif not is_still_free(
                 self.running,
                 phase,
@@ -151,7 +151,7 @@ class Guard:
                 ray_guard_length=parameters.ray_guard_length,
                 moves=moves,
             ):
-                self._stop(scene, 'the wearer moved into the way', arrived)
+                self._stop(phase, now, scene, 'the wearer moved into the way', arrived)
             else:
                 self._reporter.recertified(time.perf_counter() - begin)
 
@@ -172,11 +172,13 @@ class Guard:
             now = self._now()
             self._insist(now)
             self._look_back()
-            if self._phase(now) is None or self._state is not Watch.WATCHING:
+            phase = self._phase(now)
+            if phase is None or self._state is not Watch.WATCHING:
                 return
             why = out_of_sight(self._heard, self._reporter.parameters, now)
             if why:
-                self._stop(scene_of(self._heard.body.value.at(now)), why, time.time_ns())
+                scene = scene_of(self._heard.body.value.at(now))
+                self._stop(phase, now, scene, why, time.time_ns())
 
     def _insist(self, now: float) -> None:
         """Stop the arm again where it goes on along the motion that it was to stop."""
@@ -212,13 +214,13 @@ class Guard:
             self._say(self._state, ELSEWHERE)
         return phase
 
-    def _stop(self, scene: Scene, why: str, arrived: int) -> None:
-        """Publish the braking trajectory from where the arm is; the lock is held."""
-        # Anew: what was looked at since then may have taken its time.
+    def _stop(self, phase: float, then: float, scene: Scene, why: str, arrived: int) -> None:
+        """Publish the braking trajectory of an arm that was so far then; the lock is held."""
+        # What was looked at since then may have taken its time.
         now = self._now()
-        phase = self._phase(now)
+        phase += now - then
         running, parameters, goal = self.running, self._parameters, self._goal
-        if running is None or phase is None or phase >= running.trajectory.duration:
+        if running is None or phase >= running.trajectory.duration:
             return
         # Of a motion that takes over a little later the stop begins then.
         start = running.start_time if phase < 0.0 else now

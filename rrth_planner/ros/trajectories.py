@@ -42,22 +42,21 @@ def joint_trajectory_to_msg(
         Not at rest at the end, or two points closer than a nanosecond.
 
     """
-    velocities, accelerations = np.array(trajectory.velocities), np.array(trajectory.accelerations)
-    for values in (velocities, accelerations):
+    # Numbers one by one, as in what follows: of few points arrays take longer.
+    velocities, accelerations = trajectory.velocities.tolist(), trajectory.accelerations.tolist()
+    for rows in (velocities, accelerations):
         for end in (0, -1):
-            values[end][np.abs(values[end]) <= RESIDUE] = 0.0
-    if velocities[-1].any():
-        raise MessageError(
-            f'velocity of the last point: {velocities[-1].tolist()}, expected 0 [rad/s]'
-        )
+            rows[end] = [0.0 if abs(value) <= RESIDUE else value for value in rows[end]]
+    if any(velocities[-1]):
+        raise MessageError(f'velocity of the last point: {velocities[-1]}, expected 0 [rad/s]')
     times = [round(t * NANOSECONDS) for t in trajectory.times.tolist()]
     _check_times(times)
     msg = JointTrajectory(joint_names=list(joint_names))
     msg.header.frame_id = frame
     stamp = msg.header.stamp
     stamp.sec, stamp.nanosec = divmod(round(begin * NANOSECONDS), NANOSECONDS)
-    rows = (values.tolist() for values in (trajectory.positions, velocities, accelerations))
-    for time, q, v, a in zip(times, *rows, strict=True):
+    positions = trajectory.positions.tolist()
+    for time, q, v, a in zip(times, positions, velocities, accelerations, strict=True):
         # Arrays are taken as they are; lists would be checked number by number.
         point = JointTrajectoryPoint(
             positions=array('d', q), velocities=array('d', v), accelerations=array('d', a)

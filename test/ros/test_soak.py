@@ -4,6 +4,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from multiprocessing import Pipe
 import os
 import signal
 import threading
@@ -336,8 +337,11 @@ def test_where_idle_priority_is_refused_nothing_is_kept_awake(monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    ours, theirs = Pipe()
     # It would not return otherwise: nobody ends it.
-    assert stay_awake(None) is None
+    assert stay_awake(theirs) is None
+    # Whoever entered waits for that.
+    assert ours.recv() is None
 
 
 def test_moments_of_several_processors_are_united():
