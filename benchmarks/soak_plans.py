@@ -22,6 +22,7 @@ from benchmarks.real_time import put_ahead, staying_off
 from benchmarks.soak_body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak_client import brakes_in, process_of, SoakClient, threads_of
 from benchmarks.soak_judge import EACH, FREE, judge_bytes, MARGIN, name_of, newest_before, RAY
+from benchmarks.soak_looks import Look, look_at
 
 NODE = 'rrth_planner.ros.planner_node'
 # The arm of this part stands where it is said to: a brake is not followed by another plan.
@@ -54,8 +55,8 @@ class PlansRecord:
         How long the answers took [s].
     memory : list of (float, float)
         Time since the begin [s], and resident memory of the node [MB].
-    ages : list of float
-        Of the body, by the node's diagnostics [s].
+    looks : list of Look
+        At the body, by the node's diagnostics.
     gaps : list of float
         Between two bodies of this client [s].
     figures : dict
@@ -83,7 +84,7 @@ class PlansRecord:
     examples: dict[str, str] = field(default_factory=dict)
     calls: list[float] = field(default_factory=list)
     memory: list[tuple[float, float]] = field(default_factory=list)
-    ages: list[float] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
     gaps: list[float] = field(default_factory=list)
     figures: dict[str, str] = field(default_factory=dict)
     n_sent: int = 0
@@ -126,7 +127,9 @@ def soak_plans(
             BodyStream(client.stream.publish, 1) as bodies,
         ):
             client.hear(2.0)
-            client.on_figures = lambda f: record.ages.append(float(f['age of body [s]']))
+            client.on_figures = lambda figures: record.looks.append(
+                look_at(figures, time.time_ns(), len(bodies.log))
+            )
             try:
                 _ask(client, child, bodies, record, n, longest, seed)
             except KeyboardInterrupt:

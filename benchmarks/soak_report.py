@@ -14,8 +14,15 @@ from benchmarks.real_time import scheduling
 from benchmarks.soak_flood import FloodRecord
 from benchmarks.soak_guard import GuardRecord
 from benchmarks.soak_judge import name_of
+from benchmarks.soak_looks import heard_by, losses
 from benchmarks.soak_plans import PlansRecord
-from benchmarks.soak_targets import flood_target, guard_targets, plan_targets, running_target
+from benchmarks.soak_targets import (
+    flood_target,
+    guard_targets,
+    MOST_AGE,
+    plan_targets,
+    running_target,
+)
 from benchmarks.standstill import Standstills
 from benchmarks.task import origin
 
@@ -110,6 +117,7 @@ def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
                 + _stillness(still, published - round(1e9 * max(ages[:2], default=0.0)), published)
                 for word, published, ages in plans.suspects
             ),
+            *_lateness(plans, still),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
                 [['call, as its client sees it', *_percentiles(np.array(plans.calls) * 1e3)]],
@@ -117,6 +125,24 @@ def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
             *(f'- {k}: {v}' for k, v in plans.figures.items() if k in ('brakes',)),
         ]
     )
+
+
+def _lateness(plans: PlansRecord, still: Standstills | None) -> list[str]:
+    """Return a line for each time at which the body was old, or bodies were lost."""
+    old = [look for look in plans.looks if look.age >= MOST_AGE]
+    lost = losses(plans.looks, plans.n_sent - heard_by(plans.figures))
+    return [
+        *(
+            f'- the body was {1e3 * look.age:.1f} ms old'
+            + _stillness(still, look.time - round(1e9 * look.age), look.time)
+            for look in old
+        ),
+        *(
+            f'- bodies were lost: {loss.n}, between two messages of diagnostics'
+            + _stillness(still, loss.begin, loss.end)
+            for loss in lost
+        ),
+    ]
 
 
 def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:

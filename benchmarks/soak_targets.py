@@ -10,6 +10,7 @@ from benchmarks import soak_contacts as contacts
 from benchmarks.soak_flood import FloodRecord
 from benchmarks.soak_guard import GuardRecord
 from benchmarks.soak_judge import FREE, growth_of
+from benchmarks.soak_looks import heard_by
 from benchmarks.soak_plans import PlansRecord
 from benchmarks.standstill import Standstills
 
@@ -23,10 +24,10 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
     """Return the lines of targets of the plans."""
     unsafe = sum(n for (word, _), n in plans.verdicts.items() if word != FREE)
     n_judged = sum(plans.verdicts.values())
-    heard = int(plans.figures.get('good messages, body', 0))
+    heard = heard_by(plans.figures)
     refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('refused messages'))
     growth = growth_of([m for _, m in plans.memory]).growth if plans.memory else np.nan
-    age = max(plans.ages, default=np.nan)
+    age = max((look.age for look in plans.looks), default=np.nan)
     return [
         _line('calls without an answer', '0', plans.n_unanswered, plans.n_unanswered == 0),
         _line(

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 
@@ -39,6 +40,7 @@ from benchmarks.soak_body import (  # noqa: E402
 from benchmarks.soak_client import brakes_in  # noqa: E402
 from benchmarks.soak_flood import FloodRecord  # noqa: E402
 from benchmarks.soak_guard import GuardRecord  # noqa: E402
+from benchmarks.soak_looks import Look, look_at, Loss, losses  # noqa: E402
 from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
 from benchmarks.soak_report import draw_memory, report  # noqa: E402
 from benchmarks.soak_targets import guard_targets, plan_targets  # noqa: E402
@@ -96,7 +98,7 @@ def plans(**changes):
         codes=Counter(SUCCESS=2),
         calls=[0.01, 0.02],
         memory=FLAT,
-        ages=[0.01],
+        looks=[Look(1, 0.01, 7, 7)],
         gaps=[0.01],
         figures=FIGURES,
         n_sent=7,
@@ -171,8 +173,8 @@ def test_each_fault_misses_its_target():
         ({'figures': FIGURES | {'refused messages, body': '1'}}, 'heard'),
         ({'figures': FIGURES | {'brakes': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
         ({'figures': FIGURES | {'brakes': '0, last 0 ms, p50 0 ms, p99 0 ms'}}, 'busy'),
-        ({'ages': [0.01, 0.06]}, 'age'),
-        ({'ages': []}, 'age'),
+        ({'looks': [Look(1, 0.01, 7, 7), Look(2, 0.06, 7, 7)]}, 'age'),
+        ({'looks': []}, 'age'),
         ({'memory': leaking}, 'memory'),
     ):
         (missed,) = unmet(plan_targets(plans(**changes)))
@@ -184,6 +186,52 @@ def test_the_report_says_how_old_the_bodies_before_a_bad_motion_were():
     assert '- braking: touches: published 0.4, 10.4 ms after the bodies before' in report(
         bad, None, ''
     )
+
+
+def test_the_report_says_when_the_body_was_old_and_bodies_were_lost():
+    still = united([(1_000_000_000, 1_600_000_000)], 10**10)
+    looks = [
+        Look(800_000_000, 0.005, 70, 71),
+        Look(1_620_000_000, 0.625, 72, 150),
+        Look(2_800_000_000, 0.01, 270, 272),
+    ]
+    late = plans(looks=looks, n_sent=301, figures=FIGURES | {'good messages, body': '299'})
+    text = report(late, None, '', still=still)
+    assert '- the body was 625.0 ms old (the machine stood still for 600.0 of 625.0 ms)' in text
+    assert '- bodies were lost: 1, between two messages of diagnostics (the machine stood' in text
+    assert ' still for 600.0 of 820.0 ms)' in text
+    assert 'ms old' not in report(plans(), None, '')
+    assert 'were lost' not in report(plans(), None, '')
+
+
+@worlds.examples(100)
+@given(
+    steps=st.lists(
+        st.tuples(st.integers(0, 5), st.integers(0, 2), st.integers(0, 3)), min_size=1, max_size=30
+    )
+)
+def test_bodies_are_lost_when_they_are_never_heard(steps):
+    # Of each step: bodies that were sent, how many of them got lost, how many are on their way.
+    looks, sent, lost = [], 0, 0
+    for k, (n, n_lost, n_coming) in enumerate(steps):
+        sent += n
+        lost += min(n, n_lost)
+        looks.append(Look(k, 0.0, sent - lost - min(n_coming, sent - lost), sent))
+    found = losses(looks, lost)
+    assert sum(loss.n for loss in found) == lost
+    missing = [look.n_sent - look.n_heard for look in looks]
+    for k in range(len(looks) - 1):
+        # What is seen to be there later is not lost.
+        assert sum(loss.n for loss in found if loss.end <= k) == min(*missing[k:], lost)
+    on_time = [replace(look, n_heard=look.n_sent) for look in looks]
+    assert losses(on_time, 0) == []
+
+
+def test_a_look_is_read_from_diagnostics():
+    figures = FIGURES | {'age of body [s]': '0.012'}
+    assert look_at(figures, 5, 9) == Look(5, 0.012, 7, 9)
+    assert losses([look_at(figures, 5, 9)], 2) == [Loss(2, 5, 5)]
+    assert losses([], 2) == []
 
 
 def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
