@@ -41,7 +41,7 @@ class Certificate:
     touches: bool = False
 
 
-_BERNSTEIN_4, _BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
+BERNSTEIN_4, BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
 
 
 def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
@@ -63,7 +63,7 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
     """
     n, _, dof = coefficients.shape
     speed, bend = np.empty((2, n, dof))
-    bound(np.ascontiguousarray(coefficients), _BERNSTEIN_4, _BERNSTEIN_3, speed, bend)
+    bound(np.ascontiguousarray(coefficients), BERNSTEIN_4, BERNSTEIN_3, speed, bend)
     return speed, bend
 
 

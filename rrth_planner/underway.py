@@ -9,13 +9,13 @@ import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import tree_depth
-from rrth_planner.certificate import bounds_of, certify, FINENESS
+from rrth_planner.certificate import BERNSTEIN_3, BERNSTEIN_4, certify, FINENESS
 from rrth_planner.kernels import pieces
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import joined
-from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
+from rrth_planner.trajectory import positions_at, sample, Trajectory
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
 # Two points of a part of a motion are at least so far apart [s].
@@ -198,9 +198,10 @@ def _is_rest_free(
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         pieces.is_rest_free(
-            piece_coefficients(trajectory),
             trajectory.times,
-            *bounds_of(trajectory),
+            trajectory.positions,
+            trajectory.velocities,
+            trajectory.accelerations,
             begin,
             running.reach,
             FINENESS * RESOLUTION,
@@ -210,6 +211,8 @@ def _is_rest_free(
             mount_inverse(arm),
             margin + SLACK,
             tree_depth(len(scene.boxes)),
+            BERNSTEIN_4,
+            BERNSTEIN_3,
         )
     )
 

@@ -17,6 +17,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     VEC,
 )
+from rrth_planner.kernels.quintics import bound, fit
 
 
 @kernel(void(MAT, float64, OUT_MAT))
@@ -80,14 +81,30 @@ def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
 
 
 @kernel(
-    boolean(CUBE, VEC, MAT, MAT, float64, float64, float64, CHAIN, MAT, MAT, MAT, float64, int64),
+    boolean(
+        VEC,
+        MAT,
+        MAT,
+        MAT,
+        float64,
+        float64,
+        float64,
+        CHAIN,
+        MAT,
+        MAT,
+        MAT,
+        float64,
+        int64,
+        MAT,
+        MAT,
+    ),
     is_short=True,
 )
 def is_rest_free(
-    curves,
     times,
-    speeds,
-    bends,
+    positions,
+    velocities,
+    accelerations,
     begin,
     reach,
     resolution,
@@ -97,22 +114,27 @@ def is_rest_free(
     T_arm_base,
     growth,
     depth,
+    quartic,
+    cubic,
 ):
     """
     Return whether what is left of a motion is proven free of boxes that were just seen.
 
     In one go, since a moving arm waits for it. At the end a ray of length `reach` has to be free
-    too [m]. curves (n, 6, dof), times (n + 1,), speeds and bends (n, dof): pieces of the motion as
-    for `prove_pieces`, of which only what comes after `begin` counts [s]; boxes (m, 15),
-    T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`.
+    too [m]. times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of
+    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15), T_arm_base
+    (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`; quartic and cubic as for
+    `quintics.bound`.
     """
-    n_pieces = curves.shape[0]
+    n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
+    curves = np.empty((n_pieces, 6, dof))
+    fit(times, positions, velocities, accelerations, curves)
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
     pack_seen(boxes, T_arm_base, growth, depth, groups)
-    q_end = np.empty(curves.shape[2])
-    for k in range(curves.shape[2]):
+    q_end = np.empty(dof)
+    for k in range(dof):
         q_end[k] = 0.0
-        for power in range(curves.shape[1]):
+        for power in range(6):
             q_end[k] += curves[n_pieces - 1, power, k]
     ray = robot[robot.shape[0] - 1, D]
     if not is_configuration_free(q_end, max(ray, reach), chain, groups):
@@ -122,6 +144,8 @@ def is_rest_free(
     first = 0
     while first < n_pieces - 1 and times[first + 1] <= begin:
         first += 1
+    speeds, bends = np.empty((n_pieces, dof)), np.empty((n_pieces, dof))
+    bound(curves[first:], quartic, cubic, speeds[first:], bends[first:])
     share = max(0.0, (begin - times[first]) / (times[first + 1] - times[first]))
     found = prove_pieces(curves, speeds, bends, first, share, resolution, chain, robot, groups)
     return found == -1

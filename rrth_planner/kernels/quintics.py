@@ -4,36 +4,20 @@
 
 import math
 
-from numba.core.types import boolean, float64, void
-import numpy as np
+from numba.core.types import float64, void
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_MAT, VEC
 
 # Bounds of derivatives are by so much larger, for rounding: a share, and [rad].
 SHARE, LEAST = 1e-12, 1e-15
 
 
-@kernel(boolean(VEC, MAT, MAT, MAT), is_short=True)
-def are_points(times, positions, velocities, accelerations):
-    """Return whether all are finite, (n,) and (n, dof), and the times increase from 0 [s]."""
-    n, dof = positions.shape
-    if n == 0 or times[0] != 0.0:
-        return False
-    for i in range(n):
-        if i > 0 and not times[i - 1] < times[i] < np.inf:
-            return False
-        for k in range(dof):
-            if not (
-                math.isfinite(positions[i, k])
-                and math.isfinite(velocities[i, k])
-                and math.isfinite(accelerations[i, k])
-            ):
-                return False
-    return True
-
-
-@kernel(void(VEC, MAT, MAT, MAT, OUT_CUBE), is_short=True)
+@kernel(void(VEC, MAT, MAT, MAT, OUT_CUBE))
 def fit(times, positions, velocities, accelerations, curves):
-    """Write the quintics that fit both ends of each piece, (n - 1, 6, dof), lowest power first."""
+    """
+    Write the quintics that fit both ends of each piece, (n - 1, 6, dof), lowest power first.
+
+    As `trajectory.piece_coefficients`, which does without compiled code: a playback has none.
+    """
     for i in range(curves.shape[0]):
         T = times[i + 1] - times[i]
         for k in range(curves.shape[2]):
