@@ -14,7 +14,7 @@ from benchmarks.real_time import scheduling
 from benchmarks.soak_flood import FloodRecord
 from benchmarks.soak_guard import GuardRecord
 from benchmarks.soak_judge import name_of
-from benchmarks.soak_looks import heard_by, losses
+from benchmarks.soak_looks import heard_by, Look, losses
 from benchmarks.soak_plans import PlansRecord
 from benchmarks.soak_targets import (
     flood_target,
@@ -28,6 +28,8 @@ from benchmarks.task import origin
 
 # For so long after a hand came that was missed it is said whether the machine ran [ns].
 AFTERWARDS = 1_000_000_000
+# Of what may happen often the worst are told.
+MOST_LISTED = 10
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
 METHOD = """\
@@ -128,21 +130,33 @@ def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
 
 
 def _lateness(plans: PlansRecord, still: Standstills | None) -> list[str]:
-    """Return a line for each time at which the body was old, or bodies were lost."""
+    """Return lines that say when the body was old, and when bodies were lost."""
     old = [look for look in plans.looks if look.age >= MOST_AGE]
+    ran = [look for look in old if look.age - _still_before(look, still) >= MOST_AGE]
     lost = losses(plans.looks, plans.n_sent - heard_by(plans.figures))
-    return [
-        *(
-            f'- the body was {1e3 * look.age:.1f} ms old'
-            + _stillness(still, look.time - round(1e9 * look.age), look.time)
-            for look in old
-        ),
-        *(
-            f'- bodies were lost: {loss.n}, between two messages of diagnostics'
-            + _stillness(still, loss.begin, loss.end)
-            for loss in lost
-        ),
+    lines = [
+        f'- the body was {1e3 * look.age:.1f} ms old'
+        + _stillness(still, look.time - round(1e9 * look.age), look.time)
+        for look in sorted(ran, key=lambda look: -look.age)[:MOST_LISTED]
     ]
+    lines += [
+        f'- bodies were lost: {loss.n}, between two messages of diagnostics'
+        + _stillness(still, loss.begin, loss.end)
+        for loss in lost
+    ]
+    if old:
+        lines.insert(
+            0,
+            f'- {len(old)} messages of diagnostics said that the body was {1e3 * MOST_AGE:.0f} ms '
+            f'old or older, {len(old) - len(ran)} of them only because the machine stood still',
+        )
+    return ['\n'.join(lines)] if lines else []
+
+
+def _still_before(look: Look, still: Standstills | None) -> float:
+    """Return for how long the machine stood still while the body of a look got old [s]."""
+    begin = look.time - round(1e9 * look.age)
+    return 0.0 if still is None else 1e-9 * still.within(begin, look.time)
 
 
 def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:

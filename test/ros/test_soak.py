@@ -197,10 +197,18 @@ def test_the_report_says_when_the_body_was_old_and_bodies_were_lost():
     ]
     late = plans(looks=looks, n_sent=301, figures=FIGURES | {'good messages, body': '299'})
     text = report(late, None, '', still=still)
-    assert '- the body was 625.0 ms old (the machine stood still for 600.0 of 625.0 ms)' in text
+    assert '- 1 messages of diagnostics said' in text
+    assert '50 ms old or older, 1 of them only because the machine stood still' in text
+    assert '- the body was' not in text
     assert '- bodies were lost: 1, between two messages of diagnostics (the machine stood' in text
     assert ' still for 600.0 of 820.0 ms)' in text
-    assert 'ms old' not in report(plans(), None, '')
+    running = report(late, None, '', still=united([(1_000_000_000, 1_570_000_000)], 10**10))
+    assert 'older, 0 of them' in running
+    assert '- the body was 625.0 ms old (the machine stood still for 570.0 of 625.0 ms)' in running
+    assert '- the body was 625.0 ms old\n' in report(late, None, '')
+    many = [replace(looks[1], age=0.1 + 0.001 * k) for k in range(30)]
+    assert report(plans(looks=many), None, '').count('- the body was') == 10
+    assert 'older, ' not in report(plans(), None, '')
     assert 'were lost' not in report(plans(), None, '')
 
 
