@@ -23,7 +23,8 @@ METHOD = """\
   node and client share all cores.
 - **Configurations and edges** are looped over in compiled code: configurations uniform within the
   limits, edges from free configurations into random directions; each number is a mean over
-  thousands. A batch is a free edge looked at every 0.02 rad.
+  thousands. A batch is a free edge, whose configurations every 0.02 rad are asked
+  for; where a short proof holds for the whole edge it answers for all of them.
 - **Taut edges** are those of paths between random configurations that RRT-H pulled taut with a
   check every 0.001 rad in place of the proof, so that the proof had no say in them; truly free
   is what the oracle passes at 0.0005 rad. Of those that clear the boxes by 0.1 mm

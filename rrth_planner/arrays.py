@@ -35,18 +35,21 @@ def frozen_array(
         raise error(
             f'{name}: {value!r}, expected numbers of shape {_wanted(shape)} [{unit}]'
         ) from problem
-    fits = array.ndim == len(shape) and all(
-        n is None or n == given for n, given in zip(shape, array.shape, strict=True)
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
-    # The sum is finite where all elements are, but for a sum that overflows.
-    with np.errstate(over='ignore', invalid='ignore'):
-        total = array.sum()
-    if not math.isfinite(total) and not np.isfinite(array).all():
+    # A sum of squares is finite where all elements are, unless it overflows.
+    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')
     array.setflags(write=False)
     return array
+
+
+def _fits(given: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(given) == len(shape) and all(map(_is_length, given, shape))
+
+
+def _is_length(given: int, wanted: int | None) -> bool:
+    return wanted is None or given == wanted
 
 
 def _wanted(shape: tuple[int | None, ...]) -> str:

@@ -31,6 +31,8 @@ class Growth:
         Draws that it took.
     stopped : PlanStatus or None
         Why growth had to stop, if it had.
+    time : float
+        When it ended, since the plan began [s].
     trees : tuple of Tree
 
     """
@@ -38,6 +40,7 @@ class Growth:
     waypoints: Array | None
     n_samples: int
     stopped: PlanStatus | None
+    time: float
     trees: tuple[Tree, ...]
 
 
@@ -67,7 +70,7 @@ def search(
         trees=grown.trees,
         cost_history=(path.length,),
         sample_history=(grown.n_samples,),
-        time_history=(deadline.elapsed(),),
+        time_history=(grown.time,),
         n_samples=grown.n_samples,
         planning_time=deadline.elapsed(),
     )
@@ -152,7 +155,11 @@ def grow(
         n = tree.trace_path(tree_q, parents, room.meeting[0], room.meeting[1], path)
         waypoints = path[:n].copy() if n else None
     return Growth(
-        waypoints=waypoints, n_samples=drawn, stopped=stopped, trees=grown_trees(room, 0, options)
+        waypoints=waypoints,
+        n_samples=drawn,
+        stopped=stopped,
+        time=deadline.elapsed(),
+        trees=grown_trees(room, 0, options),
     )
 
 

@@ -35,7 +35,8 @@ class Tree:
         nodes = frozen_array(self.nodes, (None, dof), 'nodes', 'rad', RrthError)
         parents = np.array(self.parents, dtype=np.int64)
         parents.setflags(write=False)
-        if len(parents) != len(nodes) or not (parents < np.arange(len(nodes))).all():
+        # A parent that is out of place is greater than its own index, or as great.
+        if len(parents) != len(nodes) or np.count_nonzero(parents >= np.arange(len(nodes))):
             raise RrthError('parents: expected for every node one that comes before it, or -1')
         object.__setattr__(self, 'nodes', nodes)
         object.__setattr__(self, 'parents', parents)

@@ -5,7 +5,7 @@
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.arm_validity import ENDS_ROOM, is_configuration_free
+from rrth_planner.kernels.arm_validity import ENDS_ROOM, is_configuration_free, is_edge_free
 from rrth_planner.kernels.jit import (
     BOX_HALF,
     BOX_OFFSET,
@@ -21,6 +21,9 @@ from rrth_planner.kernels.tree import distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
 POINTS_PER_BAR = 10
+# Spacings between configurations over which a proof gives up: it is to be quicker than a look at
+# each of them.
+SHORT_PROOF = 8.0
 
 
 @kernel(void(VEC, VEC, float64, OUT_VEC))
@@ -32,7 +35,14 @@ def between(q_from, q_to, share, q):
 
 @kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
 def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, boxes):
-    """Return whether each configuration is free, exactly, at a spacing of `resolution` [rad]."""
+    """
+    Return whether each configuration is free, exactly, at a spacing of `resolution` [rad].
+
+    Where a short proof holds for the whole edge it holds for each of them; where none does they
+    are looked at one by one, and what lies between them is not.
+    """
+    if is_edge_free(q_from, q_to, SHORT_PROOF * resolution, chain, robot, boxes):
+        return True
     n = int64(distance(q_from, q_to) / resolution) + 1
     q = np.empty(q_from.shape[0])
     ray_length = robot[robot.shape[0] - 1, D]
