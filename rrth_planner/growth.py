@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Growth to a first path: RRT with one tree or two, and what RRT-H builds on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -13,7 +14,7 @@ from rrth_planner.kernels.random import random_state
 from rrth_planner.options import GrowthOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import PlanResult, Tree
+from rrth_planner.result import GrownTrees, PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import MAX_NODES, Workspace, workspace
 
@@ -33,7 +34,7 @@ class Growth:
         Why growth had to stop, if it had.
     time : float
         When it ended, since the plan began [s].
-    trees : tuple of Tree
+    trees : sequence of Tree
 
     """
 
@@ -41,7 +42,7 @@ class Growth:
     n_samples: int
     stopped: PlanStatus | None
     time: float
-    trees: tuple[Tree, ...]
+    trees: Sequence[Tree]
 
 
 def search(
@@ -49,7 +50,7 @@ def search(
     options: GrowthOptions,
     rng: np.random.Generator,
     deadline: Deadline,
-    previous: tuple[Tree, ...],
+    previous: Sequence[Tree],
 ) -> PlanResult:
     """Return the first path that RRT finds, unshortened."""
     grown = grow(problem, problem.q_goals, options, rng, deadline, previous=previous)
@@ -83,7 +84,7 @@ def grow(
     rng: np.random.Generator,
     deadline: Deadline,
     *,
-    previous: tuple[Tree, ...] = (),
+    previous: Sequence[Tree] = (),
     club: Array | None = None,
     best_cost: float = np.inf,
     budget: int | None = None,
@@ -99,7 +100,7 @@ def grow(
     options : GrowthOptions
     rng : numpy.random.Generator
     deadline : Deadline
-    previous : tuple of Tree
+    previous : sequence of Tree
         Trees of an earlier plan: what is still free of them is where growth begins.
     club : ndarray, shape (m, dof)
         Points to keep away from [rad]; the options are then RRTHOptions.
@@ -163,7 +164,7 @@ def grow(
     )
 
 
-def room_for(options: GrowthOptions, n_roots: int, previous: tuple[Tree, ...], budget: int) -> int:
+def room_for(options: GrowthOptions, n_roots: int, previous: Sequence[Tree], budget: int) -> int:
     """Return how many nodes a tree may come to have."""
     return min(2 * budget, MAX_NODES) + n_roots + sum(len(t.nodes) for t in previous) + 2
 
@@ -173,7 +174,7 @@ def plant(
     roots: Array,
     options: GrowthOptions,
     room: Workspace,
-    previous: tuple[Tree, ...],
+    previous: Sequence[Tree],
 ) -> None:
     """Begin the trees of a growth, with what is still free of the previous ones."""
     world, tree_q, parents, sizes = problem.world, room.tree_q[0], room.parents[0], room.sizes[0]
@@ -190,12 +191,8 @@ def plant(
     reuse.join(*seam, options.step_size, tree_q, sizes, room.meeting)
 
 
-def grown_trees(room: Workspace, pair: int, options: GrowthOptions) -> tuple[Tree, ...]:
+def grown_trees(room: Workspace, pair: int, options: GrowthOptions) -> GrownTrees:
     """Return the trees of one pair as they are."""
-    return tuple(
-        Tree(
-            nodes=room.tree_q[pair, side, : room.sizes[pair, side]],
-            parents=room.parents[pair, side, : room.sizes[pair, side]],
-        )
-        for side in range(2 if options.is_bidirectional else 1)
-    )
+    nodes, parents, sizes = room.tree_q[pair], room.parents[pair], room.sizes[pair].tolist()
+    sides = range(2 if options.is_bidirectional else 1)
+    return GrownTrees([(nodes[i, : sizes[i]], parents[i, : sizes[i]]) for i in sides])

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """RRT-H with its three steps as printed, to check the paper by; its paths may touch."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ def search(
     options: PrintedRRTHOptions,
     rng: np.random.Generator,
     deadline: Deadline,
-    previous: tuple[Tree, ...],
+    previous: Sequence[Tree],
 ) -> PlanResult:
     """Return the shortest path of some growths, each shortened as printed."""
     fixed = replace(problem, slide_goal=STAY)

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What planning brought: a path or none, the trees, and how the cost fell."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +44,41 @@ class Tree:
         object.__setattr__(self, 'parents', parents)
 
 
+class GrownTrees(Sequence[Tree]):
+    """
+    Trees as a kernel left them, copied at once; each becomes a value when it is looked at.
+
+    Parameters
+    ----------
+    rows : iterable of (ndarray, ndarray)
+        Nodes (n, dof) [rad] and parents (n,) of each tree, in arrays that will be used again.
+
+    """
+
+    def __init__(self, rows: Iterable[tuple[Array, NDArray[np.int64]]]) -> None:
+        """Copy."""
+        self._rows = tuple([(nodes.copy(), parents.copy()) for nodes, parents in rows])
+
+    def __len__(self) -> int:
+        """Return how many trees there are."""
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, index: int) -> Tree: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Tree, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Tree | tuple[Tree, ...]:
+        """Return a tree, or some."""
+        if isinstance(index, slice):
+            return tuple([_tree(row) for row in self._rows[index]])
+        return _tree(self._rows[index])
+
+
+def _tree(row: tuple[Array, NDArray[np.int64]]) -> Tree:
+    return Tree(nodes=row[0], parents=row[1])
+
+
 def ordered_tree(nodes: Array, parents: NDArray[np.int64]) -> Tree:
     """Return a tree whose nodes come in the order of their depth, so parents come first."""
     # A root's parent is a node past the last one. In each round all look twice as far up.
@@ -72,7 +109,7 @@ class PlanResult:
     raw_path : Path or None
         The first path that growth found, before any shortening; None where a straight edge did,
         and for RRT* and its kin, which shorten nothing.
-    trees : tuple of Tree
+    trees : sequence of Tree
         From the start and, with two trees, from the goals, as they were last.
     cost_history, sample_history, time_history : tuple of float, of int, of float
         Length of the best path after each improvement [rad], draws and seconds until then.
@@ -88,7 +125,7 @@ class PlanResult:
     status: PlanStatus
     path: Path | None
     raw_path: Path | None = None
-    trees: tuple[Tree, ...] = ()
+    trees: Sequence[Tree] = ()
     cost_history: tuple[float, ...] = ()
     sample_history: tuple[int, ...] = ()
     time_history: tuple[float, ...] = ()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ def search(
     options: RRTHOptions,
     rng: np.random.Generator,
     deadline: Deadline,
-    previous: tuple[Tree, ...],
+    previous: Sequence[Tree],
     shorten: Any = TIGHTEN,
 ) -> PlanResult:
     """
@@ -123,7 +124,7 @@ def _result(
     deadline: Deadline,
     room: Workspace,
     stopped: PlanStatus | None,
-    trees: tuple[Tree, ...],
+    trees: Sequence[Tree],
 ) -> PlanResult:
     """Return what the kernels left behind."""
     state = room.state.tolist()

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """RRT*, Informed RRT* and RRT*-Smart: paths that get shorter as the trees grow."""
 
+from collections.abc import Sequence
 import math
 
 import numpy as np
@@ -26,7 +27,7 @@ class _Trees:
     """The buffers of the two trees, as the kernels see them."""
 
     def __init__(
-        self, problem: PlanningProblem, options: RRTStarOptions, previous: tuple[Tree, ...]
+        self, problem: PlanningProblem, options: RRTStarOptions, previous: Sequence[Tree]
     ) -> None:
         dof, n_goals = len(problem.q_start), len(problem.q_goals)
         old = sum(len(t.nodes) for t in previous)
@@ -112,7 +113,7 @@ def search(
     options: RRTStarOptions,
     rng: np.random.Generator,
     deadline: Deadline,
-    previous: tuple[Tree, ...],
+    previous: Sequence[Tree],
 ) -> PlanResult:
     """Return the best path after `max_samples` draws, or after `improve_time` since the first."""
     world = problem.world
