@@ -33,7 +33,7 @@ METHOD = """\
   **0.02 %**: when the cost of RRT-H, improving for {budget} ms, first came there; the exact
   shortest on maps is that of the visibility graph.
 - **Full query**: nearest free postures that aim, plan, shorten, with one further growth and a
-  margin of 2 cm; the packing of the wearer's boxes, once a body message, is not counted. A long run
+  margin of 2 cm; the packing of the boxes, once a body message, is not counted. A long run
   tries 32 times the postures and several times 50 ms of growths.
 - **The node** is asked over its service by a client in another process; body, target and joints
   are published and acknowledged before. Memory is its resident set.
