@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import gc
 import os
+from pathlib import Path
 import sys
 import time
 
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.arrays import Array
+from rrth_planner.campaign.store import replace_file
 from rrth_planner.errors import RrthError
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.fields import nanoseconds_of
@@ -24,6 +26,8 @@ from rrth_planner.ros.messages import joint_trajectory_to_msg
 from rrth_planner.trajectory import sample, Trajectory
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
+
+from benchmarks import jitter_report
 
 NODE = 'rrth_planner.ros.playback_node'
 RATES = (100.0, 500.0)
@@ -121,23 +125,16 @@ def measure(rate: float, seconds: float) -> dict[str, dict[str, dict[str, float]
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Print the figures of each rate."""
+    """Write a page with the figures of each rate."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--rates', type=float, nargs='+', default=list(RATES), help='[Hz]')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each figure [s]')
+    parser.add_argument('--output', default='docs/playback.md', help='where the page goes')
     options = parser.parse_args(arguments)
-    print('| Hz | arm | by | p50 [ms] | p99 [ms] | max [ms] | missed | of |')
-    print('| --- | --- | --- | --- | --- | --- | --- | --- |')
-    for rate in options.rates:
-        for arm, figures in measure(rate, options.seconds).items():
-            for by, row in figures.items():
-                numbers = ' | '.join(
-                    f'{row[key]:.3f}' if key in row else '' for key in ('p50', 'p99', 'max')
-                )
-                counts = ' | '.join(
-                    f'{row[key]:.0f}' if key in row else '' for key in ('missed', 'intervals')
-                )
-                print(f'| {rate:g} | {arm} | {by} | {numbers} | {counts} |', flush=True)
+    measured = {rate: measure(rate, options.seconds) for rate in options.rates}
+    page = jitter_report.page(measured, 'python -m benchmarks.jitter', options.seconds)
+    replace_file(Path(options.output), lambda fresh: fresh.write_text(page, encoding='utf-8'))
+    print(page)
     return 0
 
 

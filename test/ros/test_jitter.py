@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from benchmarks import jitter  # noqa: E402
+from benchmarks import jitter, jitter_report  # noqa: E402
 from rrth_planner.trajectory import sample  # noqa: E402
 
 
@@ -30,6 +30,17 @@ def test_a_position_that_is_late_for_its_stamp_is_seen():
     figures = jitter._time_errors(np.stack([stamps, stamps + 0.3, q], axis=1), swings)
     assert figures['p99'] < 1e-3
     assert figures['max'] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_the_page_has_a_line_for_each_figure():
+    figures = {
+        'published': {'p50': 0.05, 'p99': 0.2, 'max': 1.0, 'missed': 3.0, 'intervals': 98.0}
+    }
+    moving = {**figures, 'positions': {'p99': 0.1, 'max': 0.4}}
+    text = jitter_report.page({100.0: {'idle': figures, 'moving': moving}}, 'python -m x', 60.0)
+    assert 'Written by `python -m x`; do not edit.' in text
+    assert '| 100 | idle | published | 0.050 | 0.200 | 1.000 | 3 | 98 |' in text
+    assert '| 100 | moving | positions | – | 0.100 | 0.400 | – | – |' in text
 
 
 @pytest.mark.slow
