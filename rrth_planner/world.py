@@ -87,7 +87,13 @@ class World:
         return bool(((q >= self.bounds[0]) & (q <= self.bounds[1])).all())
 
     def is_valid(self, q: Array, ray_length: float | None = None) -> bool:
-        """Return whether q, shape (dof,), is within limits and free, with a ray that long [m]."""
+        """
+        Return whether q, shape (dof,), is within limits and free, with a ray that long [m].
+
+        A point on a map has no ray.
+        """
+        if self.chain is chain.NO_CHAIN:
+            return self.is_edge_valid(q, q)
         ray = self.ray_length if ray_length is None else ray_length
         return self.is_in_bounds(q) and bool(
             arm_validity.is_configuration_free(q, ray, self.chain, self.obstacles)

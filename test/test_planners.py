@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner import oracle
+from rrth_planner import oracle, star
 from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem, map_world
 from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.options import (
@@ -21,6 +21,7 @@ from rrth_planner.options import (
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.shortest import shortest_path
 from rrth_planner.status import PlanStatus
 from rrth_planner.world import arm_world
 import worlds
@@ -47,14 +48,14 @@ SHORTEST = {'c_shape': 113.07113394, 'spiral': 158.83831257, 'fence': 361.545655
 
 
 def _wall_map(dof):
-    """Return a map with a wall across that leaves a gap at one end of the second axis."""
+    """Return a map of two walls: past one along the second axis, past the other along the last."""
     low, high = np.zeros(dof), np.full(dof, 10.0)
-    wall = np.array([low, high])
-    wall[:, 0] = 4.5, 5.5
-    wall[:, 1] = 0.0, 7.0
+    walls = np.array([[low, high], [low, high]])
+    walls[0, :, 0], walls[0, :, 1] = (3.5, 4.5), (0.0, 7.0)
+    walls[1, :, 0], walls[1, :, -1] = (6.0, 7.0), (0.0, 7.0)
     start, goal = np.full(dof, 2.0), np.full(dof, 2.0)
-    goal[0] = 8.0
-    return BoxMap(name=f'wall_{dof}', bounds=[low, high], obstacles=[wall], start=start, goal=goal)
+    goal[0] = 9.0
+    return BoxMap(name=f'wall_{dof}', bounds=[low, high], obstacles=walls, start=start, goal=goal)
 
 
 def _map(name):
@@ -62,7 +63,10 @@ def _map(name):
 
 
 def _is_box_free(box_map, q_from, q_to):
-    """Judge an edge of a map by dense points, none of which may be deep inside a box."""
+    """Judge an edge of a map by dense points, within it and none of them deep inside a box."""
+    low, high = box_map.bounds
+    if not all(((q >= low) & (q <= high)).all() for q in (q_from, q_to)):
+        return False
     n = int(np.linalg.norm(q_to - q_from) / 0.01) + 2
     points = q_from + np.linspace(0.0, 1.0, n)[:, None] * (q_to - q_from)
     deep = 1e-6
@@ -86,20 +90,29 @@ def _problems():
     arm, scene = worlds.table_1_arm(), worlds.wearer()
     world = arm_world(arm, scene, 0.0, 1.0)
     start = np.array([0.0, -0.35, 1.5707963267948966, 1.5707963267948966])
-    # Postures on the other side of the head, straight ways to which are blocked.
-    goals = np.array([[-2.2, -0.9, 1.2, -1.4], [-2.4, -1.0, 1.0, -1.2]])
-    goals = np.array([q for q in goals if world.is_valid(q)])
-    rng = np.random.default_rng(5)
+    # Postures round the body, the straight ways to which are blocked.
+    rng, goals = np.random.default_rng(5), []
     while len(goals) < 2:
         q = rng.uniform(*arm.bounds)
         if world.is_valid(q) and not world.is_edge_valid(start, q):
-            goals = np.vstack([goals.reshape(-1, 4), q])
+            goals.append(q)
     problems['arm_4'] = (
         PlanningProblem(world=world, q_start=start, q_goals=goals),
-        lambda a, b: not worlds.edge_touches(arm, scene, 0.0, 1.0, a, b, 2e-3),
+        lambda a, b: (
+            all(((q >= arm.bounds[0]) & (q <= arm.bounds[1])).all() for q in (a, b))
+            and not worlds.edge_touches(arm, scene, 0.0, 1.0, a, b, 2e-3)
+        ),
         1.0,
     )
     return problems
+
+
+def test_no_goal_of_the_problems_is_reached_by_a_straight_edge():
+    for problem, is_free, _ in _problems().values():
+        for q in problem.q_goals:
+            assert problem.world.is_valid(q)
+            assert not problem.world.is_edge_valid(problem.q_start, q)
+            assert not is_free(problem.q_start, q)
 
 
 def _options(algorithm, factor):
@@ -147,7 +160,11 @@ def test_the_cost_is_the_length_and_never_rises(algorithm, name):
 @everything
 def test_the_edges_of_the_trees_are_free_and_lead_back_to_a_root(algorithm, name):
     _, is_free, _ = _problems()[name]
-    for tree in _solved(algorithm, name).trees:
+    result = _solved(algorithm, name)
+    assert result.n_samples > 0
+    assert len(result.trees) == 1 + ALGORITHMS[algorithm].is_bidirectional
+    assert sum(len(tree.nodes) for tree in result.trees) >= 4
+    for tree in result.trees:
         children = np.flatnonzero(tree.parents >= 0)
         # A parent comes before its children, so there is no cycle.
         assert (tree.parents[children] < children).all()
@@ -163,6 +180,32 @@ def test_the_same_seed_gives_the_same_bytes(algorithm, name):
     assert again.path.waypoints.tobytes() == first.path.waypoints.tobytes()
     assert again.cost_history == first.cost_history
     assert [t.nodes.tobytes() for t in again.trees] == [t.nodes.tobytes() for t in first.trees]
+
+
+@pytest.mark.parametrize('algorithm', STAR_LIKE)
+@pytest.mark.parametrize('name', PROBLEMS)
+def test_the_best_cost_of_a_tree_never_rises_from_draw_to_draw(algorithm, name, monkeypatch):
+    told = []
+
+    def spied(advance):
+        def spy(*arguments):
+            made = advance(*arguments)
+            told.append(arguments[-1][:made].copy())
+            return made
+
+        return spy
+
+    for kernel in (star.rrt_star, star.informed_rrt_star, star.rrt_star_smart):
+        monkeypatch.setattr(kernel, 'advance', spied(kernel.advance))
+    problem, _, factor = _problems()[name]
+    for seed in (4, 5):
+        told.clear()
+        result = plan(problem, _options(algorithm, factor), np.random.default_rng(seed))
+        costs = np.concatenate(told)
+        assert len(costs) == result.n_samples
+        assert (costs[1:] <= costs[:-1]).all()
+        assert costs[-1] == pytest.approx(result.path.length, rel=1e-9)
+        assert name == 'wall_6' or len(np.unique(costs[np.isfinite(costs)])) > 1
 
 
 @pytest.mark.parametrize('algorithm', STAR_LIKE)
@@ -211,13 +254,22 @@ def test_a_step_adapted_to_the_clearance_still_finds_free_paths(algorithm, name)
     assert result.status is PlanStatus.SOLVED
     q = result.path.waypoints
     assert all(is_free(a, b) for a, b in zip(q[:-1], q[1:], strict=True))
-    plain = plan(problem, _options(algorithm, factor), np.random.default_rng(1))
-    if algorithm == 'rrt':
-        steps = [
-            np.linalg.norm(np.diff(r.raw_path.waypoints, axis=0), axis=1)[:-1].min()
-            for r in (result, plain)
-        ]
-        assert steps[0] < steps[1]
+    if name == 'wall_3' and isinstance(options, RRTStarOptions):
+        # Where there is much room the parent that RRT* chooses is further away than the step.
+        return
+    plain = replace(options, clearance_gain=0.0)
+    mean, mean_plain = (
+        np.mean(
+            [
+                np.linalg.norm(np.diff(tree.nodes[[i, tree.parents[i]]], axis=0)).item()
+                for seed in range(3)
+                for tree in plan(problem, given, np.random.default_rng(seed)).trees
+                for i in np.flatnonzero(tree.parents >= 0)
+            ]
+        )
+        for given in (options, plain)
+    )
+    assert mean < 0.97 * mean_plain
 
 
 @pytest.mark.parametrize('algorithm', ALGORITHMS)
@@ -304,6 +356,34 @@ def test_the_path_club_finds_the_shorter_way_round():
     assert without < with_club
 
 
+def test_the_path_club_turns_growths_away_until_their_budget_is_spent():
+    problem = map_problem(_map('two_ways'))
+    common = {
+        'step_size': 10.0,
+        'corner_spacing': 0.05,
+        'improve_time': 60.0,
+        'time_limit': 60.0,
+        'club_budget': 70,
+    }
+    changes = ({'club_radius': 0.0}, {'club_probability': 0.0}, {'club_count': 10**6})
+    n_spared = [0] * len(changes)
+    for seed in range(10):
+        rng = functools.partial(np.random.default_rng, seed)
+        first = plan(problem, RRTHOptions(club_attempts=0, **common), rng())
+        closed_to_all = RRTHOptions(
+            club_attempts=3, club_radius=500.0, club_count=0, club_probability=1.0, **common
+        )
+        closed = plan(problem, closed_to_all, rng())
+        # All of the map is near a member: nobody is let in, and all draws are made in vain.
+        assert closed.n_samples == first.n_samples + 3 * 70
+        assert closed.path.waypoints.tobytes() == first.path.waypoints.tobytes()
+        for k, change in enumerate(changes):
+            let_in = plan(problem, replace(closed_to_all, **change), rng())
+            assert let_in.n_samples <= closed.n_samples
+            n_spared[k] += closed.n_samples - let_in.n_samples
+    assert all(n > 0 for n in n_spared)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', [RRTStarOptions, InformedRRTStarOptions])
 @pytest.mark.parametrize('name', ['c_shape', 'spiral'])
@@ -321,6 +401,73 @@ def test_rrt_star_tends_to_the_shortest_path(kind, name):
         for seed in range(3)
     ]
     assert np.median(ratios) <= 1.02
+
+
+@functools.cache
+def _excess(kind, name, n_seeds=20, **changes):
+    """Return by how much paths exceed the shortest one, a share for each seed; inf: no path."""
+    problem, shortest = map_problem(_map(name)), shortest_path(_map(name))[0]
+    options = kind(
+        step_size=10.0, time_limit=60.0, improve_time=60.0, is_bidirectional=False, **changes
+    )
+    results = [plan(problem, options, np.random.default_rng(seed)) for seed in range(n_seeds)]
+    return np.array([np.inf if r.path is None else r.path.length / shortest - 1 for r in results])
+
+
+STARS = (RRTStarOptions, InformedRRTStarOptions, RRTStarSmartOptions)
+
+
+@pytest.mark.parametrize('name', ['c_shape', 'spiral'])
+@pytest.mark.parametrize('kind', STARS)
+def test_rrt_h_is_shorter_than_others_after_2000_draws_with_each_seed(kind, name):
+    ours = _excess(
+        RRTHOptions, name, corner_spacing=0.05, corner_moves=0, club_attempts=0, near_bias=0.0
+    )
+    assert (ours < _excess(kind, name, max_samples=2000)).all()
+
+
+def test_informed_rrt_star_gains_by_its_ellipse_where_that_is_slim():
+    plain, informed = (
+        np.median(_excess(kind, 'c_shape_near', max_samples=2000))
+        for kind in (RRTStarOptions, InformedRRTStarOptions)
+    )
+    assert informed < 0.5 * plain
+
+
+def test_rrt_star_smart_is_nearer_to_the_shortest_path_than_rrt_star():
+    for name in ('c_shape', 'spiral'):
+        plain, smart = (
+            np.median(_excess(kind, name, max_samples=2000))
+            for kind in (RRTStarOptions, RRTStarSmartOptions)
+        )
+        assert smart < 0.5 * plain
+
+
+def test_every_so_many_draws_of_rrt_star_smart_are_near_a_beacon():
+    problem, shares = map_problem(_map('c_shape')), []
+    for ratio in (10**6, 8, 2):
+        options = RRTStarSmartOptions(
+            step_size=10.0,
+            max_samples=2000,
+            biasing_ratio=ratio,
+            improve_time=60.0,
+            time_limit=60.0,
+            is_bidirectional=False,
+        )
+        near = []
+        for seed in range(5):
+            result = plan(problem, options, np.random.default_rng(seed))
+            beacons = result.path.waypoints[1:-1]
+            nodes = result.trees[0].nodes[:, None]
+            near.append((np.linalg.norm(nodes - beacons, axis=2).min(axis=1) < 5.0).mean())
+            # Whatever can be skipped is.
+            q = result.path.waypoints
+            assert not any(
+                problem.world.is_edge_valid(a, b) for a, b in zip(q[:-2], q[2:], strict=True)
+            )
+        shares.append(np.mean(near))
+    assert 1.5 * shares[0] < shares[1]
+    assert 1.5 * shares[1] < shares[2]
 
 
 def test_rrt_h_as_printed_can_be_run_and_may_be_invalid():
