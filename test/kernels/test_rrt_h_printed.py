@@ -144,7 +144,7 @@ def first_blocked(world, p, i, targets, checks):
 
 
 def forward_in_words(world, path, targets, checks):
-    """Step 1 of the paper."""
+    """Return a path after step 1 of the paper."""
     p, i = list(path), 0
     while i + 2 < len(p):
         p_t, blocked = first_blocked(world, p, i, targets, checks)
@@ -157,7 +157,7 @@ def forward_in_words(world, path, targets, checks):
 
 
 def corners_in_words(world, path, targets, checks, k):
-    """Step 3 of the paper."""
+    """Return a path after step 3 of the paper."""
     p, i = list(path), 0
     while i + 2 < len(p):
         p_t, blocked = first_blocked(world, p, i, targets, checks)
@@ -173,7 +173,7 @@ def corners_in_words(world, path, targets, checks, k):
 
 
 def steps_in_words(world, path, k, targets, checks):
-    """Steps 1, 2 and 3 of the paper."""
+    """Return a path after steps 1, 2 and 3 of the paper."""
     p = forward_in_words(world, path, targets, checks)
     p = forward_in_words(world, p[::-1], targets, checks)[::-1]
     return corners_in_words(world, p, targets, checks, k)
