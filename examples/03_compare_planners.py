@@ -1,18 +1,23 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the planners on a map; `python examples/03_compare_planners.py [MAP]`."""
+"""Compare the planners on a map; `python examples/03_compare_planners.py [MAP or FILE.yaml]`."""
 
 import sys
 
 import numpy as np
 from rrth_planner.campaign.paper_runs import ALGORITHMS, FIVE
-from rrth_planner.campaign.problems import load_map, load_problem
+from rrth_planner.campaign.problems import load_problem
+from rrth_planner.errors import RrthError
+from rrth_planner.map_file import load_map
 from rrth_planner.planner import plan
 from rrth_planner.shortest import shortest_path
 
 name = sys.argv[1] if len(sys.argv) > 1 else 'c_shape'
-exact, _ = shortest_path(load_map(name))
-problem = load_problem(name).problem
+try:
+    box_map, problem = load_map(name), load_problem(name).problem
+except RrthError as refused:
+    sys.exit(str(refused))
+exact, _ = shortest_path(box_map)
 
 print(f'{name}: the shortest path is {exact:.2f} long')
 for algorithm in FIVE:

@@ -185,9 +185,33 @@ def goal_configurations(
 
 
 def pointing_problem(
-    arm: ArmModel, goal: PointingGoal, world: World, q_start: Array, goals: GoalSet
+    arm: ArmModel, goal: PointingGoal, world: World, q_start: Array, goals: GoalSet | None = None
 ) -> PlanningProblem:
-    """Return the planning problem of a pointing goal."""
+    """
+    Return the planning problem of a pointing goal.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    goal : PointingGoal
+    world : World
+        Of that arm.
+    q_start : ndarray, shape (dof,)
+        [rad].
+    goals : GoalSet, optional
+        None: those that `goal_configurations` finds near q_start.
+
+    Raises
+    ------
+    ModelError
+        The ray of the arm sweeps no more than a surface; only where goals are to be found.
+
+    """
+    if goals is None:
+        check_pointing_arm(arm)
+        goals = goal_configurations(arm, goal, world, q_start, FEW)
+        if len(goals.q_goals) == 0:
+            goals = goal_configurations(arm, goal, world, q_start, MANY)
     return PlanningProblem(
         world=world,
         q_start=q_start,

@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+import reprlib
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)
 NO_CONTACTS = jit.first_class(contacts.no_contacts)
 FREE_RADIUS = jit.first_class(map_validity.free_radius)
+# What a mapping that describes a map may say.
+ENTRIES = ('name', 'bounds', 'rectangles', 'boxes', 'start', 'goal')
+EXPECTED = 'bounds, rectangles or boxes, start and goal, and a name or none'
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -90,28 +94,34 @@ def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:
     Return the map that a mapping describes, laid out as the files in `config/maps`.
 
     In the plane a row of `rectangles` is xmin, ymin, xmax, ymax; in general a row of `boxes` is
-    the lower corner, then the upper one, and `bounds` alike.
+    the lower corner, then the upper one, and `bounds` alike. A map has the one or the other.
 
     Raises
     ------
     SceneError
-        Something is missing, has another name or describes no map.
+        Something is missing, has another name, is there twice or describes no map.
 
     """
+    if not isinstance(data, Mapping):
+        raise SceneError(f'map "{name}": {reprlib.repr(data)}, expected a mapping with {EXPECTED}')
+    # A wall under a name that nobody reads would be no wall.
+    unknown = [str(key) for key in data if key not in ENTRIES]
+    if unknown:
+        raise SceneError(f'map "{name}": {", ".join(unknown)} unknown, expected only {EXPECTED}')
+    if 'rectangles' in data and 'boxes' in data:
+        raise SceneError(f'map "{name}": rectangles and boxes, expected one of them')
     try:
         start = np.asarray(data['start'], dtype=float)
         rows = data['rectangles'] if 'rectangles' in data else data['boxes']
         return BoxMap(
             name=str(data.get('name', name)),
             bounds=np.asarray(data['bounds'], dtype=float).reshape(2, len(start)),
-            obstacles=np.asarray(rows, dtype=float).reshape(-1, 2, len(start)),
+            obstacles=np.asarray(rows, dtype=float).reshape(len(rows), 2, len(start)),
             start=start,
             goal=np.asarray(data['goal'], dtype=float),
         )
     except KeyError as missing:
-        raise SceneError(
-            f'map "{name}": no {missing}, expected bounds, rectangles or boxes, start and goal'
-        ) from None
+        raise SceneError(f'map "{name}": no {missing}, expected {EXPECTED}') from None
     except (TypeError, ValueError, AttributeError) as problem:
         raise SceneError(
             f'map "{name}": {problem}; expected numbers laid out as in config/maps'

@@ -33,10 +33,31 @@ def resource_path(name: str) -> Path:
     raise ModelError(f'file {name}: not found, expected in one of {[str(f) for f in folders]}')
 
 
+class _UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
+    """YAML whose keys are said once: of two, the first would be dropped without a word."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        """Return a mapping, or raise MarkedYAMLError where a key comes again."""
+        keys = [key.value for key, _ in node.value if key.tag != 'tag:yaml.org,2002:merge']
+        for i, key in enumerate(keys):
+            if isinstance(key, str) and key in keys[:i]:
+                raise yaml.MarkedYAMLError(problem=f'{key} twice', problem_mark=node.start_mark)
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
 def load_yaml(path: str | Path) -> Any:
-    """Return what a YAML file holds, or raise ModelError when it cannot be read."""
+    """
+    Return what a YAML file holds.
+
+    Raises
+    ------
+    ModelError
+        It cannot be read, or a mapping in it has a key twice.
+
+    """
     try:
-        return yaml.safe_load(Path(path).read_text(encoding='utf-8'))
+        return yaml.load(Path(path).read_text(encoding='utf-8'), _UniqueKeys)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as problem:
         reason = ' '.join(str(problem).split())
         raise ModelError(f'file {path}: {reason}; expected a readable YAML file') from problem

@@ -56,6 +56,12 @@ def test_a_map_without_walls_is_a_map(tmp_path):
         ('[28, 0, 32, 25]', '[28, 0, 28, 25]', 'expected a positive size along every axis'),
         ('goal: [55, 20]', 'goal: [65, 20]', 'goal [65.0, 20.0], expected within'),
         ('start: [5, 20]', 'start: [5, -1]', 'start [5.0, -1.0], expected within'),
+        ('rectangles:', 'rectangels:', 'rectangels unknown, expected only'),
+        ('goal: [55, 20]', 'goal: [55, 20]\nwalls: []', 'walls unknown, expected only'),
+        ('rectangles:', 'boxes: []\nrectangles:', 'rectangles and boxes, expected one of them'),
+        ('rectangles:', 'rectangles: []\nboxes:', 'rectangles and boxes, expected one of them'),
+        ('25]', '25, 30]\n  - [1, 1, 2]', 'expected numbers laid out as in config/maps'),
+        ('[28, 0, 32, 25]', '[0, 0, 1, 1, 2, 2]\n  - [3, 3, 4, 4, 5, 5]', 'laid out as'),
         ('goal: [55, 20]\n', '', "no 'goal', expected bounds, rectangles or boxes"),
         ('bounds: [0, 0, 60, 40]\n', '', "no 'bounds', expected bounds, rectangles or boxes"),
         ('start: [5, 20]', 'start: [.nan, 20]', 'start: [nan, 20.0], expected finite numbers'),
@@ -78,6 +84,18 @@ def test_a_bad_map_is_refused_in_one_sentence(tmp_path, old, new, told):
     assert 'map "' in sentence
     assert '\n' not in sentence
     assert len(sentence) < 250
+
+
+def test_a_wall_that_a_second_one_of_its_name_would_hide_is_no_silent_loss(tmp_path):
+    with pytest.raises(RrthError, match='rectangles twice') as refusal:
+        read(tmp_path, GATE + 'rectangles: []\n')
+    assert '\n' not in str(refusal.value)
+
+
+@pytest.mark.parametrize('text', ['', '[1, 2]', 'a wall'])
+def test_a_file_that_holds_no_map_is_refused_in_one_sentence(tmp_path, text):
+    with pytest.raises(SceneError, match='expected a mapping with bounds, rectangles or boxes'):
+        read(tmp_path, text)
 
 
 @pytest.mark.parametrize('text', ['bounds: [0, 0', '\t- :'])

@@ -14,11 +14,12 @@ import pyarrow.parquet as pq
 from rrth_planner.campaign import cluster
 from rrth_planner.campaign.cluster import cluster_client, run_campaign
 from rrth_planner.campaign.paper_runs import ALGORITHMS, PRINTED, RRT, RRT_H, RRT_STAR
-from rrth_planner.campaign.problems import load_map, load_problem
+from rrth_planner.campaign.problems import load_problem
 from rrth_planner.campaign.runs import execute, Run
 from rrth_planner.campaign.statistics import histories_on, Rows
 from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
 from rrth_planner.errors import RrthError
+from rrth_planner.map_file import load_map
 from rrth_planner.shortest import shortest_path
 
 # Columns that differ from run to run whatever the seed.

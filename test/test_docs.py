@@ -5,6 +5,8 @@
 import ast
 from pathlib import Path
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -102,16 +104,40 @@ def test_links_lead_somewhere(page):
             assert fragment in map(anchor, headings), f'{page.name}: no heading for {link}'
 
 
-def test_snippets_of_the_readme_are_in_the_examples_that_it_names():
+def test_a_snippet_of_the_readme_is_in_the_example_that_it_names():
     text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    snippets = SNIPPET.findall(text)
-    assert len(snippets) == text.count('```python') > 0
-    for before, snippet in snippets:
-        (name,) = re.findall(r'`(examples/\w+\.py)`', before)
+    named = [
+        (name, snippet)
+        for before, snippet in SNIPPET.findall(text)
+        for name in re.findall(r'`(examples/\w+\.py)`', before)
+    ]
+    assert named
+    for name, snippet in named:
         example = (ROOT / name).read_text(encoding='utf-8')
         assert snippet in example, f'README.md quotes what {name} does not have'
         # Complete: all that it needs, it imports.
         assert example.split('"""')[2].strip().startswith(snippet.split('\n')[0])
+
+
+# What the snippets of the README print: a length of 158.84 at best; the start comes first.
+PLANNED = {
+    'A point on a map': r'solved 158\.[89]',
+    'A path of the arm': r'solved \[\[ 0\. +-0\.35 ',
+}
+
+
+@pytest.mark.parametrize('start', PLANNED)
+def test_five_lines_of_the_readme_plan(start, tmp_path):
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    (snippet,) = (code for before, code in SNIPPET.findall(text) if before.startswith(start))
+    statements = ast.parse(snippet).body
+    assert sum(not isinstance(s, ast.Import | ast.ImportFrom) for s in statements) == 5
+    code = f'import sys; sys.path.insert(0, {str(ROOT)!r})\n{snippet}'
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=tmp_path, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.match(PLANNED[start], done.stdout), done.stdout
 
 
 def spoken():

@@ -19,15 +19,15 @@ TOLD = {
 }
 
 
-def run(example, folder, *arguments):
-    """Return what an example prints."""
+def run(example, folder, *arguments, is_refused=False):
+    """Return what an example prints, or what it says where it refuses."""
     code = f'import runpy, sys; sys.path.insert(0, {str(ROOT)!r}); sys.argv[1:] = {arguments!r}; '
     code += f"runpy.run_path({str(example)!r}, run_name='__main__')"
     done = subprocess.run(
         [sys.executable, '-c', code], cwd=folder, capture_output=True, text=True, timeout=300
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert (done.returncode == 0) == (not is_refused), done.stderr
+    return done.stderr if is_refused else done.stdout
 
 
 @pytest.mark.parametrize('example', EXAMPLES, ids=lambda path: path.stem)
@@ -45,3 +45,18 @@ def test_the_first_example_plans_on_a_map_of_ones_own(tmp_path):
     told = run(EXAMPLES[0], tmp_path, 'gate.yaml')
     assert 'solved' in told
     assert '[28.0, 25.0]' in told
+
+
+@pytest.mark.parametrize(
+    ('text', 'told'),
+    [
+        ('start: [5, 20]\nboxes: []\nwalls: []\n', 'map "gate": walls unknown, expected only'),
+        ('start: [5, 20\n', 'expected a readable YAML file'),
+    ],
+)
+def test_a_bad_map_is_refused_by_the_examples_in_one_sentence(text, told, tmp_path):
+    (tmp_path / 'gate.yaml').write_text(text, encoding='utf-8')
+    for example in (EXAMPLES[0], EXAMPLES[2]):
+        said = run(example, tmp_path, 'gate.yaml', is_refused=True)
+        assert told in said
+        assert len(said.splitlines()) == 1

@@ -24,8 +24,9 @@ from rrth_planner.campaign.paper_runs import (
     TWO_WAYS,
 )
 from rrth_planner.campaign.plane_claims import verdict
-from rrth_planner.campaign.problems import CERTIFIED, load_map
+from rrth_planner.campaign.problems import CERTIFIED
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
+from rrth_planner.map_file import load_map
 from rrth_planner.shortest import shortest_path
 
 # Figure 20: mean accumulated change of each joint [deg], and its reduction [%].

@@ -18,7 +18,6 @@ from rrth_planner.campaign.paper_runs import (
     STEPS,
     with_near,
 )
-from rrth_planner.campaign.problems import load_map
 from rrth_planner.campaign.statistics import (
     markdown_table,
     NOTHING,
@@ -28,6 +27,7 @@ from rrth_planner.campaign.statistics import (
     share_of,
     spread,
 )
+from rrth_planner.map_file import load_map
 from rrth_planner.shortest import shortest_path
 
 OTHERS = (RRT_STAR, INFORMED, SMART)

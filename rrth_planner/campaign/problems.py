@@ -5,16 +5,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from rrth_planner.aiming import check_pointing_arm, goal_configurations, MANY
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
-from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
+from rrth_planner.box_map import map_problem
 from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.errors import OptionsError, SceneError
 from rrth_planner.goal import PointingGoal
+from rrth_planner.map_file import load_map
 from rrth_planner.oracle import first_contact
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import load_arm, load_yaml, resource_path
@@ -100,15 +100,6 @@ def load_problem(name: str, collision: str = CERTIFIED) -> NamedProblem:
     return NamedProblem(
         name=name, problem=problem, is_path_valid=is_path_valid, is_body_clear=is_path_valid
     )
-
-
-def load_map(name: str) -> BoxMap:
-    """Return a map of `config/maps`, or that of a file if the name ends in `.yaml`."""
-    path = Path(name) if name.endswith('.yaml') else resource_path(f'config/maps/{name}.yaml')
-    data = load_yaml(path)
-    if not isinstance(data, dict):
-        raise SceneError(f'map "{name}": expected a mapping laid out as in config/maps')
-    return map_from_mapping(data, path.stem)
 
 
 def load_wearer() -> Scene:

@@ -23,13 +23,13 @@ from rrth_planner.campaign.paper_runs import (
 )
 from rrth_planner.campaign.problems import (
     CERTIFIED,
-    load_map,
     load_problem,
     load_wearer,
     RAY,
     TARGETS,
 )
 from rrth_planner.campaign.statistics import Rows
+from rrth_planner.map_file import load_map
 from rrth_planner.path import Path as JointPath
 from rrth_planner.planner import plan
 from rrth_planner.resources import load_arm
