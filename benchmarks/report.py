@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from rrth_planner.campaign.statistics import markdown_table
 
+from benchmarks import pace
 from benchmarks.harness import published
 from benchmarks.measures import figures
 from benchmarks.table import (
@@ -78,6 +79,8 @@ Written by `{command}`; do not edit.
 ## Targets
 
 {markdown_table(TARGET_HEADER, target_lines(rows))}
+
+{pace.sentence(rows)}
 
 ## What is measured, and how
 

@@ -10,6 +10,7 @@ from rrth_planner.campaign.statistics import NOTHING
 
 from benchmarks.harness import published
 from benchmarks.measures import gap, measured, peer_median, percentile, time_within, total_time
+from benchmarks.pace import slowness
 from benchmarks.queries import MAPS, QUERIES
 from benchmarks.targets import Target, TARGETS, WHY_NOT
 from benchmarks.task import Row
@@ -33,6 +34,8 @@ PEER_HEADER = (
     *('problem', 'planner', 'whose', 'runs with a path', 'first path [ms]', 'time in all [ms]'),
     *('over the best known [%]', 'to within 5 % [ms]', 'to within 1 % [ms]', 'paths that hold'),
 )
+# Units of what a slower machine takes longer for.
+TIMES = ('ns', 'us', 'ms', 's')
 SURVIVAL_HEADER = ('planner', 'whose', 'maps', 'arm')
 _PROBLEMS = (*MAPS, *QUERIES)
 
@@ -50,6 +53,7 @@ def _target_line(rows: Sequence[Row], target: Target, reasons: Mapping[str, str]
         return [*line, 'not measured', *[NOTHING] * 5, _peer(rows, target), '']
     value = statistic(values, target.statistic)
     is_met, is_share = target.is_met_by(value), target.measure == 'share near'
+    why = [] if is_met else [*_details(rows, target), *_pace(rows, target, value)]
     has_spread = len(values) > 1 and not is_share
     spread = [_number(percentile(values, share)) for share in (10, 50, 90)]
     n_there = int(values.sum() if is_share else np.isfinite(values).sum())
@@ -60,7 +64,7 @@ def _target_line(rows: Sequence[Row], target: Target, reasons: Mapping[str, str]
         *(spread if has_spread else [NOTHING] * 3),
         f'{n_there} of {len(values)}' if len(values) > 1 else NOTHING,
         _peer(rows, target),
-        '' if is_met else ' '.join([*_details(rows, target), reasons.get(target.key, '')]).strip(),
+        '' if is_met else ' '.join([*why, reasons.get(target.key, '')]).strip(),
     ]
 
 
@@ -77,6 +81,14 @@ def _details(rows: Sequence[Row], target: Target) -> list[str]:
         return []
     told = [row['detail'] for row in rows if row['quantity'] == target.name and row['detail']]
     return [f'{text}.' for text in told]
+
+
+def _pace(rows: Sequence[Row], target: Target, value: float) -> list[str]:
+    """Return that the machine is slow, where that is enough of a reason."""
+    slow = slowness(rows)
+    if slow is None or target.unit not in TIMES or value > slow * target.limit:
+        return []
+    return [f'The C++ peer, too, takes {slow:.2f} times as long here.']
 
 
 def _peer(rows: Sequence[Row], target: Target) -> str:

@@ -11,7 +11,17 @@ pytest.importorskip('tqdm')
 pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
-from benchmarks import __main__ as starter, dense, draws, figures, harness, judge, measures
+from benchmarks import (
+    __main__ as starter,
+    dense,
+    draws,
+    figures,
+    harness,
+    judge,
+    measures,
+    pace,
+    table,
+)
 from benchmarks.extent import Extent, QUICK
 from benchmarks.queries import load_query, MAPS, QUERIES, table_1_arm, wearer, wearer_world
 from benchmarks.report import report
@@ -168,6 +178,30 @@ def test_lines_of_the_harness_become_rows_with_a_verdict(tmp_path):
     file.write_text('{"problem": "c_shape"}\n')
     with pytest.raises(RrthError, match='expected a run'):
         harness.read_runs(file)
+
+
+def test_the_pace_of_a_machine_is_that_of_the_peer_who_was_timed_elsewhere_too(tmp_path):
+    known, lines = pace.published_first(), []
+    assert set(known) == {*MAPS, *QUERIES}
+    # The peer takes twice as long here, but for one problem.
+    for problem, first in known.items():
+        factor = 9.0 if problem == 'lap' else 2.0
+        run = {'problem': problem, 'planner': 'RRTConnect', 'seed': 1, 'solved': True}
+        run |= {'t_first': factor * first * 1e-3, 'c_first': 9.0, 't_max': 0.0, 'c_max': 9.0}
+        lines.append(json.dumps(run))
+    (tmp_path / 'one.jsonl').write_text('\n'.join(lines))
+    rows = harness.read_runs(tmp_path / 'one.jsonl')
+    assert pace.slowness(rows) == pytest.approx(2.0)
+    assert 'takes 2.00 times as long here' in pace.sentence(rows)
+    assert pace.slowness(rows[:2]) is None
+    assert 'was not compared' in pace.sentence([])
+
+    # A reason is what makes up for all of a miss, and no excuse for a share or a length.
+    target = next(t for t in TARGETS if t.what == 'one configuration')
+    assert table._pace(rows, target, 1.9 * target.limit)
+    assert not table._pace(rows, target, 2.1 * target.limit)
+    gap = next(t for t in TARGETS if t.unit.startswith('%'))
+    assert not table._pace(rows, gap, 1.5 * gap.limit)
 
 
 def test_the_quick_extent_is_smaller_in_everything():
