@@ -32,7 +32,7 @@ class PlaybackRules:
     start_tolerance : float
         Greatest distance of a new motion from the present state, per joint [rad and rad/s].
     time_scale : float
-        Seconds of the motion per second of the clock, above 0 and up to 1 [-].
+        Seconds of a motion that begins at rest per second of the clock, above 0 and up to 1 [-].
     limits : MotionLimits
         What each joint may do; braking keeps to the jerk, a motion may have any.
 
@@ -68,7 +68,8 @@ def accept(
     Return what the arm does when a new motion replaces the present one.
 
     Until a motion begins that begins later, the arm goes on with what it does now; one that has
-    not begun when another comes never does.
+    not begun when another comes never does. What begins while a motion is under way, a takeover
+    or a stop, goes on at that motion's pace: a new `time_scale` counts from the next rest on.
 
     Parameters
     ----------
@@ -91,10 +92,11 @@ def accept(
 
     """
     before = at_present(playback, time)
+    is_under_way = before.end_time > max(time, start_time)
     new = Playback(
         trajectory=trajectory,
         start_time=start_time,
-        time_scale=rules.time_scale,
+        time_scale=before.time_scale if is_under_way else rules.time_scale,
         before=before if start_time > time else None,
     )
     # Numbers that overflow become infinite or NaN, which every comparison below refuses.

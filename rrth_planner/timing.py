@@ -16,8 +16,9 @@ from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # A motion shorter than this is none: the arm holds still for HOLD seconds.
 STILL, HOLD = 1e-9, 0.1
-# Messages carry whole nanoseconds; two points closer than this are one [s].
-TICK, CLOSEST = 1e-9, 1e-5
+# Messages carry whole nanoseconds; two points closer than this are one: in shorter pieces the last
+# digits of positions and times are a jerk worth speaking of [s].
+TICK, CLOSEST = 1e-9, 5e-5
 # Where blends are cut into cells, as shares of their length. At constant speed through all of it
 # a blend is one piece, or else it is passed slower in the middle where that is so much faster.
 SUBDIVISIONS = ((0.0, 1.0), (0.0, 0.05, 0.12, 0.22, 0.35, 0.65, 0.78, 0.88, 0.95, 1.0))

@@ -5,6 +5,7 @@
 import numpy as np
 import pytest
 from rrth_planner.acceptance import accept, PlaybackRules
+from rrth_planner.emergency import emergency_stop
 from rrth_planner.errors import MessageError, OptionsError
 from rrth_planner.path import Path
 from rrth_planner.playback import Playback, standing, stop
@@ -260,6 +261,27 @@ def test_in_slow_motion_a_motion_from_the_present_state_is_as_slow_as_the_one_it
         np.testing.assert_allclose(one, other, atol=1e-9)
     with pytest.raises(MessageError, match='begins at velocity'):
         taken(running, turn_from((q, v, a), FOLDED, 2.5), 1.6, time_scale=0.5)
+
+
+@pytest.mark.parametrize(('before', 'after'), [(0.5, 1.0), (1.0, 0.5), (0.2, 0.7)])
+def test_a_stop_is_taken_at_the_pace_of_the_motion_whatever_the_time_scale_is_by_then(
+    before, after
+):
+    move = motion(FOLDED, FOLDED - 0.8, duration=2.0)
+    running = taken(standing(FOLDED), move, time_scale=before)
+    phase = 0.9
+    braking = emergency_stop(move, phase, LIMITS)
+    now = phase / before
+    stopped = taken(running, braking, now, time_scale=after)
+    assert stopped.time_scale == before
+    for one, other in zip(stopped.state_at(now), running.state_at(now), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6)
+    assert np.abs(stopped.state_at(stopped.end_time)[1]).max() < 1e-12
+    # From rest on it counts.
+    later = stopped.end_time + 1.0
+    q = stopped.state_at(later)[0]
+    back = taken(stopped, motion(q, FOLDED, duration=2.0), later, time_scale=after)
+    assert back.end_time == pytest.approx(later + 2.0 / after)
 
 
 def test_a_braking_arm_takes_a_motion_from_its_present_state():

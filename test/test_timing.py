@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Timed paths: at rest at both ends, on the path, within limits, in whole nanoseconds."""
 
+from fractions import Fraction
+from itertools import pairwise
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -103,6 +106,44 @@ def check_motion(trajectory, path, blends, bounds):
             assert gap.min() < 1e-6
             assert np.abs(trajectory.velocities[np.argmin(gap)]).max() < 1e-2
     assert not away.any()
+
+
+def exact_jerk(trajectory):
+    """Return the greatest jerk of each joint, reckoned in rational numbers, shape (dof,)."""
+    nanoseconds = np.round(trajectory.times * 1e9).astype(int).tolist()
+    greatest = [0.0] * trajectory.positions.shape[1]
+    for k, (begin, end) in enumerate(pairwise(nanoseconds)):
+        T = Fraction(end - begin, 10**9)
+        for j in range(len(greatest)):
+            (p0, p1), (v0, v1), (a0, a1) = (
+                [Fraction(float(values[i, j])) for i in (k, k + 1)]
+                for values in (
+                    trajectory.positions,
+                    trajectory.velocities,
+                    trajectory.accelerations,
+                )
+            )
+            # The quintic through both ends; its jerk is a parabola.
+            p, v, a = p1 - p0 - v0 * T - a0 * T**2 / 2, v1 - v0 - a0 * T, a1 - a0
+            c3 = (10 * p - 4 * v * T + a * T**2 / 2) / T**3
+            c4 = (-15 * p + 7 * v * T - a * T**2) / T**4
+            c5 = (6 * p - 3 * v * T + a * T**2 / 2) / T**5
+            instants = [Fraction(0), T]
+            if c5:
+                instants += [u for u in [-c4 / (5 * c5)] if 0 < u < T]
+            jerk = max(abs(6 * c3 + 24 * c4 * u + 60 * c5 * u**2) for u in instants)
+            greatest[j] = max(greatest[j], float(jerk))
+    return np.array(greatest)
+
+
+# The first two have edges of a millionth of a radian.
+@pytest.mark.parametrize('seed', [198, 305, *range(20)])
+def test_jerk_holds_in_the_shortest_piece_in_exact_arithmetic(seed):
+    rng = np.random.default_rng(seed)
+    path = random_path(rng)
+    bounds = random_limits(rng, path.waypoints.shape[1])
+    trajectory = parameterize(path, blends_of(path, rng), bounds)
+    assert (exact_jerk(trajectory) <= 1.01 * bounds.jerk).all()
 
 
 def derivatives(trajectory):
