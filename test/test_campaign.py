@@ -13,13 +13,26 @@ pytest.importorskip('tqdm')
 import pyarrow.parquet as pq
 from rrth_planner.campaign import cluster
 from rrth_planner.campaign.cluster import cluster_client, run_campaign
-from rrth_planner.campaign.paper_runs import ALGORITHMS, PRINTED, RRT, RRT_H, RRT_STAR
+from rrth_planner.campaign.escape_claims import both_ways_shares
+from rrth_planner.campaign.paper_runs import (
+    ALGORITHMS,
+    PRINTED,
+    RRT,
+    RRT_H,
+    RRT_STAR,
+    SCATTERED,
+    SCATTERED_CLUB,
+    SMART,
+    TWO_WAYS,
+)
 from rrth_planner.campaign.problems import load_problem
 from rrth_planner.campaign.runs import execute, Run
 from rrth_planner.campaign.statistics import histories_on, Rows
 from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
+from rrth_planner.campaign.table_1 import is_the_papers
 from rrth_planner.errors import RrthError
 from rrth_planner.map_file import load_map
+from rrth_planner.resources import load_arm
 from rrth_planner.shortest import shortest_path
 
 # Columns that differ from run to run whatever the seed.
@@ -52,6 +65,59 @@ def test_a_row_tells_what_was_asked_and_what_came_out():
     assert star['history_cost'][-1] == pytest.approx(star['cost_final'])
     assert all(row['is_valid'] for row in (rrt, rrt_h, star))
     assert all(row['python_version'] and row['numba_version'] for row in (rrt, rrt_h, star))
+
+
+def test_the_first_cost_of_smart_is_of_its_path_as_it_shortened_it():
+    star, smart = (execute(run, 'serial') for run in runs(1, (RRT_STAR, SMART)))
+    # The same growth up to the first path.
+    assert smart['draws_first'] == star['draws_first']
+    assert smart['cost_first'] < 0.97 * star['cost_first']
+
+
+def test_growths_after_each_other_leave_a_row_of_the_ways_that_they_took():
+    rows = Rows(
+        [
+            execute(Run(problem=TWO_WAYS, algorithm=name, options=options, seed=seed), 'cluster')
+            for name, options in SCATTERED.items()
+            for seed in range(25)
+        ]
+    )
+    assert all(len(row['ways']) == 8 and row['is_valid'] for row in rows.rows)
+    assert all(row['cost_final'] <= row['cost_first'] for row in rows.rows)
+    club, plain = (both_ways_shares(rows, name, 25) for name in SCATTERED)
+    for shares in (club, plain):
+        assert len(shares) == 8
+        assert shares[0] == 0.0
+        assert shares == sorted(shares)
+    # Without the club a growth hardly ever takes the worse way.
+    assert club[3] > 0.7
+    assert plain[3] < 0.4
+
+
+def test_growths_after_each_other_are_rows_that_are_made_once(tmp_path):
+    path = tmp_path / 'rows.parquet'
+    asked = [
+        Run(problem=TWO_WAYS, algorithm=name, options=options, seed=seed)
+        for name, options in SCATTERED.items()
+        for seed in range(2)
+    ]
+    assert run_campaign(asked, path) == 4
+    assert run_campaign(asked, path) == 0
+    kept = Rows(read_rows(path).to_pylist())
+    assert [row['ways'] for row in kept.where(algorithm=SCATTERED_CLUB).rows] == [
+        execute(run, 'serial')['ways'] for run in asked[:2]
+    ]
+
+
+def test_the_arm_is_that_of_table_1_and_no_other_passes_for_it():
+    arm = load_arm()
+    assert is_the_papers(arm)
+    # What the ray's d is, the table leaves open.
+    for i in range(arm.dh.size - 1):
+        dh = arm.dh.copy()
+        dh.flat[i] += 1e-3
+        assert not is_the_papers(replace(arm, dh=dh))
+    assert not is_the_papers(replace(arm, bounds=0.99 * arm.bounds))
 
 
 def test_the_judge_of_a_map_finds_what_the_printed_steps_break():

@@ -2,13 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The reproduction writes its table and its pictures, and goes on where it was."""
 
+from dataclasses import replace
+import re
+
 import pytest
 
 pytest.importorskip('pyarrow')
 pytest.importorskip('tqdm')
 pytest.importorskip('matplotlib')
+pytest.importorskip('distributed')
 
 from matplotlib.image import imread
+from rrth_planner.campaign import escape, runs
+from rrth_planner.campaign.cluster import cluster_client
+from rrth_planner.campaign.paper_runs import ALGORITHMS, PRINTED_DENSE, QUICK, RRT
+from rrth_planner.campaign.plane_claims import plane_claims
+from rrth_planner.campaign.statistics import Rows
+from rrth_planner.campaign.store import read_rows
 from rrth_planner.reproduce import main
 
 TINY = ('--quick', '--serial', '--runs', '2', '--seeds', '2', '--maps', 'c_shape', '--targets')
@@ -21,6 +31,30 @@ def output(tmp_path_factory):
     folder = tmp_path_factory.mktemp('reproduction')
     assert main([*TINY, 'low_left', '--output', str(folder)]) == 0
     return folder
+
+
+def test_the_scheduler_that_is_named_does_the_runs_and_a_bar_shows_how_far_they_are(
+    tmp_path, monkeypatch, capsys
+):
+    asked = [
+        runs.Run(problem='c_shape', algorithm=RRT, options=ALGORITHMS[RRT], seed=seed)
+        for seed in range(6)
+    ]
+    monkeypatch.setattr('rrth_planner.reproduce.timed_runs', lambda _: asked[:2])
+    monkeypatch.setattr('rrth_planner.reproduce.spread_runs', lambda _: asked[2:])
+    # Six runs fill no table.
+    monkeypatch.setattr('rrth_planner.campaign.paper_report.report', lambda *_: 'told')
+    monkeypatch.setattr('rrth_planner.viewers.paper_pictures.draw_pictures', lambda *_: {})
+    with cluster_client(n_workers=1) as cluster:
+        address = cluster.scheduler.address
+        assert main(['--scheduler', address, '--output', str(tmp_path)]) == 0
+        # The worker has loaded the kernels of what it ran.
+        assert list(cluster.run(lambda: len(runs._warm)).values()) == [1]
+    rows = Rows(read_rows(tmp_path / 'reproduction.parquet').to_pylist())
+    shown = capsys.readouterr().err
+    for label, timing, n in (('one by one', 'serial', 2), ('side by side', 'cluster', 4)):
+        assert len(rows.where(timing=timing)) == n
+        assert re.search(rf'{label}: 100%\|.*\| {n}/{n} \[', shown), shown
 
 
 def test_every_figure_is_drawn(output):
@@ -51,9 +85,41 @@ def test_a_second_time_runs_nothing_and_writes_the_same(output, monkeypatch):
         raise AssertionError('a run was done again')
 
     monkeypatch.setattr('rrth_planner.campaign.cluster.execute', refuse)
+    # The two that Figure 14 shows are grown again; its shares come from rows.
+    grown = []
+    monkeypatch.setattr(
+        escape, 'grow', lambda *a, grow=escape.grow, **k: grown.append(a) or grow(*a, **k)
+    )
     assert main([*TINY, 'low_left', '--output', str(output)]) == 0
+    assert 0 < len(grown) <= 16
     assert report.read_text(encoding='utf-8') == before
     assert data.read_bytes() == rows
+
+
+def test_the_report_tells_what_spacings_cost_what_goal_bias_does_and_which_arm_it_is(output):
+    text = (output / 'reproduction.md').read_text(encoding='utf-8')
+    verdict = r'\*\*(holds|does not hold)\*\*'
+    for claim in ('Denser P_C cost time', 'A smaller k costs time', 'Both cost time, .*'):
+        cell = rf'{verdict}: [\d.]+ ms become [\d.]+ ms, \d+ waypoints \d+; \d of 2 seeds slower'
+        assert re.search(rf'\| {claim}\. \| c_shape \| {cell} \| {cell} \|', text), claim
+    for bias in ('none', '5 %'):
+        assert re.search(rf'\| c_shape \| {bias} \| 2 of 2 \| \d+ \(', text), bias
+    assert 'is that of Table 1 **holds**' in text
+    assert re.search(r'\| L3 \| 0\.386 \| 0\.386 \|', text)
+    told = re.sub(r'\s+', ' ', text)
+    assert '10 check points lie on the first 1 m of the ray, every 10 cm' in told
+    assert 'The first cost of RRT*-Smart is that of its first path as it shortened it' in told
+
+
+@pytest.mark.parametrize(('factor', 'told'), [(100.0, '**holds**'), (0.01, '**does not hold**')])
+def test_whether_denser_points_cost_time_is_told_from_the_rows(output, factor, told):
+    rows = read_rows(output / 'reproduction.parquet').to_pylist()
+    for row in rows:
+        row['time_total'] *= factor if row['algorithm'] == PRINTED_DENSE else 1.0
+    extent = replace(QUICK, few=2, many=2, maps=('c_shape',))
+    (line,) = (c for c in plane_claims(Rows(rows), extent) if c[0] == 'Denser P_C cost time.')
+    assert line[2].startswith(told)
+    assert line[3].startswith(told)
 
 
 @pytest.mark.parametrize('arguments', [('--runs', '0'), ('--maps', 'moon'), ('--runs', 'ten')])

@@ -1,29 +1,22 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper says of the arm (section 6.2), of the escape and of its collision test."""
+"""What the paper says of the arm (Table 1, section 6.2) and of its collision test."""
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.campaign.escape import both_ways_shares
 from rrth_planner.campaign.paper_runs import (
-    ATTEMPTS,
     CHECK_POINTS,
-    CLUB,
-    club_label,
     Extent,
     INFORMED,
     LONG,
     long_label,
-    NO_CLUB,
     PRINTED,
     PRINTED_FINE,
     RRT,
     RRT_H,
     RRT_STAR,
     SAMPLED,
-    TWO_WAYS,
 )
-from rrth_planner.campaign.plane_claims import verdict
 from rrth_planner.campaign.problems import CERTIFIED
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
 from rrth_planner.map_file import load_map
@@ -32,8 +25,6 @@ from rrth_planner.shortest import shortest_path
 # Figure 20: mean accumulated change of each joint [deg], and its reduction [%].
 PAPER_TRAVEL = {RRT: (181.28, 172.57, 212.57, 140.38), RRT_H: (88.38, 69.16, 92.00, 93.89)}
 PAPER_REDUCTION, PAPER_OVERALL = (51.24, 59.92, 56.72, 33.11), 51.4
-# A path this much over the shortest one goes round the better side.
-BETTER = 1.05
 
 
 def mean_travel(rows: Rows, extent: Extent, name: str, n: int) -> Array:
@@ -138,53 +129,6 @@ def mode_table(rows: Rows, extent: Extent) -> str:
             lines.append([problem, name, str(some.n_solved()), touch, 'no margin'])
     header = ('problem', 'planner or check', 'paths', 'touch', 'touch without the margin')
     return markdown_table(header, lines)
-
-
-def better_way_share(rows: Rows, name: str, attempts: int) -> float:
-    """Return the share of the runs that end on the shorter way round."""
-    exact = shortest_path(load_map(TWO_WAYS))[0]
-    some = rows.where(problem=TWO_WAYS, algorithm=club_label(name, attempts))
-    return float((some.aligned('cost_final') < BETTER * exact).mean()) if len(some) else np.nan
-
-
-def escape_table(rows: Rows) -> str:
-    """Return how often the better way round is found, with the path club and without."""
-    lines = []
-    for attempts in ATTEMPTS:
-        cells = [str(attempts)]
-        for name in (CLUB, NO_CLUB):
-            some = rows.where(problem=TWO_WAYS, algorithm=club_label(name, attempts))
-            cells += [
-                percent(better_way_share(rows, name, attempts), 1),
-                number(some.median('draws_total'), 0),
-            ]
-        lines.append(cells)
-    header = ('`club_attempts`', 'better way, club', 'draws', 'better way, no club', 'draws')
-    return markdown_table(header, lines)
-
-
-def escape_claim(rows: Rows) -> str:
-    """Return the sentence on the escape."""
-    none, last = better_way_share(rows, CLUB, 0), better_way_share(rows, CLUB, ATTEMPTS[-1])
-    plain = better_way_share(rows, NO_CLUB, ATTEMPTS[-1])
-    return (
-        f'That the best of several paths wins {verdict(last >= 0.99)}: {percent(last, 1)} of the '
-        f'runs end on the better way with the escape, {percent(none, 1)} with a single growth, '
-        f'{percent(plain, 1)} with as many growths that know nothing of a club.'
-    )
-
-
-def ways_claim(extent: Extent) -> str:
-    """Return the sentence on how the club scatters growths."""
-    with_club = both_ways_shares(range(extent.many), has_club=True)
-    without = both_ways_shares(range(extent.many), has_club=False)
-    k = 4
-    club, none = with_club[k - 1], without[k - 1]
-    return (
-        f'That the club makes growths explore other ways {verdict(club > none)}: {k} growths '
-        f'have found both ways in {percent(club)} of {extent.many} runs with it, in '
-        f'{percent(none)} without (Figure 14).'
-    )
 
 
 def long_table(rows: Rows, extent: Extent) -> str:

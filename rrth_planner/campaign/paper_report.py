@@ -6,17 +6,25 @@ from collections.abc import Mapping, Sequence
 
 from rrth_planner.campaign.arm_claims import (
     arm_table,
-    escape_claim,
-    escape_table,
     long_table,
     mode_table,
     target_table,
-    ways_claim,
 )
-from rrth_planner.campaign.paper_runs import ARM_STEP, Extent, STEPS, TWO_WAYS
-from rrth_planner.campaign.plane_claims import plane_claims, plane_table
-from rrth_planner.campaign.problems import MARGIN
+from rrth_planner.campaign.escape_claims import escape_claim, escape_table, ways_claim
+from rrth_planner.campaign.paper_runs import (
+    ARM_STEP,
+    DENSE,
+    Extent,
+    SPARSE,
+    STEPS,
+    TWO_WAYS,
+)
+from rrth_planner.campaign.plane_claims import goal_bias_table, plane_claims, plane_table
+from rrth_planner.campaign.problems import MARGIN, RAY
 from rrth_planner.campaign.statistics import markdown_table, Rows
+from rrth_planner.campaign.table_1 import table_1, table_1_claim
+from rrth_planner.kernels.arm_sampling import POINTS_PER_BAR
+from rrth_planner.resources import load_arm
 
 
 def report(
@@ -39,7 +47,7 @@ def report(
         By caption, where the pictures are, relative to the report.
 
     """
-    row = rows.rows[0]
+    row, arm = rows.rows[0], load_arm()
     commit = f', commit {row["commit"]}' if row['commit'] else ''
     claims = markdown_table(
         (
@@ -89,9 +97,17 @@ RRT and RRT-H stop at the first path; the others run {STEPS} steps.
 
 {plane_table(rows, extent, extent.many)}
 
+The first cost of RRT*-Smart is that of its first path as it shortened it at once; all others are
+of paths as they were grown.
+
 RRT* and Informed RRT* approach the exact shortest path as theory says:
 
 {long_table(rows, extent)}
+
+Draws of the goal itself, which the paper names beside the work that it builds on, and without
+which all runs above are made: growth of RRT, the first {extent.seeds} seeds.
+
+{goal_bias_table(rows, extent)}
 
 ## The escape from local traps (section 4)
 
@@ -99,14 +115,20 @@ The paper says that the path club makes new growths explore other ways round, an
 several paths wins (Figure 14; it gives no number). Measured on `{TWO_WAYS}`, whose ways differ by
 a third.
 
-{ways_claim(extent)}
+{ways_claim(rows, extent)}
 
 {escape_claim(rows)} ({extent.seeds} seeds.) Why the last two hardly differ: from this start a
 growth seldom takes the worse way, so that one more growth mostly mends it, with a club or without.
 
 {escape_table(rows)}
 
-## The arm (section 6.2)
+## The arm (section 5, Table 1)
+
+{table_1_claim(arm)} The tool's row stands for L5, the ray.
+
+{table_1(arm)}
+
+## The arm's motions (section 6.2)
 
 Accumulated change of the four joint angles from the folded state to {len(extent.targets)} targets,
 each by the nearest free posture that aims at it; none is reached by a straight edge. RRT and RRT-H
@@ -123,11 +145,15 @@ the way round the body demand is left, which is why joint 2, which hardly has to
 
 ## The collision tests (section 6.1)
 
+{POINTS_PER_BAR} check points lie on the first {RAY:g} m of the ray, every
+{100 * RAY / POINTS_PER_BAR:g} cm, as the paper has them, and as many on each bar of the arm, where
+it gives no number.
+
 RRT-H with its edges checked in three ways, its paths judged every 0.002 rad by exact clipping
 against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A taut
 path leans on the body, so what a test does not see between two checks is where it touches. On
-maps the judge is exact, and RRT-H as printed is shown with check points every 1 and every 0.2
-map units.
+maps the judge is exact, and RRT-H as printed is shown with check points every {SPARSE:g} and every
+{DENSE:g} map units.
 
 {mode_table(rows, extent)}
 

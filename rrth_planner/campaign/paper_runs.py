@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from rrth_planner.campaign.escape import ScatterOptions
 from rrth_planner.campaign.problems import CERTIFIED, TARGETS
 from rrth_planner.campaign.runs import Run
 from rrth_planner.options import (
@@ -42,11 +43,13 @@ _RRT_H: dict[str, Any] = {
     'club_attempts': 0,
     'improve_time': 600.0,
 }
+# Of the printed steps, sparse and dense.
+SPARSE, DENSE = 1.0, 0.2
 _PRINTED: dict[str, Any] = {
     **_RRT_H,
-    'corner_spacing': 1.0,
-    'target_spacing': 1.0,
-    'check_spacing': 1.0,
+    'corner_spacing': SPARSE,
+    'target_spacing': SPARSE,
+    'check_spacing': SPARSE,
 }
 
 RRT, RRT_STAR, INFORMED, SMART, RRT_H = (
@@ -58,6 +61,8 @@ RRT, RRT_STAR, INFORMED, SMART, RRT_H = (
 )
 FIVE = (RRT, RRT_STAR, INFORMED, SMART, RRT_H)
 PRINTED, PRINTED_FINE = 'RRT-H as printed', 'RRT-H as printed, fine'
+PRINTED_DENSE, PRINTED_SMALL = 'RRT-H as printed, dense P_C', 'RRT-H as printed, small k'
+PRINTED_OTHERS = (PRINTED_FINE, PRINTED_DENSE, PRINTED_SMALL)
 LONG_STEP, BIASED = 'RRT, step 20', 'RRT, goal bias 5 %'
 CLUB, NO_CLUB = 'RRT-H, path club', 'RRT-H, no club'
 ALGORITHMS: dict[str, TreeOptions] = {
@@ -68,8 +73,10 @@ ALGORITHMS: dict[str, TreeOptions] = {
     RRT_H: RRTHOptions(**_RRT_H),
     PRINTED: PrintedRRTHOptions(**_PRINTED),
     PRINTED_FINE: PrintedRRTHOptions(
-        **{**_PRINTED, 'corner_spacing': 0.2, 'target_spacing': 0.2, 'check_spacing': 0.2}
+        **{**_PRINTED, 'corner_spacing': DENSE, 'target_spacing': DENSE, 'check_spacing': DENSE}
     ),
+    PRINTED_DENSE: PrintedRRTHOptions(**{**_PRINTED, 'check_spacing': DENSE}),
+    PRINTED_SMALL: PrintedRRTHOptions(**{**_PRINTED, 'corner_spacing': DENSE}),
     LONG_STEP: RRTOptions(**{**_GROWTH, 'step_size': 20.0}),
     BIASED: RRTOptions(**{**_GROWTH, 'goal_bias': 0.05}),
 }
@@ -78,6 +85,20 @@ ATTEMPTS = (0, 1, 2, 3, 4, 6)
 CLUB_BUDGET = 400
 # More club points than this, so near [map units], turn a new point away with this chance.
 CLUB_COUNT, CLUB_RADIUS, CLUB_PROBABILITY = 2, 10.0, 0.9
+# Growths alone, after each other, and the draws of each at most: with the path club and without.
+SCATTERED_CLUB, SCATTERED_PLAIN = 'growths, path club', 'growths, no club'
+N_GROWTHS, SCATTER_BUDGET = 8, 1000
+_SCATTER: dict[str, Any] = {
+    **_RRT_H,
+    'club_attempts': N_GROWTHS - 1,
+    'club_budget': SCATTER_BUDGET,
+    'club_count': CLUB_COUNT,
+    'club_probability': CLUB_PROBABILITY,
+}
+SCATTERED = {
+    SCATTERED_CLUB: ScatterOptions(**{**_SCATTER, 'club_radius': CLUB_RADIUS}),
+    SCATTERED_PLAIN: ScatterOptions(**{**_SCATTER, 'club_radius': 0.0}),
+}
 # The arm's step [rad]: the paper gives none; with this one RRT's paths wind as much as its do.
 ARM_STEP = 0.6
 _ARM: dict[str, Any] = {'step_size': ARM_STEP, 'max_samples': 200_000}
@@ -124,11 +145,24 @@ QUICK = Extent(few=10, many=20, seeds=50, long=3, arm=4, arm_modes=4)
 
 def timed_runs(extent: Extent) -> list[Run]:
     """Return the runs whose times are told, to be done one after another."""
+    wanted = [
+        *(
+            (problem, name, seed)
+            for problem in with_near(extent.maps)
+            for name in FIVE
+            for seed in range(extent.many)
+        ),
+        # Compared seed by seed: one right after the other, so that the machine is the same.
+        *(
+            (problem, name, seed)
+            for problem in with_near(extent.maps)
+            for seed in range(extent.many)
+            for name in (PRINTED, *(PRINTED_OTHERS if problem in extent.maps else ()))
+        ),
+    ]
     return [
         Run(problem=problem, algorithm=name, options=ALGORITHMS[name], seed=seed)
-        for problem in with_near(extent.maps)
-        for name in (*FIVE, PRINTED)
-        for seed in range(extent.many)
+        for problem, name, seed in wanted
     ]
 
 
@@ -163,7 +197,7 @@ def _map_runs(extent: Extent) -> Iterable[Run]:
     for problem in extent.maps:
         for name in (RRT, RRT_H, PRINTED, PRINTED_FINE, LONG_STEP, BIASED):
             # Seeds that the timed runs have are not done twice.
-            first = extent.many if name in (RRT, RRT_H, PRINTED) else 0
+            first = 0 if name in (LONG_STEP, BIASED) else extent.many
             for seed in range(first, extent.seeds):
                 yield Run(problem=problem, algorithm=name, options=ALGORITHMS[name], seed=seed)
 
@@ -197,6 +231,9 @@ def _club_runs(extent: Extent) -> Iterable[Run]:
                     options=options,
                     seed=seed,
                 )
+    for name, scatter in SCATTERED.items():
+        for seed in range(extent.many):
+            yield Run(problem=TWO_WAYS, algorithm=name, options=scatter, seed=seed)
 
 
 def _arm_runs(extent: Extent) -> Iterable[Run]:

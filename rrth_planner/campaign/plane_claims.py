@@ -6,15 +6,22 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from rrth_planner.campaign.paper_runs import (
+    BIASED,
+    DENSE,
     Extent,
     FIVE,
     INFORMED,
     LONG_STEP,
     NEAR,
     PRINTED,
+    PRINTED_DENSE,
+    PRINTED_FINE,
+    PRINTED_SMALL,
+    RRT,
     RRT_H,
     RRT_STAR,
     SMART,
+    SPARSE,
     STEPS,
     with_near,
 )
@@ -112,6 +119,27 @@ def plane_claims(rows: Rows, extent: Extent) -> list[list[str]]:
             'points at a spacing do not see corners either. Valid: by exact clipping.',
         ),
         (
+            'Denser P_C cost time.',
+            extent.maps,
+            _costs_time(PRINTED_DENSE),
+            f'RRT-H as printed, P_C every {DENSE:g} against every {SPARSE:g} map units, all else '
+            'the same: the same growths, then more points to look at. Compared seed by seed.',
+        ),
+        (
+            'A smaller k costs time.',
+            extent.maps,
+            _costs_time(PRINTED_SMALL),
+            f'k of {DENSE:g} against {SPARSE:g} map units, all else the same: more corners are '
+            'still cut, at a few lines of sight each, beside the growth that both share.',
+        ),
+        (
+            'Both cost time, denser P_T too.',
+            extent.maps,
+            _costs_time(PRINTED_FINE),
+            f'k, P_T and P_C of {DENSE:g} against {SPARSE:g}. What it buys stands under the '
+            'collision tests.',
+        ),
+        (
             'Informed RRT* has no advantage over RRT* on tortuous maps: its ellipse covers the '
             'whole map.',
             extent.maps,
@@ -203,6 +231,40 @@ def _printed(rows: Rows, problem: str, n: int) -> str:
         f'{verdict(some.share("is_valid") == 1.0)}: {percent(1.0 - some.share("is_valid"))} of '
         f'the paths enter a wall; median cost {number(some.median("cost_final"))}'
     )
+
+
+def _costs_time(dense: str) -> Measure:
+    def measure(rows: Rows, problem: str, n: int) -> str:
+        sparse, finer = (
+            rows.where(problem=problem, algorithm=name, below=n) for name in (PRINTED, dense)
+        )
+        before, after = 1e3 * sparse.median('time_total'), 1e3 * finer.median('time_total')
+        is_slower = finer.aligned('time_total') > sparse.aligned('time_total')
+        return (
+            f'{verdict(after > before)}: {number(before)} ms become {number(after)} ms, '
+            f'{number(sparse.median("n_waypoints"), 0)} waypoints '
+            f'{number(finer.median("n_waypoints"), 0)}; {share_of(is_slower)} seeds slower'
+        )
+
+    return measure
+
+
+def goal_bias_table(rows: Rows, extent: Extent) -> str:
+    """Return what it does to RRT's growth that some draws are the goal itself."""
+    lines = []
+    for problem in extent.maps:
+        for name, label in ((RRT, 'none'), (BIASED, '5 %')):
+            some = rows.where(problem=problem, algorithm=name, below=extent.seeds)
+            lines.append(
+                [
+                    problem,
+                    label,
+                    f'{some.n_solved()} of {len(some)}',
+                    spread(some.values('draws_first'), 0),
+                    spread(some.values('cost_final')),
+                ]
+            )
+    return markdown_table(('map', 'goal bias', 'found', 'P_random', 'first cost'), lines)
 
 
 def _informed(rows: Rows, problem: str, n: int) -> str:

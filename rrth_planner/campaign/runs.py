@@ -8,23 +8,27 @@ from functools import cache
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
 import json
-from pathlib import Path
+import pathlib
 import platform
 import subprocess
+from time import perf_counter
 from typing import Any
 
 import numpy as np
-from rrth_planner.campaign.problems import CERTIFIED, load_problem
+from rrth_planner.campaign.escape import goes_over_the_top, scattered_growths, ScatterOptions
+from rrth_planner.campaign.problems import CERTIFIED, load_problem, NamedProblem
 from rrth_planner.options import TreeOptions
+from rrth_planner.path import Path
 from rrth_planner.planner import plan
 from rrth_planner.result import PlanResult
+from rrth_planner.status import PlanStatus
 
 Row = dict[str, Any]
 # What decides about a row besides the run itself.
 _SOURCES = (
     *('growth', 'star', 'rrt_h', 'printed', 'planner', 'workspace', 'problem', 'box_map'),
     *('checking', 'aiming', 'world', 'box_tree', 'reach', 'options', 'oracle', 'shortest'),
-    *('campaign/problems', 'campaign/runs'),
+    *('campaign/problems', 'campaign/runs', 'campaign/escape', 'map_file'),
 )
 
 
@@ -66,7 +70,7 @@ def options_digest(options: TreeOptions) -> str:
 @cache
 def source_digest() -> str:
     """Return a short digest of the sources that decide what a run brings."""
-    root = Path(__file__).parent.parent
+    root = pathlib.Path(__file__).parent.parent
     files = [*sorted((root / 'kernels').glob('*.py')), *(root / f'{n}.py' for n in _SOURCES)]
     return _digest(''.join(file.read_text(encoding='utf-8') for file in files))
 
@@ -88,7 +92,7 @@ def provenance() -> Mapping[str, str | None]:
 def processor_name() -> str:
     """Return the processor's own name where the system tells it."""
     try:
-        for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
+        for line in pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
             if line.startswith('model name'):
                 return line.partition(':')[2].strip()
     except OSError:
@@ -111,16 +115,10 @@ def execute(run: Run, timing: str) -> Row:
 
     """
     named = load_problem(run.problem, run.collision)
-    kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
-    if kind not in _warm:
-        # Kernels are loaded by the first plan that uses them: that is not its planning time.
-        plan(named.problem, run.options, np.random.default_rng(run.seed))
-        _warm.add(kind)
-    result = plan(named.problem, run.options, np.random.default_rng(run.seed))
-    waypoints = None if result.path is None else result.path.waypoints
-    is_valid = None if waypoints is None else named.is_path_valid(waypoints)
-    # What keeps off the grown boxes keeps off the body too.
-    is_body_clear = is_valid or (None if waypoints is None else named.is_body_clear(waypoints))
+    if isinstance(run.options, ScatterOptions):
+        found = _scattered(named, run.options, run.seed)
+    else:
+        found = _planned(named, run)
     return {
         'key': run.key(),
         'problem': run.problem,
@@ -131,10 +129,41 @@ def execute(run: Run, timing: str) -> Row:
         'seed': run.seed,
         'collision': run.collision,
         'timing': timing,
-        **_outcome(result),
-        'is_valid': is_valid,
-        'is_body_clear': is_body_clear,
+        **found,
         **provenance(),
+    }
+
+
+def _planned(named: NamedProblem, run: Run) -> Row:
+    """Return the columns that a plan brings."""
+    kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
+    if kind not in _warm:
+        # Kernels are loaded by the first plan that uses them: that is not its planning time.
+        plan(named.problem, run.options, np.random.default_rng(run.seed))
+        _warm.add(kind)
+    result = plan(named.problem, run.options, np.random.default_rng(run.seed))
+    waypoints = None if result.path is None else result.path.waypoints
+    is_valid = None if waypoints is None else named.is_path_valid(waypoints)
+    # What keeps off the grown boxes keeps off the body too.
+    is_body_clear = is_valid or (None if waypoints is None else named.is_body_clear(waypoints))
+    return {**_outcome(result), 'is_valid': is_valid, 'is_body_clear': is_body_clear}
+
+
+def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
+    """Return the columns that growths after each other bring; what is left out is null."""
+    start = perf_counter()
+    growths = scattered_growths(named.problem, options, seed)
+    elapsed = perf_counter() - start
+    paths = [Path(g.waypoints) for g in growths if g.waypoints is not None]
+    is_valid = all(named.is_path_valid(path.waypoints) for path in paths)
+    return {
+        'status': (PlanStatus.SOLVED if paths else PlanStatus.SAMPLE_LIMIT).value,
+        'time_total': elapsed,
+        'cost_first': paths[0].length if paths else None,
+        'cost_final': min(path.length for path in paths) if paths else None,
+        'draws_total': sum(g.n_samples for g in growths),
+        'is_valid': is_valid if paths else None,
+        'ways': [None if g.waypoints is None else goes_over_the_top(g.waypoints) for g in growths],
     }
 
 
@@ -174,7 +203,7 @@ def _commit() -> str | None:
     try:
         told = subprocess.run(
             ['git', 'rev-parse', '--short', 'HEAD'],
-            cwd=Path(__file__).parent,
+            cwd=pathlib.Path(__file__).parent,
             capture_output=True,
             text=True,
             timeout=10.0,
@@ -186,7 +215,11 @@ def _commit() -> str | None:
 
 
 def _first_cost(result: PlanResult) -> float | None:
-    """Return the length of the first path, before any shortening, or None."""
+    """
+    Return the length of the first path, or None.
+
+    RRT-H's before any shortening; RRT*-Smart's after its own, with which its history begins.
+    """
     if result.raw_path is not None:
         return result.raw_path.length
     return result.cost_history[0] if result.cost_history else None

@@ -39,6 +39,8 @@ SCHEMA = pa.schema(
         ('is_body_clear', pa.bool_()),
         # Sum of the changes of each joint along the path [rad].
         ('joint_travel', pa.list_(pa.float64())),
+        # Of each of several growths, whether it went the longer way; null where it found none.
+        ('ways', pa.list_(pa.bool_())),
         # After each improvement: length of the best path, draws and seconds until then.
         ('history_cost', pa.list_(pa.float64())),
         ('history_draws', pa.list_(pa.int64())),

@@ -8,16 +8,20 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.campaign.escape import both_ways_shares, scattered_paths
+from rrth_planner.arrays import Array
+from rrth_planner.campaign.escape import scattered_growths
+from rrth_planner.campaign.escape_claims import both_ways_shares
 from rrth_planner.campaign.paper_runs import (
     ALGORITHMS,
     ARM_ALGORITHMS,
-    CLUB_RADIUS,
     Extent,
     FIVE,
     NEAR,
     RRT,
     RRT_H,
+    SCATTERED,
+    SCATTERED_CLUB,
+    SCATTERED_PLAIN,
     TWO_WAYS,
     with_near,
 )
@@ -77,16 +81,16 @@ def draw_pictures(rows: Rows, extent: Extent, output: Path) -> dict[str, list[st
     caption = f'Figure 12: histograms of cost and of time, {n} runs (triangles: medians)'
     save(caption, 'figure_12', histogram_figure(rows, maps, n))
     shares = {
-        label: both_ways_shares(range(extent.many), has_club=has_club)
-        for label, has_club in (('with the path club', True), ('without', False))
+        label: both_ways_shares(rows, name, n)
+        for label, name in (('with the path club', SCATTERED_CLUB), ('without', SCATTERED_PLAIN))
     }
     save(
         'Figure 14: the escape from local traps',
         'figure_14',
         escape_figure(
             load_map(TWO_WAYS),
-            scattered_paths(SEED, club_radius=CLUB_RADIUS),
-            scattered_paths(SEED, club_radius=0.0),
+            _scattered(SCATTERED_CLUB),
+            _scattered(SCATTERED_PLAIN),
             shares,
         ),
     )
@@ -103,6 +107,12 @@ def draw_pictures(rows: Rows, extent: Extent, output: Path) -> dict[str, list[st
         motions_figure(load_arm(), load_wearer(), shown, TARGETS, RAY),
     )
     return captions
+
+
+def _scattered(name: str) -> list[Array | None]:
+    """Return the paths of growths after each other, of one seed."""
+    growths = scattered_growths(load_problem(TWO_WAYS).problem, SCATTERED[name], SEED)
+    return [growth.waypoints for growth in growths]
 
 
 def _pair(rows: Rows, target: str) -> tuple[JointPath, JointPath]:

@@ -4,7 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.taut import pull_taut
+from rrth_planner.box_map import BoxMap, map_world
+from rrth_planner.kernels.taut import pull_forward, pull_taut
 from rrth_planner.kernels.tree import path_length
 from worlds import (
     edge_touches,
@@ -77,3 +78,22 @@ def test_a_full_buffer_takes_no_further_waypoint(raw):
     world = wearer_world()
     for path in raw:
         assert len(taut(world, path, room=len(path))) <= len(path)
+
+
+@pytest.mark.parametrize('spacing', [0.3, 0.01, 1e-6])
+@pytest.mark.parametrize('width', [1.6, 1e-6])
+def test_forward_goes_to_the_last_visible_point_whatever_is_how_thin(spacing, width):
+    # Lines from the origin to (t, 4) meet the upper end of the wall, (1.4, 2), at t = 2.8.
+    box_map = BoxMap(
+        name='wall',
+        bounds=[[-1, -1], [9, 9]],
+        obstacles=[[[1.4, 0], [1.4 + width, 2]]],
+        start=[0, 0],
+        goal=[8, 4],
+    )
+    world = map_world(box_map)
+    path = np.array([[0.0, 0.0], [0.0, 4.0], [8.0, 4.0]])
+    seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
+    assert pull_forward(*seam, path, 3, spacing) == 3
+    assert path[1, 1] == 4.0
+    assert 2.8 - spacing <= path[1, 0] <= 2.8 + 1e-5
