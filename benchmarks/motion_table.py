@@ -60,7 +60,7 @@ def worst_ratio(row: Row) -> float:
 def target_lines(rows: Sequence[Row]) -> list[list[str]]:
     """Return a line for each target, columns as in HEADER."""
     bent, n = with_corners(rows), len(rows)
-    stopping = _ratio_of_means(bent, 'duration', 'duration_stopping')
+    stopping = ratio_of_means(bent, 'duration', 'duration_stopping')
     lines = [_count(rows, 'touches the wearer', f'motions of {n} with a sample that touches')]
     for name in ('velocity', 'acceleration', 'jerk'):
         worst = column(rows, f'{name}_ratio').max(initial=0.0) - 1.0
@@ -81,7 +81,7 @@ def target_lines(rows: Sequence[Row]) -> list[list[str]]:
             not any(map(FAULTS['off the path by more than 1e-4 rad'], rows)),
         ),
         _line(
-            f'mean duration over stopping at each corner, {len(bent)} motions with corners',
+            f'mean duration over that of stopping at each corner, {len(bent)} motions with corners',
             '<= 80 %',
             f'{100 * stopping:.1f} %',
             stopping <= STOPPING,
@@ -174,7 +174,8 @@ def ratios(rows: Sequence[Row], name: str, over: str) -> Array:
     return values[:, 0] / values[:, 1]
 
 
-def _ratio_of_means(rows: Sequence[Row], name: str, over: str) -> float:
+def ratio_of_means(rows: Sequence[Row], name: str, over: str) -> float:
+    """Return the mean of a column over the mean of another; NaN without rows."""
     return float(column(rows, name).mean() / column(rows, over).mean()) if rows else np.nan
 
 
