@@ -81,7 +81,7 @@ def target_lines(rows: Sequence[Row]) -> list[list[str]]:
             not any(map(FAULTS['off the path by more than 1e-4 rad'], rows)),
         ),
         _line(
-            f'mean duration over that of stopping at each corner, {len(bent)} motions with corners',
+            f'mean duration over that of stopping at corners, {len(bent)} motions with corners',
             '<= 80 %',
             f'{100 * stopping:.1f} %',
             stopping <= STOPPING,
