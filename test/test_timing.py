@@ -5,6 +5,7 @@
 from fractions import Fraction
 from itertools import pairwise
 
+from benchmarks.motion_path import distances, planned_pieces
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -203,6 +204,18 @@ def test_a_motion_with_rounded_corners_is_never_slower_than_with_stops():
         if rounded > stops * 1.0005 + 1e-6:
             slower.append((round(rounded / stops, 4), seed))
     assert slower == []
+
+
+@pytest.mark.parametrize('seed', range(25))
+def test_the_curve_of_the_quintics_stays_within_a_ten_thousandth_of_lines_and_blends(seed):
+    rng = np.random.default_rng(seed)
+    steps = rng.standard_normal((rng.integers(2, 6), 4)) * rng.choice([0.02, 0.2, 1.0])
+    path = Path(rng.uniform(-1.0, 1.0, 4) + np.cumsum(steps, axis=0))
+    blends = blends_of(path, rng)
+    trajectory = parameterize(path, blends, limits())
+    points, _, _ = sample(trajectory, np.arange(0.0, trajectory.duration, 2e-3))
+    pieces = [piece for part in planned_pieces(path, blends) for piece in part]
+    assert distances(points, pieces).max() < 1e-4
 
 
 @examples(60)
