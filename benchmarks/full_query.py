@@ -24,8 +24,8 @@ from benchmarks.task import path_row, Row, Task
 
 MARGIN, RAY = 0.02, 1.0
 FOLDED = np.array([0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi])
-# One more growth than it takes: a query that is answered between two frames of a body tracker.
-OPTIONS = RRTHOptions(club_attempts=1)
+# The defaults: a query that is answered between two frames of a body tracker.
+OPTIONS = RRTHOptions()
 # A long run: many postures, and as many growths as fit into this time [s].
 LONG = RRTHOptions(improve_time=0.05, club_attempts=10_000)
 PLANNER = 'full query'

@@ -19,11 +19,12 @@ WHY_NOT: Mapping[str, str] = {
         'short, each of them is looked at.'
     ),
     'full query: choose the posture, plan, shorten, p90': (
-        'With one further growth. With three it is 0.1 % on a like set of queries, and p95 3 ms.'
+        'With three further growths, of which the shortest path leans. More of them find more '
+        'ways round, and take longer.'
     ),
     'full query: choose the posture, plan, shorten, p95': (
-        'Queries that no straight way answers: growth takes 0.1 ms, leaning on the boxes 1 ms a '
-        'path.'
+        'Queries that no straight way answers: a growth takes 0.1 ms, pulling its path 0.2 ms, '
+        'and the best of them 1 ms or more to lean on the boxes.'
     ),
     **dict.fromkeys(
         (f'first path, {name}, p50' for name in QUERIES),

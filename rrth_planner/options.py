@@ -110,7 +110,7 @@ class RRTHOptions(GrowthOptions):
         0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
     )
     club_attempts: int = _option(
-        2, 0, 10**4, '-', 'further growths with the path club after the first path'
+        3, 0, 10**4, '-', 'further growths with the path club after the first path'
     )
     club_radius: float = _option(0.5, 0.0, 1000.0, 'rad', 'range in which club points count')
     club_count: int = _option(2, 0, 10**6, '-', 'a new point with more club points is rejected')

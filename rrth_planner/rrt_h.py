@@ -11,6 +11,7 @@ from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grown_trees, plant, room_for
 from rrth_planner.kernels import jit, lean, rrt_h
 from rrth_planner.kernels.random import random_state
+from rrth_planner.kernels.taut import TAUT
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -90,9 +91,9 @@ def search(
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
     """Return the entries of `settings` of the kernel."""
-    how = (options.corner_spacing, float(options.corner_moves), 0.0, 0.0)
+    how = (options.corner_spacing, float(options.corner_moves), TAUT, 0.0, 0.0)
     if isinstance(options, PrintedRRTHOptions):
-        how = (options.corner_spacing, 0.0, options.target_spacing, options.check_spacing)
+        how = (options.corner_spacing, 0.0, 0.0, options.target_spacing, options.check_spacing)
     return np.array(
         [
             options.step_size,

@@ -130,18 +130,30 @@ def test_every_plan_to_a_target_ends_on_its_manifold():
     assert n_solved > 20
 
 
-def test_improvement_never_worsens(blocked):
-    n_better = 0
+def test_improvement_shortens_and_never_worsens_by_much(blocked):
+    lengths = []
     for i, problem in enumerate(blocked[:25]):
-        lengths = []
-        for attempts in (0, 2, 8):
-            options = RRTHOptions(club_attempts=attempts, improve_time=1000.0, time_limit=1000.0)
-            result = plan(problem, options, np.random.default_rng(i))
-            lengths.append(np.inf if result.path is None else result.path.length)
-        assert lengths[0] >= lengths[1] - 1e-12
-        assert lengths[1] >= lengths[2] - 1e-12
-        n_better += lengths[2] < lengths[0] - 1e-6
-    assert n_better > 2
+        results = [
+            plan(
+                problem,
+                RRTHOptions(club_attempts=attempts, improve_time=1000.0, time_limit=1000.0),
+                np.random.default_rng(i),
+            )
+            for attempts in (0, 2, 8, 20)
+        ]
+        for result in results:
+            assert (np.diff(result.cost_history) < 0).all()
+        lengths.append([np.inf if r.path is None else r.path.length for r in results])
+    none, some, several, many = np.array(lengths).T
+    # What is the shortest path of some growths before it settles may not be so afterwards.
+    assert (some <= none * 1.05).all()
+    assert (several <= some * 1.05).all()
+    assert (many <= several + 1e-12).all()
+    solved = np.isfinite(none)
+    assert np.mean(some[solved]) < np.mean(none[solved])
+    assert np.mean(several[solved]) < np.mean(some[solved])
+    assert (many[solved] < none[solved] - 1e-6).sum() > 2
+    assert solved.sum() > 20
 
 
 def test_no_improvement_is_reproducible_and_takes_the_first_path(blocked):
@@ -150,7 +162,9 @@ def test_no_improvement_is_reproducible_and_takes_the_first_path(blocked):
         result = plan(problem, options, np.random.default_rng(1))
         if result.path is not None:
             assert result.is_reproducible
-            assert len(result.cost_history) == 1
+            # All that was drawn was drawn for the one growth; its path was pulled, then settled.
+            assert set(result.sample_history) == {result.n_samples}
+            assert 1 <= len(result.cost_history) <= 2
 
 
 def test_the_same_seed_gives_the_same_bytes_in_this_and_in_other_processes():

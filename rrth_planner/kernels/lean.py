@@ -17,7 +17,7 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     VEC,
 )
-from rrth_planner.kernels.taut import pull_taut
+from rrth_planner.kernels.taut import ENOUGH, MOVES, pull_taut, SPACING
 from rrth_planner.kernels.tree import copy, distance, path_length
 
 # Gap that a path is left with, for the proof of its edges to succeed [m].
@@ -34,7 +34,7 @@ SHORTEST_BEND = 0.03
 # Shorter edges pull no harder than one of this length [rad].
 SHORTEST = 1e-3
 # What a round must gain to be worth another one, relative.
-ENOUGH = 5e-4
+WORTH = 5e-4
 
 
 @kernel(void(MAT, int64, OUT_VEC))
@@ -285,13 +285,14 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     """
     Pull a path taut and let it lean, in turn, until it gets no shorter (`SHORTEN`).
 
-    how: k of the paper [rad], most rounds.
+    how: settings by the indices of `taut`.
     """
-    n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+    spacing, enough = how[SPACING], how[ENOUGH]
+    n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
     contacts = np.empty((MAX_CONTACTS, SLOPES + path.shape[1]))
     edges = np.empty(MAX_CONTACTS, np.int64)
     length, is_bent = path_length(path, n), False
-    for _ in range(int64(how[1])):
+    for _ in range(int64(how[MOVES])):
         if n < 3 or n > MAX_CORNERS + 2:
             break
         n_found = lean(
@@ -308,9 +309,11 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
             edges,
         )
         if n_found >= 0:
-            n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+            n = pull_taut(
+                is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough
+            )
         shorter = path_length(path, n)
-        is_done = shorter > length * (1.0 - ENOUGH)
+        is_done = shorter > length * (1.0 - WORTH)
         length = shorter
         if not is_done:
             is_bent = False
@@ -325,5 +328,5 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
             break
     if is_bent:
         # A corner that brought nothing goes again.
-        n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, how[0])
+        n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
     return n

@@ -5,7 +5,6 @@
 import math
 
 from numba.core.types import float64, int64, void
-from rrth_planner.kernels import scratch
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
     as_chain,
@@ -13,11 +12,8 @@ from rrth_planner.kernels.jit import (
     as_edge_check,
     as_shorten,
     as_slide,
-    CHAIN,
     CHAIN_AT,
-    CONTACTS,
     CONTACTS_AT,
-    EDGE_CHECK,
     EDGE_CHECK_AT,
     kernel,
     MAT,
@@ -30,11 +26,10 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     READ_INTS,
     RNG,
-    SHORTEN,
-    SLIDE,
     VEC,
 )
 from rrth_planner.kernels.rrt import advance as grow
+from rrth_planner.kernels.shortening import pull, settle
 from rrth_planner.kernels.taut import TAUT
 from rrth_planner.kernels.tree import copy, distance, path_length, trace_path
 
@@ -43,9 +38,10 @@ STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = r
 MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, HOW = range(8, 13)
 # Entries of `state`: growths begun, whether one is on its way, draws of it and in all, waypoints
 # of the best and of the first raw path, points of the club, rows of the history, in which of the
-# two pairs of trees growth goes on, which one led to the best path, why the search ended.
+# two pairs of trees growth goes on, which one led to the best path, why the search ended, whether
+# the best path is still to settle.
 BEGUN, GROWING, DRAWN, SAMPLES, N_BEST, N_RAW, N_CLUB, N_HISTORY, PAIR, BEST_PAIR, END = range(11)
-STATE_SIZE = 11
+TO_SETTLE, STATE_SIZE = 11, 12
 # Values of state[END]: not yet, all growths done, no path found, no time left to improve.
 RUNNING, DONE, FAILED, CLOCK = range(4)
 # Rows of `paths`.
@@ -59,102 +55,12 @@ BATCH = 100
 # Draws of later growths lie where a path this much longer than the best one can lead: what is
 # first found is longer than what becomes of it.
 WIDER = 1.3
-# A taut path longer than this times the best one is not made to lean.
-PROMISING = 1.2
-# Finest step of a goal along its manifold [rad].
-FINEST_SLIDE = 2e-3
-# Rounds of it, and those in which the path leans; what a slide must gain to be worth another one,
-# relative.
-MAX_SLIDES, MAX_LEANS, SLID = 30, 1, 1e-3
-# Entries of the settings of `shorten`: k of the paper, moves of its corners, and, for the steps as
-# printed, the spacings of the points P_T and P_C.
-N_HOW, MOVES = 4, 1
+# The paths of so many first growths are only pulled; then the shortest one settles, which takes
+# as long as several growths. Later paths settle at once, where they are no longer than this times
+# the best one.
+N_QUICK, PROMISING = 8, 1.2
 # Waypoints nearer than this are one [rad].
 TWIN = 1e-9
-
-
-@kernel(
-    int64(
-        EDGE_CHECK,
-        CONTACTS,
-        SHORTEN,
-        SLIDE,
-        CHAIN,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        VEC,
-        VEC,
-        float64,
-        OUT_MAT,
-        int64,
-    )
-)
-def finish(
-    is_edge_free,
-    find,
-    shorten,
-    slide_goal,
-    chain,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    target,
-    how,
-    worth,
-    path,
-    n,
-):
-    """
-    Pull a path taut and slide its goal, in turn, until little is gained; return its size.
-
-    It leans on the boxes only once its goal is about where it will be, and only where it is
-    shorter than `worth` by then.
-    """
-    quick = scratch.floats(N_HOW)
-    for i in range(N_HOW):
-        quick[i] = how[i]
-    quick[MOVES] = 0.0
-    n_leans = 0 if how[MOVES] > 0.0 else 1
-    for _ in range(MAX_SLIDES):
-        is_leaning = n_leans > 0
-        n = shorten(
-            is_edge_free,
-            find,
-            resolution,
-            chain,
-            robot,
-            obstacles,
-            bounds,
-            path,
-            n,
-            how if is_leaning else quick,
-        )
-        gain = slide_goal(
-            is_edge_free,
-            resolution,
-            chain,
-            robot,
-            obstacles,
-            bounds,
-            target,
-            path,
-            n,
-            FINEST_SLIDE,
-        )
-        if gain < SLID * path_length(path, n):
-            if is_leaning:
-                return n
-            if path_length(path, n) > worth:
-                return n
-            n_leans = 1
-        elif is_leaning:
-            n_leans += 1
-            if n_leans > MAX_LEANS:
-                break
-    return shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
 
 
 @kernel(void(OUT_CUBE, int64, int64, OUT_INTS, OUT_MAT))
@@ -227,7 +133,7 @@ def go_straight(
         if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
             for k in range(goals.shape[1]):
                 paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
-            n = finish(
+            n = pull(
                 is_edge_free,
                 find,
                 shorten,
@@ -239,7 +145,6 @@ def go_straight(
                 bounds,
                 target,
                 settings[HOW:],
-                math.inf,
                 paths[WORK],
                 2,
             )
@@ -336,8 +241,8 @@ def advance(
     Grow first paths and pull each taut, until state[END] says why it ended or time is `until` [s].
 
     Growths after the first path keep away from the path club, the points of all raw paths, and
-    draw only where a shorter path can lead. tree_q (2, 2, capacity, dof): the pair of trees at
-    work and the one that led to the best path.
+    draw only where a shorter path can lead. Of the first ones only the shortest path settles.
+    tree_q (2, 2, capacity, dof): the pair of trees at work and the one that led to the best path.
     """
     is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
     find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
@@ -346,7 +251,7 @@ def advance(
         cost = math.inf
         if state[N_BEST] > 0:
             cost = history[state[N_HISTORY] - 1, COST]
-        pair = state[PAIR]
+        pair, n, is_new = state[PAIR], 0, True
         if state[GROWING] == 0:
             # The first path, unless a straight edge is one, does not count as an attempt.
             if state[BEGUN] > 0 and state[N_BEST] == 0:
@@ -355,45 +260,71 @@ def advance(
             n_useful = count_useful(goals, q_start, cost)
             if n_useful == 0 or state[BEGUN] >= settings[ATTEMPTS]:
                 state[END] = DONE
-                break
-            if state[N_BEST] > 0 and now() > settings[IMPROVE_UNTIL]:
+            elif state[N_BEST] > 0 and now() > settings[IMPROVE_UNTIL]:
                 state[END] = CLOCK
+            if state[TO_SETTLE] == 1 and (state[END] != RUNNING or state[BEGUN] >= N_QUICK):
+                n, pair, is_new = state[N_BEST], state[BEST_PAIR], False
+                for i in range(n):
+                    copy(paths[BEST, i], paths[WORK, i])
+            elif state[END] != RUNNING:
                 break
-            plant(goals, q_start, n_useful, tree_q[pair], parents[pair], sizes[pair])
-            state[GROWING], state[DRAWN], meeting[0] = 1, 0, -1
-            state[BEGUN] += 1
-        budget = int64(settings[MAX_SAMPLES if state[N_BEST] == 0 else CLUB_BUDGET])
-        if meeting[0] < 0:
-            n_drawn = grow(
-                functions,
-                resolution,
-                robot,
-                obstacles,
-                bounds,
-                settings[STEP],
-                settings[GAIN],
-                settings[BIAS],
-                settings[NEAR],
-                settings[TWO_TREES] != 0.0,
-                WIDER * cost,
-                club[: state[N_CLUB]],
-                settings[CLUB_RADIUS],
-                int64(settings[CLUB_COUNT]),
-                settings[CLUB_PROBABILITY],
-                min(BATCH, budget - state[DRAWN]),
-                rng,
-                tree_q[pair],
-                parents[pair],
-                sizes[pair],
-                meeting,
-            )
-            state[DRAWN] += n_drawn
-            state[SAMPLES] += n_drawn
-        if meeting[0] >= 0:
-            state[GROWING] = 0
-            n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
-            remember(paths, n, club, state)
-            n = finish(
+            else:
+                plant(goals, q_start, n_useful, tree_q[pair], parents[pair], sizes[pair])
+                state[GROWING], state[DRAWN], meeting[0] = 1, 0, -1
+                state[BEGUN] += 1
+        if is_new:
+            budget = int64(settings[MAX_SAMPLES if state[N_BEST] == 0 else CLUB_BUDGET])
+            if meeting[0] < 0:
+                n_drawn = grow(
+                    functions,
+                    resolution,
+                    robot,
+                    obstacles,
+                    bounds,
+                    settings[STEP],
+                    settings[GAIN],
+                    settings[BIAS],
+                    settings[NEAR],
+                    settings[TWO_TREES] != 0.0,
+                    WIDER * cost,
+                    club[: state[N_CLUB]],
+                    settings[CLUB_RADIUS],
+                    int64(settings[CLUB_COUNT]),
+                    settings[CLUB_PROBABILITY],
+                    min(BATCH, budget - state[DRAWN]),
+                    rng,
+                    tree_q[pair],
+                    parents[pair],
+                    sizes[pair],
+                    meeting,
+                )
+                state[DRAWN] += n_drawn
+                state[SAMPLES] += n_drawn
+            n_nodes = max(sizes[pair, 0], sizes[pair, 1])
+            if meeting[0] >= 0:
+                state[GROWING] = 0
+                n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
+                remember(paths, n, club, state)
+                n = pull(
+                    is_edge_free,
+                    find,
+                    shorten,
+                    slide_goal,
+                    chain,
+                    resolution,
+                    robot,
+                    obstacles,
+                    bounds,
+                    target,
+                    settings[HOW:],
+                    paths[WORK],
+                    n,
+                )
+            elif state[DRAWN] >= budget or n_nodes >= tree_q.shape[2] - 1:
+                state[GROWING] = 0
+        is_quick = is_new and state[BEGUN] <= N_QUICK
+        if n > 0 and not is_quick and path_length(paths[WORK], n) <= PROMISING * cost:
+            n = settle(
                 is_edge_free,
                 find,
                 shorten,
@@ -405,14 +336,13 @@ def advance(
                 bounds,
                 target,
                 settings[HOW:],
-                PROMISING * cost,
                 paths[WORK],
                 n,
             )
-            if n > 0 and path_length(paths[WORK], n) < cost:
-                keep_best(paths, n, pair, state, history)
-                state[PAIR] = 1 - pair
-        elif state[DRAWN] >= budget or max(sizes[pair, 0], sizes[pair, 1]) >= tree_q.shape[2] - 1:
-            state[GROWING] = 0
+        if not is_new:
+            state[TO_SETTLE] = 0
+        if n > 0 and path_length(paths[WORK], n) < cost:
+            keep_best(paths, n, pair, state, history)
+            state[PAIR], state[TO_SETTLE] = 1 - pair, int64(is_quick)
         if now() > until:
             break

@@ -5,7 +5,7 @@
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, CONTACTS, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
-from rrth_planner.kernels.taut import remove_waypoint, reverse_path
+from rrth_planner.kernels.taut import remove_waypoint, reverse_path, SPACING
 from rrth_planner.kernels.tree import copy, distance
 
 MAX_CUTS = 1000
@@ -115,9 +115,10 @@ def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     """
     Do steps 1, 2 and 3 once each, in place; return the number of waypoints.
 
-    how (4,): k of the paper, not used, distance between points P_T, between points P_C [rad].
+    how (5,): k of the paper, two entries not used, distance between points P_T, between points P_C
+    [rad].
     """
-    least, targets, checks = how[0], how[2], how[3]
+    least, targets, checks = how[SPACING], how[3], how[4]
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
     reverse_path(path, n)
     n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)

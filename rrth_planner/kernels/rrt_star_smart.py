@@ -64,15 +64,17 @@ def advance(
     Make n_draws draws; return how many were made.
 
     Whenever the path of the trees improves, it is shortened by skipping waypoints. The best such
-    path is kept in `shortened`, its inner waypoints are the beacons: every `bias`-th draw comes
-    from a ball of half a step round one of them (Nasir et al. 2013). history (n_draws,): cost of
-    the shortened path after each draw.
+    path is kept in `shortened`, its inner waypoints are the beacons: every `bias`-th draw of each
+    tree comes from a ball of half a step round one of them (Nasir et al. 2013). history
+    (n_draws,): cost of the shortened path after each draw.
     """
     q, path = np.empty(tree_q.shape[2]), np.empty(shortened.shape)
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0
+        # Counted for each tree: an even bias would leave one of them without beacons.
+        turn = draw // 2 if is_bidirectional else draw
         n_beacons = int64(best[2]) - 2
-        if n_beacons > 0 and draw % bias == 0:
+        if n_beacons > 0 and turn % bias == 0:
             beacon = 1 + int64(uniform(rng) * n_beacons)
             draw_ball(shortened[beacon], 0.5 * step_size, bounds, rng, q)
         elif uniform(rng) < goal_bias:

@@ -14,7 +14,10 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.tree import copy, distance, path_length
 
-# What a gain in length must exceed to be worth another round, relative.
+# Entries of the settings of `shorten` (kernels.jit.SHORTEN): k of the paper [rad], rounds at most
+# in which corners move, what pulling must gain to go on, relative.
+SPACING, MOVES, ENOUGH = range(3)
+# What a gain in length must exceed to count, relative.
 TAUT = 1e-5
 # Rounds of the three steps; they stop by themselves when nothing is gained.
 MAX_ROUNDS = 100
@@ -144,12 +147,13 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
+def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough):
     """
     Repeat the three steps until the path gets no shorter; return its number of waypoints.
 
-    spacing: k of the paper [rad]. Every edge that enters the path has been proven by the edge
+    spacing: k of the paper [rad]. enough: what a round must gain to be worth another one,
+    relative; TAUT: next to nothing. Every edge that enters the path has been proven by the edge
     check; the path never gets longer.
     """
     length = path_length(path, n)
@@ -162,7 +166,7 @@ def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacin
         reverse_path(path, n)
         n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         shorter = path_length(path, n)
-        if shorter > length * (1.0 - TAUT):
+        if shorter > length * (1.0 - enough):
             break
         length = shorter
     return n

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rrth_planner.kernels.lean import MAX_CORNERS, tighten
-from rrth_planner.kernels.taut import pull_taut
+from rrth_planner.kernels.taut import pull_taut, TAUT
 from rrth_planner.world import arm_world
 from worlds import (
     blocked_pair,
@@ -31,10 +31,10 @@ def shortened(world, waypoints, kernel, *how, room=64):
     path[: len(waypoints)] = waypoints
     seam = (world.resolution, world.chain, world.robot, world.obstacles)
     if kernel is pull_taut:
-        n = pull_taut(world.edge_check, *seam, path, len(waypoints), SPACING)
+        n = pull_taut(world.edge_check, *seam, path, len(waypoints), SPACING, TAUT)
     else:
         seam = (world.edge_check, world.contacts, *seam, world.bounds)
-        n = tighten(*seam, path, len(waypoints), np.array([SPACING, *how]))
+        n = tighten(*seam, path, len(waypoints), np.array([SPACING, *how, TAUT]))
     return path[:n]
 
 

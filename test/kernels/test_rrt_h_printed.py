@@ -53,7 +53,7 @@ def all_steps(world, waypoints, least, targets, checks):
     """Return the path after steps 1, 2 and 3."""
     path = np.full((len(waypoints) + 60, len(waypoints[0])), np.nan)
     path[: len(waypoints)] = waypoints
-    how = np.array([least, 0.0, targets, checks])
+    how = np.array([least, 0.0, 0.0, targets, checks])
     functions = seam(world)
     n = SHORTEN(
         functions[0], world.contacts, *functions[1:], world.bounds, path, len(waypoints), how

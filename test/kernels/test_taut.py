@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from rrth_planner.box_map import BoxMap, map_world
-from rrth_planner.kernels.taut import pull_forward, pull_taut
+from rrth_planner.kernels.taut import pull_forward, pull_taut, TAUT
 from rrth_planner.kernels.tree import path_length
 from worlds import (
     edge_touches,
@@ -25,11 +25,11 @@ def raw():
     return raw_paths(wearer_world(), np.random.default_rng(44), 20)
 
 
-def taut(world, waypoints, spacing=0.01, room=64):
+def taut(world, waypoints, spacing=0.01, room=64, enough=TAUT):
     path = np.full((room, 4), np.nan)
     path[: len(waypoints)] = waypoints
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    n = pull_taut(*seam, path, len(waypoints), spacing)
+    n = pull_taut(*seam, path, len(waypoints), spacing, enough)
     return path[:n]
 
 
@@ -54,6 +54,18 @@ def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
         again = taut(world, once)
         gain = path_length(once, len(once)) - path_length(again, len(again))
         assert gain <= 2e-3 * path_length(once, len(once))
+
+
+def test_pulling_loosely_is_a_beginning_of_pulling_taut(raw):
+    world, n_looser = wearer_world(), 0
+    for path in raw:
+        loose, tight = taut(world, path, enough=0.5), taut(world, path)
+        lengths = [path_length(p, len(p)) for p in (path, loose, tight)]
+        assert lengths[0] * (1 + 1e-12) >= lengths[1] >= lengths[2] * (1 - 1e-12)
+        n_looser += lengths[1] > lengths[2] * (1 + 1e-6)
+        # Going on where it stopped ends where pulling taut at once ends.
+        assert np.array_equal(taut(world, loose), tight)
+    assert n_looser > 2
 
 
 def test_a_detour_through_free_space_is_pulled_straight():
