@@ -443,7 +443,8 @@ def test_rrt_star_smart_is_nearer_to_the_shortest_path_than_rrt_star():
         assert smart < 0.5 * plain
 
 
-def test_every_so_many_draws_of_rrt_star_smart_are_near_a_beacon():
+@pytest.mark.parametrize('is_bidirectional', [False, True])
+def test_every_so_many_draws_of_rrt_star_smart_are_near_a_beacon(is_bidirectional):
     problem, shares = map_problem(_map('c_shape')), []
     for ratio in (10**6, 8, 2):
         options = RRTStarSmartOptions(
@@ -452,22 +453,26 @@ def test_every_so_many_draws_of_rrt_star_smart_are_near_a_beacon():
             biasing_ratio=ratio,
             improve_time=60.0,
             time_limit=60.0,
-            is_bidirectional=False,
+            is_bidirectional=is_bidirectional,
         )
         near = []
         for seed in range(5):
             result = plan(problem, options, np.random.default_rng(seed))
-            beacons = result.path.waypoints[1:-1]
-            nodes = result.trees[0].nodes[:, None]
-            near.append((np.linalg.norm(nodes - beacons, axis=2).min(axis=1) < 5.0).mean())
-            # Whatever can be skipped is.
             q = result.path.waypoints
+            near.append([_share_near(q[1:-1], tree.nodes) for tree in result.trees])
+            # Whatever can be skipped is.
             assert not any(
                 problem.world.is_edge_valid(a, b) for a, b in zip(q[:-2], q[2:], strict=True)
             )
-        shares.append(np.mean(near))
-    assert 1.5 * shares[0] < shares[1]
-    assert 1.5 * shares[1] < shares[2]
+        # Of each tree: an even ratio must not leave one of two without beacons.
+        shares.append(np.mean(near, axis=0))
+    assert len(shares[0]) == 1 + is_bidirectional
+    assert (1.5 * shares[0] < shares[1]).all()
+    assert (1.5 * shares[1] < shares[2]).all()
+
+
+def _share_near(beacons, nodes):
+    return (np.linalg.norm(nodes[:, None] - beacons, axis=2).min(axis=1) < 5.0).mean()
 
 
 def test_rrt_h_as_printed_can_be_run_and_may_be_invalid():
