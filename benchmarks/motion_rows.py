@@ -37,7 +37,7 @@ SCHEMA = pa.schema(
         *((name, pa.int64()) for name in ('body', 'query', 'n_corners', 'n_stops', 'n_points')),
         ('n_cores', pa.int64()),
         *((name, pa.bool_()) for name in ('is_solved', 'is_stopping', 'is_at_rest')),
-        *((name, pa.bool_()) for name in ('is_increasing', 'is_at_ends')),
+        *((name, pa.bool_()) for name in ('is_increasing', 'is_at_ends', 'is_sought')),
         *((name, pa.float64()) for name in _FLOATS),
         # Ways of the rounded corners to either side, as large as they are proven free [rad].
         ('half_lengths', pa.list_(pa.float64())),
@@ -50,8 +50,8 @@ SCHEMA = pa.schema(
 )
 
 
-def motion_row(motion: Motion, limits: MotionLimits) -> Row:
-    """Return what is to be said of a motion."""
+def motion_row(motion: Motion, is_sought: bool, limits: MotionLimits) -> Row:
+    """Return what is to be said of a motion; is_sought: it is kept for its corners alone."""
     plan = motion.plan
     row: Row = {
         **origin(),
@@ -59,6 +59,7 @@ def motion_row(motion: Motion, limits: MotionLimits) -> Row:
         'sentence': plan.sentence,
         'body': motion.body,
         'query': motion.index,
+        'is_sought': is_sought,
         'is_solved': plan.status is PlanStatus.SOLVED,
         'n_corners': len(motion.rounded),
         'half_lengths': [blend.half_length for blend in motion.rounded],
