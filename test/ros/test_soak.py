@@ -355,11 +355,10 @@ def test_moments_in_which_a_processor_stood_still_are_found():
 def test_processors_are_kept_awake_by_what_gives_way_to_all_others():
     with OnEachProcessor(stay_awake) as awake:
         pids = awake.pids
-        assert {os.sched_getscheduler(pid) for pid in pids} <= {os.SCHED_IDLE, os.SCHED_OTHER}
-        end = time.monotonic() + 20.0
-        while min(sum(psutil.Process(pid).cpu_times()[:2]) for pid in pids) < 0.5:
-            assert time.monotonic() < end
-            time.sleep(0.05)
+        # Never asleep, though it may be kept waiting by all that the machine does besides.
+        for _ in range(50):
+            assert {psutil.Process(pid).status() for pid in pids} == {psutil.STATUS_RUNNING}
+            time.sleep(0.01)
         assert {os.sched_getscheduler(pid) for pid in pids} == {os.SCHED_IDLE}
         cores = [os.sched_getaffinity(pid) for pid in pids]
     assert sorted(core for one in cores for core in one) == sorted(os.sched_getaffinity(0))
