@@ -48,6 +48,8 @@ class GrownTrees(Sequence[Tree]):
     """
     Trees as a kernel left them, copied at once; each becomes a value when it is looked at.
 
+    Where rewiring has left a parent behind its child the nodes are put in the order of depth.
+
     Parameters
     ----------
     rows : iterable of (ndarray, ndarray)
@@ -76,10 +78,13 @@ class GrownTrees(Sequence[Tree]):
 
 
 def _tree(row: tuple[Array, NDArray[np.int64]]) -> Tree:
-    return Tree(nodes=row[0], parents=row[1])
+    nodes, parents = row
+    if (parents >= np.arange(len(parents))).any():
+        return _ordered(nodes, parents)
+    return Tree(nodes=nodes, parents=parents)
 
 
-def ordered_tree(nodes: Array, parents: NDArray[np.int64]) -> Tree:
+def _ordered(nodes: Array, parents: NDArray[np.int64]) -> Tree:
     """Return a tree whose nodes come in the order of their depth, so parents come first."""
     # A root's parent is a node past the last one. In each round all look twice as far up.
     n = len(nodes)

@@ -4,6 +4,7 @@
 
 from collections.abc import Sequence
 import math
+from typing import Any
 
 import numpy as np
 from rrth_planner.arrays import Array
@@ -13,7 +14,7 @@ from rrth_planner.kernels.random import random_state
 from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import ordered_tree, PlanResult, Tree
+from rrth_planner.result import GrownTrees, PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import MAX_NODES, MAX_WAYPOINTS
 
@@ -100,11 +101,12 @@ class _Trees:
         n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)
         return path[:n].copy()
 
-    def frozen(self) -> tuple[Tree, ...]:
-        """Return the trees as values."""
-        return tuple(
-            ordered_tree(self.tree_q[side, :n].copy(), self.links[side, 0, :n].copy())
-            for side, n in enumerate(self.sizes[: 2 if self.is_bidirectional else 1])
+    def grown(self) -> GrownTrees:
+        """Return the trees."""
+        sizes = self.sizes[: 2 if self.is_bidirectional else 1]
+        return GrownTrees(
+            (self.tree_q[side, :n], self.links[side, rrt_star.PARENT, :n])
+            for side, n in enumerate(sizes)
         )
 
 
@@ -127,7 +129,7 @@ def search(
         advance = rrt_star_smart.advance
     radius = options.rewire_factor * optimal_radius(world.bounds)
     cost = np.inf
-    history: list[tuple[float, int, float]] = []
+    history: list[tuple[Array, Any, Array]] = []
     drawn, stopped, is_cut, bits = 0, None, False, random_state(rng)
     first_time = np.inf
     while drawn < options.max_samples:
@@ -142,10 +144,8 @@ def search(
         before = deadline.elapsed()
         costs = np.empty(min(BATCH, options.max_samples - drawn))
         made = advance(
-            world.edge_check,
-            world.free_radius,
+            world.functions,
             world.resolution,
-            world.chain,
             world.robot,
             world.obstacles,
             world.bounds,
@@ -168,11 +168,12 @@ def search(
         )
         after = deadline.elapsed()
         # The draws of this batch after which the path was shorter than ever before.
-        least = np.minimum.accumulate(np.concatenate([[cost], costs[:made]]))
-        for i in np.flatnonzero(least[1:] < least[:-1]):
-            moment = before + (i + 1) / made * (after - before)
-            history.append((float(costs[i]), drawn + int(i) + 1, moment))
-        cost = float(least[-1])
+        costs = costs[:made]
+        falls = np.flatnonzero(costs < np.append(cost, costs[:-1]))
+        if len(falls):
+            moments = before + (falls + 1) * ((after - before) / made)
+            history.append((costs[falls], drawn + 1 + falls, moments))
+            cost = float(costs[falls[-1]])
         drawn += made
         if cost < np.inf and first_time == np.inf:
             first_time = after
@@ -182,10 +183,10 @@ def search(
     return PlanResult(
         status=(stopped or PlanStatus.SAMPLE_LIMIT) if best_path is None else PlanStatus.SOLVED,
         path=None if best_path is None else Path(best_path),
-        trees=trees.frozen(),
-        cost_history=tuple(entry[0] for entry in history),
-        sample_history=tuple(entry[1] for entry in history),
-        time_history=tuple(entry[2] for entry in history),
+        trees=trees.grown(),
+        cost_history=tuple([c for costs, _, _ in history for c in costs.tolist()]),
+        sample_history=tuple([n for _, draws, _ in history for n in draws.tolist()]),
+        time_history=tuple([t for _, _, moments in history for t in moments.tolist()]),
         n_samples=drawn,
         planning_time=deadline.elapsed(),
         is_reproducible=stopped is None and not is_cut,

@@ -6,7 +6,16 @@ import math
 
 from numba.core.types import int64
 import numpy as np
-from rrth_planner.kernels.jit import kernel, N_GOALS
+from rrth_planner.kernels.jit import (
+    as_chain,
+    as_edge_check,
+    as_free_radius,
+    CHAIN_AT,
+    EDGE_CHECK_AT,
+    FREE_RADIUS_AT,
+    kernel,
+    N_GOALS,
+)
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
 from rrth_planner.kernels.sampling import draw_informed, draw_uniform
@@ -15,10 +24,8 @@ from rrth_planner.kernels.tree import copy
 
 @kernel(STAR_SIGNATURE)
 def advance(
-    is_edge_free,
-    free_radius,
+    functions,
     resolution,
-    chain,
     robot,
     obstacles,
     bounds,
@@ -46,6 +53,8 @@ def advance(
     2014, algorithm 2). history (n_draws,): cost of the best path after each draw. `bias` and
     `shortened` are not used.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0

@@ -7,9 +7,15 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
+    as_chain,
+    as_edge_check,
+    as_free_radius,
     CHAIN,
+    CHAIN_AT,
     EDGE_CHECK,
+    EDGE_CHECK_AT,
     FREE_RADIUS,
+    FREE_RADIUS_AT,
     kernel,
     MAT,
     N_GOALS,
@@ -20,6 +26,7 @@ from rrth_planner.kernels.jit import (
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
+    READ_INTS,
     RNG,
     VEC,
 )
@@ -34,16 +41,14 @@ from rrth_planner.kernels.tree import (
     steer,
 )
 
-# What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: edge check, free radius,
-# resolution, chain, robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius,
-# two trees or one, biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes,
-# meetings, best, history. best (4,): cost of the best path and row of its meeting, then number of
-# waypoints and cost of the shortened path, which RRT*-Smart alone keeps.
+# What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: functions, resolution,
+# robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two trees or one,
+# biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes, meetings, best, history.
+# best (4,): cost of the best path and row of its meeting, then number of waypoints and cost of the
+# shortened path, which RRT*-Smart alone keeps.
 STAR_SIGNATURE = int64(
-    EDGE_CHECK,
-    FREE_RADIUS,
+    READ_INTS,
     float64,
-    CHAIN,
     MAT,
     MAT,
     MAT,
@@ -139,7 +144,7 @@ def add_node(
     is_edge_free, resolution, chain, robot, obstacles, q, near, radius, nodes, links, costs, n
 ):
     """
-    Add q to a tree of n nodes: best parent first, then rewire; return 0 where it is not reached.
+    Add q to a tree of n nodes, then rewire; return 1 and how many were rewired, 0: not reached.
 
     nodes (capacity, dof), links (3, capacity), costs (capacity,). `near`, the nearest node, is the
     parent unless one within the radius makes a shorter way (ChooseParent); afterwards q becomes
@@ -158,15 +163,26 @@ def add_node(
     for row in range(n_near):
         lengths[row] = math.sqrt(lengths[row])
     parent, cost = near, costs[near] + distance(nodes[near], q)
+    totals = np.empty(n_near)
     for row in range(n_near):
-        i, length = neighbours[row], lengths[row]
-        is_shorter = i != near and costs[i] + length < cost - GAIN
-        if is_shorter and is_edge_free(nodes[i], q, resolution, chain, robot, obstacles):
-            parent, cost = i, costs[i] + length
+        totals[row] = costs[neighbours[row]] + lengths[row]
+    while True:
+        # The best first: the first free one is the parent, and no other need be checked.
+        at, least = -1, cost - GAIN
+        for row in range(n_near):
+            if totals[row] < least:
+                at, least = row, totals[row]
+        if at < 0:
+            break
+        totals[at] = math.inf
+        if is_edge_free(nodes[neighbours[at]], q, resolution, chain, robot, obstacles):
+            parent, cost = neighbours[at], least
+            break
     copy(q, nodes[n])
     links[CHILD, n] = -1
     costs[n] = cost
     attach(links, n, parent)
+    n_rewired = 0
     for row in range(n_near):
         i, length = neighbours[row], lengths[row]
         is_shorter = i != parent and cost + length < costs[i] - GAIN
@@ -174,7 +190,8 @@ def add_node(
             detach(links, i)
             attach(links, i, n)
             shift_costs(links, costs, i, cost + length - costs[i])
-    return 1
+            n_rewired += 1
+    return 1 + n_rewired
 
 
 @kernel(void(OUT_CUBE, OUT_MAT, OUT_INTS, OUT_INT_MAT, OUT_VEC))
@@ -272,7 +289,7 @@ def extend(
     step = adapted_step(free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain)
     steer(q_near, q, step, q_new)
     radius = near_radius(new, dof, rewire_radius, step_size)
-    if not add_node(
+    n_changed = add_node(
         is_edge_free,
         resolution,
         chain,
@@ -285,9 +302,11 @@ def extend(
         links[side],
         costs[side],
         new,
-    ):
+    )
+    if n_changed == 0:
         return False
     sizes[side] += 1
+    n_met = sizes[N_MEETINGS]
     for i in range(sizes[other] if is_bidirectional else sizes[N_GOALS]):
         length = distance(tree_q[other, i], q_new)
         cost = costs[side, new] + length + costs[other, i]
@@ -298,6 +317,8 @@ def extend(
         if is_edge_free(tree_q[other, i], q_new, resolution, chain, robot, obstacles):
             meetings[sizes[N_MEETINGS], side], meetings[sizes[N_MEETINGS], other] = new, i
             sizes[N_MEETINGS] += 1
+    if n_changed == 1 and sizes[N_MEETINGS] == n_met:
+        return False
     before = best[0]
     find_best(tree_q, costs, sizes, meetings, best)
     return best[0] < before - GAIN
@@ -305,10 +326,8 @@ def extend(
 
 @kernel(STAR_SIGNATURE)
 def advance(
-    is_edge_free,
-    free_radius,
+    functions,
     resolution,
-    chain,
     robot,
     obstacles,
     bounds,
@@ -334,6 +353,8 @@ def advance(
 
     history (n_draws,): cost of the best path after each draw. `bias` and `shortened` are not used.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
     q = np.empty(tree_q.shape[2])
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0

@@ -6,7 +6,20 @@ import math
 
 from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, N_GOALS, OUT_MAT
+from rrth_planner.kernels.jit import (
+    as_chain,
+    as_edge_check,
+    as_free_radius,
+    CHAIN,
+    CHAIN_AT,
+    EDGE_CHECK,
+    EDGE_CHECK_AT,
+    FREE_RADIUS_AT,
+    kernel,
+    MAT,
+    N_GOALS,
+    OUT_MAT,
+)
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
@@ -36,10 +49,8 @@ def skip_waypoints(is_edge_free, resolution, chain, robot, obstacles, path, n):
 
 @kernel(STAR_SIGNATURE)
 def advance(
-    is_edge_free,
-    free_radius,
+    functions,
     resolution,
-    chain,
     robot,
     obstacles,
     bounds,
@@ -68,6 +79,8 @@ def advance(
     tree comes from a ball of half a step round one of them (Nasir et al. 2013). history
     (n_draws,): cost of the shortened path after each draw.
     """
+    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
+    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
     q, path = np.empty(tree_q.shape[2]), np.empty(shortened.shape)
     for draw in range(n_draws):
         side = draw & 1 if is_bidirectional else 0
