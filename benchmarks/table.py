@@ -84,11 +84,14 @@ def _details(rows: Sequence[Row], target: Target) -> list[str]:
 
 
 def _pace(rows: Sequence[Row], target: Target, value: float) -> list[str]:
-    """Return that the machine is slow, where that is enough of a reason."""
+    """Return how slow the machine is, and what is left where that is not enough of a reason."""
     slow = slowness(rows)
-    if slow is None or target.unit not in TIMES or value > slow * target.limit:
+    if slow is None or slow <= 1.0 or target.unit not in TIMES or not np.isfinite(value):
         return []
-    return [f'The C++ peer, too, takes {slow:.2f} times as long here.']
+    told = f'The C++ peer, too, takes {slow:.2f} times as long here'
+    if value <= slow * target.limit:
+        return [f'{told}.']
+    return [f'{told}; at its pace it would be {_number(value / slow)} {target.unit}.']
 
 
 def _peer(rows: Sequence[Row], target: Target) -> str:

@@ -196,10 +196,11 @@ def test_the_pace_of_a_machine_is_that_of_the_peer_who_was_timed_elsewhere_too(t
     assert pace.slowness(rows[:2]) is None
     assert 'was not compared' in pace.sentence([])
 
-    # A reason is what makes up for all of a miss, and no excuse for a share or a length.
+    # What does not make up for all of a miss says what is left; no excuse for a share or a length.
     target = next(t for t in TARGETS if t.what == 'one configuration')
-    assert table._pace(rows, target, 1.9 * target.limit)
-    assert not table._pace(rows, target, 2.1 * target.limit)
+    assert table._pace(rows, target, 1.9 * target.limit)[0].endswith('as long here.')
+    assert table._pace(rows, target, 2.2 * target.limit)[0].endswith('it would be 99 ns.')
+    assert not table._pace(rows, target, np.inf)
     gap = next(t for t in TARGETS if t.unit.startswith('%'))
     assert not table._pace(rows, gap, 1.5 * gap.limit)
 
