@@ -542,3 +542,21 @@ def test_bars_of_the_oracle_touch_where_the_check_points_do():
     # A check point inside means a bar inside; a seventh of the colliding postures is missed.
     assert not (~by_points & ~touching).any()
     assert 0.02 < (by_points & touching).sum() / touching.sum() < 0.3
+
+
+@pytest.mark.parametrize('algorithm', ALGORITHMS)
+def test_with_a_goal_bias_of_1_every_draw_is_the_other_end(algorithm):
+    box_map = _map('fence')
+    ahead = (box_map.goal - box_map.start) / np.linalg.norm(box_map.goal - box_map.start)
+
+    def farthest_aside(goal_bias):
+        options = replace(
+            _options(algorithm, 1.0), step_size=2.0, max_samples=60, goal_bias=goal_bias
+        )
+        trees = plan(map_problem(box_map), options, np.random.default_rng(0)).trees
+        assert all(len(tree.nodes) > 2 for tree in trees)
+        offsets = np.concatenate([tree.nodes for tree in trees]) - box_map.start
+        return np.abs(offsets @ [-ahead[1], ahead[0]]).max()
+
+    assert farthest_aside(1.0) < 1e-9
+    assert farthest_aside(0.0) > 2.0
