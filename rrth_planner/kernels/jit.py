@@ -17,6 +17,7 @@ from numba.core.types import float64, int32, int64
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 import numpy as np
+from rrth_planner.kernels.slim_library import use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler refuses to write through them:
 # a signature tells inputs (VEC, MAT) from outputs (OUT_...).
@@ -128,6 +129,7 @@ def _warn_once(folder: Path | None, problem: Exception) -> None:
 
 _has_warned = False
 _folder = _cache_folder()
+use_slim_libraries()
 
 
 def cache_folder() -> Path | None:

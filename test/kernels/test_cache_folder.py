@@ -109,3 +109,17 @@ assert file is None and jit.cache_folder() is None
     (line,) = warnings_in(run(code, folder, tmp_path))
     assert 'No space left on device' in line
     assert not list(folder.rglob('chain_of_a_test*'))
+
+
+def test_what_was_loaded_has_no_module_until_other_code_is_compiled_against_it(tmp_path):
+    ask = """
+from numba import njit
+(loaded,) = (result.library for result in twice.overloads.values())
+print(loaded._shared_module is None, file=sys.stderr)
+again = njit(lambda x: twice(x) + 1.0)
+assert again(2.0) == 5.0
+print(loaded._shared_module is None, file=sys.stderr)
+"""
+    folder, code = tmp_path / 'cache', f'import sys\n{COMPILE}{ask}'
+    assert run(code, folder, tmp_path) == ['False', 'False']
+    assert run(code, folder, tmp_path) == ['True', 'False']
