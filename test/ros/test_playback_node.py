@@ -284,11 +284,12 @@ def test_a_motion_from_the_present_state_replaces_the_running_one(playback, obse
     wait_until(lambda: observer.is_still_at(elsewhere))
 
 
-def test_stop_brakes_on_the_path_and_the_next_motion_begins_there(playback, observer):
-    playback()
+@pytest.mark.parametrize('scale', [1.0, 0.5])
+def test_stop_brakes_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
+    playback(time_scale=scale)
     way = np.array([-1.0, -1.0, 0.5, 0.5])
     observer.motions.publish(motion(FOLDED, FOLDED + way, 3.0))
-    wait_until(lambda: np.abs(observer.v).max() > 0.4)
+    wait_until(lambda: np.abs(observer.v).max() > 0.4 * scale)
     answer = observer.stop.call(Trigger.Request(), timeout_sec=LONGEST_WAIT)
     assert answer.success
     assert 'at rest in' in answer.message

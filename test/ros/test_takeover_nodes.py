@@ -53,13 +53,17 @@ def _body():
     return samples.array(*boxes)
 
 
-def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(wait_until, tell, ask, spinning):
+@pytest.mark.parametrize('settings', [{}, {'rate': 500.0, 'time_scale': 0.5}], ids=str)
+def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
+    wait_until, tell, ask, spinning, settings
+):
     client, said, answers = Client(), [], []
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', 'seed:=7']
+    options = [part for name, value in settings.items() for part in ('-p', f'{name}:={value}')]
     with (
         ChildProcess(planner, ros, lambda _: None) as one,
-        ChildProcess(playback, [], said.append) as other,
+        ChildProcess(playback, ['--ros-args', *options], said.append) as other,
         spinning(client),
     ):
         wait_until(client.plan.service_is_ready, 120.0)
