@@ -24,7 +24,7 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.ros.response import Response
-from rrth_planner.ros.resting import wait_for_rest
+from rrth_planner.ros.resting import Rest
 from rrth_planner.ros.right_of_way import stand_back
 from rrth_planner.ros.second_opinion import incident_of_stop
 from rrth_planner.running_motion import RunningMotion
@@ -37,9 +37,13 @@ CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
 class _Ticket:
-    """One request, until its motion is published or it ends without one."""
+    """One plan, until its motion is published or it ends without one."""
 
     is_cancelled = False
+
+    def __init__(self, is_asked: bool = True) -> None:
+        """Begin a request, or what nobody asked for."""
+        self.is_asked = is_asked
 
 
 class PlanQueue:
@@ -255,18 +259,27 @@ class PlanQueue:
 
     def _plan_again(self, goal: PointingGoal, wait: float) -> None:
         """Plan for a goal once more as soon as the arm, which brakes, rests."""
-        ticket, n_begun = _Ticket(), self.guard.n_begun
+        ticket, n_begun = _Ticket(is_asked=False), self.guard.n_begun
+        rest = Rest(self._heard.joints, self._now, wait)
+
+        def is_wanted() -> bool:
+            # Whoever asked for a motion that has begun since then wants that one.
+            return not ticket.is_cancelled and self.guard.n_begun == n_begun
 
         def work() -> None:
+            # No request waits for the rest of the arm: this comes after it.
+            if not rest.wait(lambda: self._is_asked() or not is_wanted()) and is_wanted():
+                self.prepare(work)
+                return
+            response = None
             try:
-                wait_for_rest(self._heard.joints, self._now, wait, lambda: ticket.is_cancelled)
-                if ticket.is_cancelled or self.guard.n_begun != n_begun:
-                    # Whoever asked for the motion that has begun since then wants that one.
-                    return
-                response = self._work(goal, time.perf_counter(), ticket)
+                if is_wanted():
+                    response = self._work(goal, time.perf_counter(), ticket)
             finally:
                 with self._lock:
                     self._open.discard(ticket)
+            if response is None:
+                return
             response.conclude()
             if not response.is_solved:
                 self.guard.hold(response.text)
@@ -274,6 +287,11 @@ class PlanQueue:
         with self._lock:
             self._open.add(ticket)
         self.prepare(work)
+
+    def _is_asked(self) -> bool:
+        """Return whether a request waits for its turn."""
+        with self._lock:
+            return any(ticket.is_asked for ticket in self._open)
 
     def _judge(
         self, stop: Trajectory, scene: Scene, goal: PointingGoal, parameters: PlannerParameters

@@ -16,14 +16,9 @@ LONGEST_SETTLING = 1.0
 PERIOD = 5e-3
 
 
-def wait_for_rest(
-    joints: Input[JointReading | None],
-    clock: Callable[[], float],
-    brake: float,
-    should_stop: Callable[[], bool],
-) -> None:
+class Rest:
     """
-    Return when an arm has come to rest, or the time for that is over.
+    The rest that an arm comes to when it has braked.
 
     Parameters
     ----------
@@ -32,20 +27,30 @@ def wait_for_rest(
     clock : callable
         Returns the time by which its readings are dated [s].
     brake : float
-        How long it brakes; what was read before says nothing of its rest [s].
-    should_stop : callable
-        Polled; True ends the waiting.
+        How long it brakes from now on; what was read before says nothing of its rest [s].
 
     """
-    # A simulated clock may stand still.
-    end = time.monotonic() + brake + LONGEST_SETTLING
-    begin = clock()
-    while time.monotonic() < end and not should_stop():
-        reading = joints.value
-        if (
+
+    def __init__(
+        self, joints: Input[JointReading | None], clock: Callable[[], float], brake: float
+    ) -> None:
+        """Begin to brake."""
+        self._joints, self._begin = joints, clock() + brake
+        # A simulated clock may stand still.
+        self._end = time.monotonic() + brake + LONGEST_SETTLING
+
+    def wait(self, should_stop: Callable[[], bool]) -> bool:
+        """Return whether the arm is at rest or the time for that is over; else it should stop."""
+        while not (is_over := self._is_over()) and not should_stop():
+            time.sleep(PERIOD)
+        return is_over
+
+    def _is_over(self) -> bool:
+        if time.monotonic() >= self._end:
+            return True
+        reading = self._joints.value
+        return (
             reading is not None
-            and reading.received >= begin + brake
-            and (np.abs(reading.velocities) <= REST_SPEED).all()
-        ):
-            return
-        time.sleep(PERIOD)
+            and reading.received >= self._begin
+            and bool((np.abs(reading.velocities) <= REST_SPEED).all())
+        )

@@ -13,6 +13,7 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
+from rrth_planner.arm import pointing_error  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
@@ -130,6 +131,25 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     assert any('the wearer moved into the way' in line for line in said)
     assert not [line for line in said if 'refused' in line]
     wait_until(lambda: client.figures['brakes'].startswith('1,'))
+
+
+def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wait_until, tell):
+    client, said = scene_of_a_motion()
+    n, box = len(client.states), in_the_way(client, 1.6)
+    msg, scene = body(box)
+    tell(client, client.target, samples.target(*OTHER))
+    client.body.publish(msg)
+    wait_until(lambda: len(client.motions) == 2)
+    future = client.plan.call_async(Trigger.Request())
+    wait_until(future.done)
+    # For the new target, be it that the arm was at rest before and on its way to the old one.
+    assert future.result().success, future.result().message
+    last = client.motion().positions[-1]
+    assert pointing_error(worlds.table_1_arm(), last, np.array(OTHER)) < 1e-6
+    wait_until(lambda: client.speed() == 0.0 and np.allclose(client.states[-1].position, last))
+    q = np.array([state.position for state in client.states[n:]])
+    assert oracle.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
+    assert not [line for line in said if 'refused' in line]
 
 
 def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_until):

@@ -725,6 +725,33 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     assert not planner._queue._open
 
 
+def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, monkeypatch):
+    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 300.0)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    # No joint position comes that would say that it rests.
+    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    assert stranger.answer().success
+    planner._queue._worker.submit(lambda: None).result(30.0)
+    assert planner._reporter.report.n_requests == 1
+    assert not planner._queue._open
+
+
+def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(start, monkeypatch):
+    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 300.0)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    queue = planner._queue
+    queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    refused = stranger.answer('get_plan', GetPlan.Request()).plan
+    assert not refused.poses
+    assert not stranger.heard['joint_trajectory']
+    assert len(queue._open) == 1
+    stranger.publishers['joint_states'].publish(joints())
+    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    stranger.wait_until(lambda: not queue._open)
+
+
 def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
     planner, stranger = start(max_samples=100)
     say_all(planner, stranger, body_boxes=fenced())
