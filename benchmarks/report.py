@@ -33,9 +33,9 @@ METHOD = """\
 - **First path** is that of two trees (RRT, certified edges) before shortening. **Within 1 %** and
   **0.02 %**: when the cost of RRT-H, improving for {budget} ms, first came there; the exact
   shortest on maps is that of the visibility graph.
-- **Full query**: nearest free postures that aim, plan, shorten, with one further growth and a
+- **Full query**: nearest free postures that aim, plan, shorten, by the default options and a
   margin of 2 cm; the packing of the boxes, once a body message, is not counted. A long run
-  tries 32 times the postures and several times 50 ms of growths.
+  tries 4096 draws of postures at once and several times 50 ms of growths.
 - **The node** is asked over its service by a client in another process; body, target and joints
   are published and acknowledged before. Memory is its resident set.
 - **ompl wheel**: the package from the index, its edges checked by one compiled callback an edge:

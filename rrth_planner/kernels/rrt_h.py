@@ -58,7 +58,7 @@ WIDER = 1.3
 # The paths of so many first growths are only pulled; then the shortest one settles, which takes
 # as long as several growths. Later paths settle at once, where they are no longer than this times
 # the best one.
-N_QUICK, PROMISING = 8, 1.2
+N_QUICK, PROMISING = 4, 1.2
 # Waypoints nearer than this are one [rad].
 TWIN = 1e-9
 
