@@ -51,7 +51,7 @@ class Client(Node):
             child.check()
             if time.monotonic() > end:
                 raise RrthError(f'planner node: not ready within {START:g} s')
-            time.sleep(0.002)
+            time.sleep(0.01)
 
     def tell_body(self, scene: Scene) -> None:
         """Publish a wearer."""

@@ -18,7 +18,7 @@ from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
 # Draws of joints: a few give good postures at once; many, before none is said to be free.
-FEW, MANY = 160, 4096
+FEW, MANY = 176, 4096
 # Goals that are kept, and postures that touch.
 MOST, MOST_BLOCKED = 256, 512
 # A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.

@@ -23,7 +23,7 @@ from rrth_planner.kernels.tree import copy, distance, path_length
 # Gap that a path is left with, for the proof of its edges to succeed [m].
 LEFT = 1e-4
 # Most corners and contacts of a path that are moved; sweeps of the balance.
-MAX_CORNERS, MAX_CONTACTS, MAX_SWEEPS = 16, 96, 100
+MAX_CORNERS, MAX_CONTACTS, MAX_SWEEPS = 16, 96, 30
 # Tries of a move, each of a shorter one, and corrections of each.
 N_TRIES, SHORTER, N_CORRECTIONS = 3, 0.3, 4
 SQUARE = MAX_CORNERS * MAX_CORNERS
