@@ -29,7 +29,7 @@ TARGETS = (
     (0.9, 0.9, -0.4),
     (0.6, -0.3, -0.05),
 )
-SEED = 4
+SEED = 0
 
 
 def test_the_file_is_what_read_urdf_makes_of_the_urdf(tmp_path):
