@@ -21,6 +21,10 @@ RESERVE = 0.99
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
 SEARCH_SPACING = 1e-3
+# Where it hardly moves, so close [rad], and by so small a share of its own speed.
+SHARP_POSITION, SHARP_VELOCITY = 1e-4, 0.02
+# No arm goes much faster than it was told.
+FASTEST_RATE = 1.05
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
 
@@ -188,7 +192,7 @@ def takeover(
     velocities: Array,
     running: Trajectory | None,
     ahead: float,
-    known_phase: float | None = None,
+    known: tuple[float, float] | None = None,
 ) -> Takeover:
     """
     Return what an arm will do, from a reading of it.
@@ -205,11 +209,12 @@ def takeover(
         The motion that the arm was last told to follow.
     ahead : float
         From the reading on, >= 0 [s].
-    known_phase : float, optional
-        Where in that motion the arm is known to be, on time; without, it is looked for [s].
+    known : tuple of float, optional
+        Where in that motion the arm is known to be [s], and at which rate it follows it; without,
+        that is looked for.
 
     """
-    found = None if known_phase is None else (known_phase, 1.0)
+    found = known
     if running is not None and found is None:
         found = phase_of(positions, velocities, running)
     if running is None or found is None:
@@ -228,8 +233,26 @@ def takeover(
     )
 
 
-def phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
-    """Return the time within a motion at which the arm is, and at which rate it follows it."""
+def sharp_phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
+    """Return the same as `phase_of` of an arm that hardly moves, where its reading is so exact."""
+    speed = float(np.linalg.norm(v))
+    if speed == 0.0:
+        return None
+    found = phase_of(q, v, running, (SHARP_POSITION, SHARP_VELOCITY * speed))
+    return None if found is None or found[1] > FASTEST_RATE else found
+
+
+def phase_of(
+    q: Array,
+    v: Array,
+    running: Trajectory,
+    same: tuple[float, float] = (SAME_POSITION, SAME_VELOCITY),
+) -> tuple[float, float] | None:
+    """
+    Return the time within a motion at which the arm is [s], and at which rate it follows it.
+
+    None where the motion does not pass so close to the reading, `same` [rad, rad/s].
+    """
     n = max(2, int(running.duration / SEARCH_SPACING))
     times = np.linspace(0.0, running.duration, n)
     path, along, _ = sample(running, times)
@@ -246,5 +269,5 @@ def phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | N
         phase = float(np.clip(phase + (q - p) @ w / (w @ w + 1e-300), 0.0, running.duration))
     p, w, _ = (values[0] for values in sample(running, [phase]))
     rate = float(v @ w / (w @ w + 1e-300))
-    is_same = np.abs(q - p).max() <= SAME_POSITION and np.abs(v - rate * w).max() <= SAME_VELOCITY
+    is_same = np.abs(q - p).max() <= same[0] and np.abs(v - rate * w).max() <= same[1]
     return (phase, rate) if is_same else None

@@ -18,7 +18,7 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.right_of_way import RightOfWay
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import REST_SPEED, Takeover, takeover
+from rrth_planner.takeover import REST_SPEED, sharp_phase_of, Takeover, takeover
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].
@@ -107,12 +107,14 @@ class PlanInputs:
 
     def pauses(self, running: RunningMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, to go on in less than a span [s]."""
-        return (
-            running is not None
-            and not self.is_moving(now)
-            and self._is_on_time(running)
-            and running.will_move(now, span)
-        )
+        if running is None or self.is_moving(now):
+            return False
+        followed = self._followed(running)
+        if followed is None:
+            return False
+        phase, rate = followed
+        then = running.start_time + phase + rate * (now - self.joints.taken)
+        return running.will_move(then, rate * span)
 
     def ahead(self, running: RunningMotion | None, time: float, arm: ArmModel) -> Takeover:
         """Return what an arm that moves will do at a time [s], or raise RequestError."""
@@ -122,10 +124,9 @@ class PlanInputs:
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
-        phase = None
-        if running is not None and not self.is_moving(joints.taken) and self._is_on_time(running):
-            # No velocity tells how far an arm has come that rests for a moment.
-            phase = joints.taken - running.start_time
+        known = None
+        if running is not None and not self.is_moving(joints.taken):
+            known = self._followed(running)
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
             found = takeover(
@@ -133,7 +134,7 @@ class PlanInputs:
                 joints.velocities,
                 None if running is None else running.trajectory,
                 time - joints.taken,
-                phase,
+                known,
             )
         if not np.isfinite(found.state.positions).all():
             raise RequestError(
@@ -143,9 +144,17 @@ class PlanInputs:
             )
         return found
 
-    def _is_on_time(self, running: RunningMotion) -> bool:
+    def _followed(self, running: RunningMotion) -> tuple[float, float] | None:
+        """Return the time within a motion where an arm hardly moves [s], and its rate."""
         joints = self.joints
-        return running.is_on_time(joints.positions, joints.velocities, joints.taken)
+        q, v = joints.positions, joints.velocities
+        # An arm that follows its motion slowly hardly moves for long: it only seems on time.
+        with np.errstate(all='ignore'):
+            found = sharp_phase_of(q, v, running.trajectory)
+        if found is None and running.is_on_time(q, v, joints.taken):
+            # No velocity tells how far an arm has come that rests for a moment.
+            found = joints.taken - running.start_time, 1.0
+        return found
 
     def _fastest(self, arm: ArmModel) -> str:
         speeds = np.abs(self.joints.velocities)
