@@ -20,6 +20,8 @@ from rrth_planner.takeover import (
     lead_in,
     MotionState,
     reserved,
+    REST_SPEED,
+    sharp_phase_of,
     Takeover,
     takeover,
 )
@@ -143,6 +145,22 @@ def test_an_arm_that_follows_a_motion_is_foreseen_to_go_on(rate, seed):
     # In the time of the motion: what comes next is followed at the same rate.
     assert np.abs(found.velocities - v).max() < 1e-5
     assert np.abs(found.accelerations - a).max() < 1e-3
+
+
+@pytest.mark.parametrize('rate', [0.1, 0.5, 1.0])
+@examples(40)
+@given(seed=SEEDS)
+def test_an_arm_that_hardly_moves_is_found_where_its_reading_is_exact(rate, seed):
+    rng = np.random.default_rng(seed)
+    running = parameterize(Path(rng.standard_normal((2, 4))), (), limits())
+    time = rng.uniform(0.005, 0.02)
+    q, v, _ = (values[0] for values in sample(running, [time]))
+    assert np.abs(v).max() <= REST_SPEED
+    np.testing.assert_allclose(sharp_phase_of(q, rate * v, running), (time, rate), rtol=1e-3)
+    # Noise, even that of a good encoder, has no direction; nor is an arm ahead of its motion.
+    across = np.linalg.norm(v) * np.linalg.svd(v[None])[2][-1]
+    for other in (rate * v + 0.1 * across, np.zeros(4), 1.1 * v, -v):
+        assert sharp_phase_of(q, other, running) is None
 
 
 @examples(30)
