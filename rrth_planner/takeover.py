@@ -21,8 +21,9 @@ RESERVE = 0.99
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
 SEARCH_SPACING = 1e-3
-# Where it hardly moves, so close [rad], and by so small a share of its own speed.
-SHARP_POSITION, SHARP_VELOCITY = 1e-4, 0.02
+# Where it hardly moves, so close [rad], and by so small a share of its own speed; slower, it has
+# no direction [rad/s].
+SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
 # No arm goes much faster than it was told.
 FASTEST_RATE = 1.05
 # Two points of a part of a motion are at least so far apart [s].
@@ -236,7 +237,7 @@ def takeover(
 def sharp_phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
     """Return the same as `phase_of` of an arm that hardly moves, where its reading is so exact."""
     speed = float(np.linalg.norm(v))
-    if speed == 0.0:
+    if speed < STILL:
         return None
     found = phase_of(q, v, running, (SHARP_POSITION, SHARP_VELOCITY * speed))
     return None if found is None or found[1] > FASTEST_RATE else found
