@@ -405,12 +405,13 @@ def test_a_planner_that_was_killed_is_replaced_in_mid_motion(spinning, wait_unti
             # All this time the playback went on.
             assert watcher.speed > 0.02
             playback.check()
+            n_before = len(watcher.motions)
             answer = ask()
             assert answer.success, answer.message
             wait_until(lambda: watcher.speed == 0.0)
             second.check()
-    # It took over from an arm that moved.
-    assert np.abs(watcher.motions[-1].points[0].velocities).max() > 0.02
+    # It took over from an arm that moved; a request that came late may have asked once more.
+    assert np.abs(watcher.motions[n_before].points[0].velocities).max() > 0.02
     assert not [line for line in said if 'refused' in line], said
     q = np.array([state.position for state in watcher.states])
     stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in watcher.states])
