@@ -3,25 +3,22 @@
 """What is left of a motion that runs, held against the wearer as he is seen now."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import tree_depth
-from rrth_planner.certificate import BERNSTEIN_3, BERNSTEIN_4, certify, FINENESS
+from rrth_planner.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.kernels import pieces
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Box, Scene
+from rrth_planner.scene import Scene
 from rrth_planner.takeover import joined
 from rrth_planner.trajectory import positions_at, sample, Trajectory
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
 # Two points of a part of a motion are at least so far apart [s].
 CLOSEST = 1e-4
-# Stretches of time in each of which boxes that move are as large as they get in it.
-STRETCHES = 6
 # Where one motion takes over from another no joint is further apart [rad].
 SEAM = 1e-7
 
@@ -93,7 +90,6 @@ def is_still_free(
     *,
     margin: float,
     ray_guard_length: float,
-    moves: tuple[Array, Array] | None = None,
 ) -> bool:
     """
     Return whether what is left of a motion is proven free of the wearer as seen now.
@@ -108,29 +104,16 @@ def is_still_free(
         The wearer in the base frame.
     margin, ray_guard_length : float
         [m].
-    moves : tuple of ndarray, shape (m,), optional
-        How fast each box may go on moving, in any direction, and how long ago it was seen: until
-        the arm has passed it counts as that much larger [m/s, s].
 
     """
     trajectory = running.trajectory
-    q_end = trajectory.positions[-1]
     checked = phase
     if phase < running.escape_time:
         world = arm_world(arm, scene, margin, ray_guard_length)
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
         checked = running.escape_time
-    if moves is None or not moves[0].any():
-        return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
-    # Within a stretch of time the boxes are as large as they get at its end.
-    now = min(max(checked, 0.0), trajectory.duration)
-    for begin, end in pairwise(np.linspace(now, trajectory.duration, STRETCHES + 1).tolist()):
-        reach = moves[0] * (moves[1] + end - phase)
-        world = arm_world(arm, _swollen(scene, reach), margin, ray_guard_length)
-        if not certify(between(trajectory, begin, end), world).is_proven:
-            return False
-    return world.is_valid(q_end, running.reach)
+    return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
 
 
 def leads_away(
@@ -215,32 +198,3 @@ def _is_rest_free(
             BERNSTEIN_3,
         )
     )
-
-
-def _swollen(scene: Scene, by: Array) -> Scene:
-    """Return a scene whose boxes are larger by so much on every side, (m,) [m]."""
-    return Scene(
-        tuple(
-            Box(box.name, box.center, box.size + 2.0 * growth, box.rotation)
-            for box, growth in zip(scene.boxes, by.tolist(), strict=True)
-        )
-    )
-
-
-def box_speed(before: Box, after: Box, elapsed: float) -> float:
-    """
-    Return how fast a box moved, the greatest speed of any of its corners [m/s].
-
-    Parameters
-    ----------
-    before, after : Box
-    elapsed : float
-        Between the two [s]; where that is none it may be as fast as any.
-
-    """
-    if elapsed <= 0.0:
-        return np.inf
-    turned = np.linalg.norm(after.rotation - before.rotation, 2) * np.linalg.norm(after.size)
-    moved = np.linalg.norm(after.center - before.center) + 0.5 * turned
-    grown = 0.5 * np.linalg.norm(np.maximum(after.size - before.size, 0.0))
-    return float((moved + grown) / elapsed)

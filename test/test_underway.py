@@ -21,7 +21,6 @@ from rrth_planner.timing import limit_ratio
 from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.underway import (
     between,
-    box_speed,
     is_place_free,
     is_still_free,
     leads_away,
@@ -150,44 +149,6 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
             dense_touch(arm, larger, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
             for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
         )
-
-
-def test_boxes_that_may_move_on_are_larger_the_later_the_arm_comes():
-    rng = np.random.default_rng(3)
-    motion = None
-    while motion is None or motion.duration < 1.0:
-        motion = random_motion(rng)
-    running = RunningMotion(trajectory=motion, start_time=0.0)
-    keep = {'margin': MARGIN, 'ray_guard_length': RAY}
-    n = len(wearer().boxes)
-    assert is_still_free(running, 0.0, table_1_arm(), wearer(), **keep)
-    slow = is_still_free(
-        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 1e-4), np.zeros(n)), **keep
-    )
-    fast = is_still_free(
-        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 5.0), np.zeros(n)), **keep
-    )
-    seen_long_ago = is_still_free(
-        running, 0.0, table_1_arm(), wearer(), moves=(np.full(n, 1e-4), np.full(n, 1e4)), **keep
-    )
-    assert slow
-    assert not fast
-    assert not seen_long_ago
-
-
-def test_the_speed_of_a_box_is_that_of_its_fastest_corner():
-    still = Box('torso', np.zeros(3), np.ones(3), np.eye(3))
-    moved = Box('torso', np.array([0.0, 0.1, 0.0]), np.ones(3), np.eye(3))
-    assert box_speed(still, moved, 0.1) == pytest.approx(1.0)
-    assert box_speed(still, still, 0.1) == 0.0
-    # A clock that stands still or is set back tells nothing.
-    assert box_speed(still, moved, 0.0) == box_speed(still, moved, -1.0) == np.inf
-    # It may turn or grow where it is.
-    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    turned = Box('torso', np.zeros(3), np.ones(3), quarter)
-    assert box_speed(still, turned, 1.0) >= np.sqrt(2.0 * 0.5)
-    grown = Box('torso', np.zeros(3), np.array([1.0, 1.2, 1.0]), np.eye(3))
-    assert box_speed(still, grown, 0.1) == pytest.approx(1.0)
 
 
 @examples(25)

@@ -14,7 +14,6 @@ from rclpy.node import Node
 from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.box_speeds import BoxSpeeds
 from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.messages import scene_of
@@ -81,7 +80,6 @@ class Guard:
         self.n_brakes, self.n_begun = 0, 0
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
-        self._speeds = BoxSpeeds()
         # Plans again for a goal, once the arm rests; set by the owner.
         self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
         # Has a stop that was published as free judged once more; set by the owner.
@@ -130,12 +128,9 @@ class Guard:
         begin = time.perf_counter()
         with self._lock:
             now, parameters = self._now(), self._parameters
-            if self.running is None and self._reporter.parameters.max_body_speed == 0.0:
+            if self.running is None:
                 return
-            body = self._heard.body.value.at(now)
-            scene = scene_of(body)
-            came = now - 1e-9 * (time.time_ns() - arrived)
-            moves = self._speeds.look(body, came, self._reporter.parameters.max_body_speed)
+            scene = scene_of(self._heard.body.value.at(now))
             phase = self._phase(now)
             if phase is None or self._state is not Watch.WATCHING:
                 return
@@ -149,7 +144,6 @@ class Guard:
                 scene,
                 margin=parameters.margin,
                 ray_guard_length=parameters.ray_guard_length,
-                moves=moves,
             ):
                 self._stop(phase, now, scene, 'the wearer moved into the way', arrived)
             else:

@@ -50,14 +50,6 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
         Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
         Setting(
-            'max_body_speed',
-            0.0,
-            0.0,
-            10.0,
-            'm/s',
-            'up to which boxes seen to move are foreseen to go on, while the arm moves',
-        ),
-        Setting(
             'incident_folder',
             '',
             None,
@@ -96,8 +88,6 @@ class PlannerParameters:
         [m].
     body_timeout, joint_timeout : float
         [s]; 0: never.
-    max_body_speed : float
-        [m/s].
     replan : bool
     incident_folder : str
         Empty: a folder of the ROS logs.
@@ -115,7 +105,6 @@ class PlannerParameters:
     escape_depth: float
     body_timeout: float
     joint_timeout: float
-    max_body_speed: float
     replan: bool
     incident_folder: str
     limits: MotionLimits
@@ -140,7 +129,6 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         base_frame=values['base_frame'],
         body_timeout=values['body_timeout'],
         joint_timeout=values['joint_timeout'],
-        max_body_speed=values['max_body_speed'],
         replan=values['replan'],
         incident_folder=values['incident_folder'],
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
