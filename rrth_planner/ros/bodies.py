@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rrth_planner.errors import MessageError
+from rrth_planner.errors import MessageError, one_line
 from rrth_planner.ros.edits import BodyPart, Edit, Key, MOST_BOXES, read_edits
 from rrth_planner.ros.frames import Lookup
 from rrth_planner.scene import Scene
@@ -25,7 +25,8 @@ class WearerBody:
     parts : tuple of ((str, int), BodyPart)
         Keys (ns, id), each once.
     expired : tuple of ((str, int), BodyPart)
-        Those that were neither deleted nor added again since their lifetime passed; at most 100.
+        Those that were neither deleted nor added again since their lifetime passed: nobody knows
+        where they are. At most 100.
 
     """
 
@@ -36,6 +37,11 @@ class WearerBody:
     def n_boxes(self) -> int:
         """Number of boxes."""
         return sum(len(part.boxes) for _, part in self.parts)
+
+    @property
+    def expired_names(self) -> str:
+        """What sentences call the parts whose lifetime has passed."""
+        return one_line(', '.join(f'"{box.name}"' for _, p in self.expired for box in p.boxes))
 
     def at(self, now: float) -> 'WearerBody':
         """Return the body without the parts whose lifetime has passed at a time [s]."""

@@ -1,9 +1,15 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""While the arm moves the wearer may move too: each new body is held against what is left."""
+"""
+While the arm moves the wearer may move too: each new body is held against what is left.
+
+It fails closed: whatever goes wrong while a body is judged ends in a stop.
+"""
 
 from collections.abc import Callable
+from contextlib import suppress
 from copy import copy
+from dataclasses import replace
 from enum import Enum
 from threading import RLock
 import time
@@ -13,6 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
+from rrth_planner.errors import one_line
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs
@@ -29,6 +36,8 @@ from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
+# A body that is judged later than this after it came ends in a stop [s].
+LONGEST_WAIT = 0.05
 ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
 # By whether the arm was told last what it is seen to follow.
 TURNED = {
@@ -49,6 +58,10 @@ class Watch(Enum):
 class Guard:
     """
     Stops the arm when what is left of its motion is no longer proven free of the wearer.
+
+    So does any error on the way to that proof, a body that is refused, and one that is judged too
+    late. While a stop that is due could not be published it is tried again, and the planner no
+    longer counts as alive: an arm that watches over its planner's liveliness then stops by itself.
 
     Parameters
     ----------
@@ -78,6 +91,10 @@ class Guard:
         # Motions that were planned before a brake are of no use after it, nor is a plan for what
         # was stopped once another motion has begun.
         self.n_brakes, self.n_begun = 0, 0
+        # Why the arm was stopped last, and why it is to be stopped while no stop is published;
+        # since when [s], and whether it may plan again then.
+        self.cause = self.due = ''
+        self._since, self._is_again = 0.0, True
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
         # Plans again for a goal, once the arm rests; set by the owner.
@@ -102,77 +119,127 @@ class Guard:
         tell: Callable[[], None],
     ) -> None:
         """Have a motion told, and watch it by the parameters of its plan; the lock is held."""
-        before = copy(self._followed)
+        before = copy(self._followed), self._parameters, self._goal, self._state
         self._followed.begin(running, self._now())
+        self._parameters, self._goal, self._state = parameters, goal, Watch.WATCHING
         try:
             tell()
         except Exception:
-            self._followed = before
+            self._followed, self._parameters, self._goal, self._state = before
             raise
-        self._parameters, self._goal = parameters, goal
         self.n_begun += 1
-        self._say(Watch.WATCHING, '')
-        # The body may have changed since the motion was last looked at.
-        self._surely(lambda: self.on_body(time.time_ns()))
+
+        def look() -> None:
+            self._say(Watch.WATCHING, '')
+            # The body may have changed since the motion was last looked at.
+            self._judge(time.time_ns())
+
+        # From here on the arm moves, whatever is wrong.
+        self._supervise(look)
 
     def close(self) -> None:
-        """Watch nothing any more."""
-        self._followed.forget()
+        """Stop the arm, since nobody is going to watch it, and watch nothing any more."""
+        with self._lock:
+            if self._node.context.ok():
+                self.fail('the planner ends', is_again=False)
+                if self._state is Watch.BRAKING:
+                    self._publishers.flush()
+            self._followed.forget()
+            self._state = Watch.IDLE
 
-    def _stop_of(self, running: RunningMotion, phase: float) -> Trajectory:
+    def _stop_of(self, running: RunningMotion, phase: float, now: float) -> RunningMotion:
         """Return the soonest stop that is found at once, from where the arm is."""
-        return emergency_stop(running.trajectory, phase, self._parameters.limits)
+        # Of a motion that takes over a little later the stop begins then.
+        start = running.start_time if phase < 0.0 else now
+        stop = emergency_stop(running.trajectory, phase, self._parameters.limits)
+        return RunningMotion(trajectory=stop, start_time=start)
 
     def on_body(self, arrived: int) -> None:
         """Hold the body, which came at a time [ns], against what is left of the motion."""
-        begin = time.perf_counter()
-        with self._lock:
-            now, parameters = self._now(), self._parameters
-            if self.running is None:
-                return
-            scene = scene_of(self._heard.body.value.at(now))
-            phase = self._phase(now)
-            if phase is None or self._state is not Watch.WATCHING:
-                return
-            assert self.running is not None
-            if not scene.boxes:
-                self._stop(phase, now, scene, 'the body is empty', arrived)
-            elif not is_still_free(
-                self.running,
-                phase,
-                parameters.arm,
-                scene,
-                margin=parameters.margin,
-                ray_guard_length=parameters.ray_guard_length,
-            ):
-                self._stop(phase, now, scene, 'the wearer moved into the way', arrived)
-            else:
-                self._reporter.recertified(time.perf_counter() - begin)
+        self._supervise(lambda: self._judge(arrived))
 
-    def _surely(self, look: Callable[[], None]) -> None:
-        """Look at a motion that is under way: whatever is wrong, the next look comes."""
+    def fail(self, why: str, is_again: bool = True) -> None:
+        """
+        Stop the arm, if it moves, for something that went wrong.
+
+        Parameters
+        ----------
+        why : str
+        is_again : bool
+            Whether it may plan again once the arm rests: not after an error, which would come
+            again.
+
+        """
+        with self._lock:
+            if self.running is not None and self._state is Watch.WATCHING:
+                self.due, self._is_again, self._since = why, is_again, time.perf_counter()
+                self._stop_for_failure()
+
+    def _supervise(self, look: Callable[[], None]) -> None:
+        """Have the monitor look; an error of it ends in a stop."""
         try:
-            look()
-        except Exception:
-            self._node.get_logger().error(traceback.format_exc())
+            with self._lock:
+                look()
+        except Exception as problem:
+            with suppress(Exception):
+                self._node.get_logger().error(traceback.format_exc())
+            self.fail(f'the monitor failed, {_named(problem)}', is_again=False)
+
+    def _judge(self, arrived: int) -> None:
+        """Stop the arm where the rest of its motion is not proven free; the lock is held."""
+        begin = time.perf_counter()
+        if self.running is None:
+            return
+        now, parameters = self._now(), self._parameters
+        phase = self._phase(now)
+        if phase is None or self._state is not Watch.WATCHING:
+            return
+        why = out_of_sight(self._heard, self._reporter.parameters, now)
+        if why:
+            self.fail(why)
+            return
+        scene = scene_of(self._heard.body.value.at(now))
+        if is_still_free(
+            self.running,
+            phase,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        ):
+            self._reporter.recertified(time.perf_counter() - begin)
+        else:
+            self._stop(phase, now, scene, arrived)
+        waited = self._waited(arrived)
+        if waited > LONGEST_WAIT:
+            self.fail(
+                f'a body was judged {waited:.3f} s after it came, expected at most '
+                f'{LONGEST_WAIT:g} s'
+            )
 
     def _on_timer(self) -> None:
+        """Look after a motion, and say that somebody does."""
+        self._supervise(self._look_after)
+
+    def _look_after(self) -> None:
         if self._state is not Watch.IDLE:
-            self._surely(self._look_round)
+            self._look_round()
+        if self.due:
+            self._stop_for_failure()
+        if not self.due:
+            self._publishers.assert_liveliness()
 
     def _look_round(self) -> None:
         """Stop an arm that nobody sees any more, or whose wearer, or that goes on for all that."""
-        with self._lock:
-            now = self._now()
-            self._insist(now)
-            self._look_back()
-            phase = self._phase(now)
-            if phase is None or self._state is not Watch.WATCHING:
-                return
-            why = out_of_sight(self._heard, self._reporter.parameters, now)
-            if why:
-                scene = scene_of(self._heard.body.value.at(now))
-                self._stop(phase, now, scene, why, time.time_ns())
+        now = self._now()
+        self._insist(now)
+        self._look_back()
+        phase = self._phase(now)
+        if phase is None or self._state is not Watch.WATCHING:
+            return
+        why = out_of_sight(self._heard, self._reporter.parameters, now)
+        if why:
+            self.fail(why)
 
     def _insist(self, now: float) -> None:
         """Stop the arm again where it goes on along the motion that it was to stop."""
@@ -180,7 +247,7 @@ class Guard:
         if found is None:
             return
         before, phase = found
-        stop = RunningMotion(trajectory=self._stop_of(before, phase), start_time=now)
+        stop = replace(self._stop_of(before, phase, now), start_time=now)
         self._followed.motion = stop
         self._publishers.publish_motion(stop.trajectory, self._parameters, now)
         self._node.get_logger().error('the arm did not stop as it was told: it is told again')
@@ -190,12 +257,13 @@ class Guard:
         if self._state in (Watch.WATCHING, Watch.BRAKING) and self._followed.look_back():
             self._node.get_logger().error(TURNED[self._followed.is_told])
             self._say(Watch.WATCHING, TURNED[self._followed.is_told])
-            self.on_body(time.time_ns())
+            self._judge(time.time_ns())
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where there is none any more."""
         if self._followed.is_over(now):
             self._followed.forget()
+            self.due = ''
             if self._state is Watch.BRAKING and not self._reporter.parameters.replan:
                 self._say(Watch.HOLDING, self._reporter.guard[1])
             elif self._state is not Watch.HOLDING:
@@ -208,18 +276,17 @@ class Guard:
             self._say(self._state, ELSEWHERE)
         return phase
 
-    def _stop(self, phase: float, then: float, scene: Scene, why: str, arrived: int) -> None:
-        """Publish the braking trajectory of an arm that was so far then; the lock is held."""
+    def _stop(self, phase: float, then: float, scene: Scene, arrived: int) -> None:
+        """Stop an arm, that was so far then, for a body in its way; the lock is held."""
+        why = 'the wearer moved into the way'
         # What was looked at since then may have taken its time.
         now = self._now()
         phase += now - then
         running, parameters, goal = self.running, self._parameters, self._goal
         if running is None or phase >= running.trajectory.duration:
             return
-        # Of a motion that takes over a little later the stop begins then.
-        start = running.start_time if phase < 0.0 else now
-        stopped = RunningMotion(trajectory=self._stop_of(running, phase), start_time=start)
-        is_safe = not scene.boxes or is_still_free(
+        stopped = self._stop_of(running, phase, now)
+        is_safe = is_still_free(
             stopped,
             0.0,
             parameters.arm,
@@ -240,26 +307,72 @@ class Guard:
                 self._node.get_logger().error(sentence)
             self._say(Watch.WATCHING, sentence)
             return
-        self._publishers.publish_motion(stopped.trajectory, parameters, start)
-        took = 1e-9 * (time.time_ns() - arrived)
-        self._followed.stop(stopped)
-        self.n_brakes += 1
+        self._publish_stop(stopped, why)
+        took = self._waited(arrived)
         warning = '' if is_safe else self._warning(stopped.trajectory, scene)
-        sentence = (
-            f'{why}: the arm brakes, at rest in {stopped.trajectory.duration:.2f} s{warning}'
-        )
-        self._say(Watch.BRAKING, sentence)
         self._reporter.braked(took)
-        logged = f'{sentence}; published after {1e3 * took:.2f} ms'
-        # A line each: rclpy raises where one and the same line logs at another severity.
-        if warning:
-            self._node.get_logger().error(logged)
-        else:
-            self._node.get_logger().warning(logged)
-        if not warning and goal is not None and len(scene.boxes):
+        self._tell_of_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
+        if not warning and goal is not None:
             self.judge(stopped.trajectory, scene, goal, parameters)
         if self._reporter.parameters.replan and goal is not None:
             self.plan_again(goal, stopped.trajectory.duration)
+
+    def _stop_for_failure(self) -> None:
+        """Publish the stop that is due, by as little as can be; the lock is held."""
+        running, goal = self.running, self._goal
+        if running is None:
+            self.due = ''
+            return
+        try:
+            stopped = self._stop_from_here(running)
+            if stopped is None:
+                return
+            self._publish_stop(stopped, self.due)
+        except Exception:
+            # It is tried again at the next look, and nobody says that the planner is alive.
+            with suppress(Exception):
+                self._node.get_logger().error(traceback.format_exc())
+            return
+        took = time.perf_counter() - self._since
+        # What is said of it must not undo it.
+        with suppress(Exception):
+            self._reporter.braked(took)
+            self._tell_of_stop(stopped.trajectory)
+            if self._is_again and goal is not None and self._reporter.parameters.replan:
+                self.plan_again(goal, stopped.trajectory.duration)
+
+    def _stop_from_here(self, running: RunningMotion) -> RunningMotion | None:
+        """Return the stop of a motion from where the arm is; None where it is nowhere on it."""
+        now = self._now()
+        try:
+            phase = self._followed.phase(now)
+        except Exception:
+            # What is told of where the arm is may be what is wrong; it was told to be here.
+            phase = now - running.start_time
+        return None if phase is None else self._stop_of(running, phase, now)
+
+    def _publish_stop(self, stop: RunningMotion, why: str) -> None:
+        """Publish a stop, and follow the arm on that."""
+        before = copy(self._followed)
+        self._followed.stop(stop)
+        try:
+            self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+        except Exception:
+            self._followed = before
+            raise
+        # From here on nothing may fail: the same stop would be published again.
+        self._state, self.cause, self.due = Watch.BRAKING, why, ''
+        self.n_brakes += 1
+
+    def _tell_of_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
+        """Say in log and diagnostics why the arm brakes."""
+        sentence = f'{self.cause}: the arm brakes, at rest in {stop.duration:.2f} s{warning}'
+        self._say(Watch.BRAKING, sentence)
+        # A line each: rclpy raises where one and the same line logs at another severity.
+        if warning:
+            self._node.get_logger().error(f'{sentence}{note}')
+        else:
+            self._node.get_logger().warning(f'{sentence}{note}')
 
     def _warning(self, stop: Trajectory, scene: Scene) -> str:
         """Return what is to be said of a stop that is not proven free."""
@@ -283,5 +396,13 @@ class Guard:
         self._reporter.guard = (state.value, sentence)
         self._reporter.publish_soon()
 
+    def _waited(self, arrived: int) -> float:
+        """Return how long ago a body came [ns -> s]."""
+        return 1e-9 * (time.time_ns() - arrived)
+
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9
+
+
+def _named(problem: Exception) -> str:
+    return one_line(f'{type(problem).__name__}: {problem}')

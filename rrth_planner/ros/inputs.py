@@ -61,14 +61,21 @@ class Input(Generic[T]):
         try:
             self.value = read()
         except MessageError as problem:
-            self.n_refused += 1
-            self.refusal = problem
-            self.is_last_refused = True
+            self._refuse(problem)
             return False
+        except Exception as problem:
+            self._refuse(
+                MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
+            )
+            raise
         self.received = now
         self.n_good += 1
         self.is_last_refused = False
         return True
+
+    def _refuse(self, problem: MessageError) -> None:
+        self.n_refused += 1
+        self.refusal, self.is_last_refused = problem, True
 
     def age(self, now: float) -> float:
         """Return the time since the last good message; inf before it, or where unknown [s]."""
@@ -228,13 +235,24 @@ class Inputs:
 
     def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
         _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
+        if self.body.is_last_refused:
+            # Where the wearer was before says nothing of where he is.
+            raise RequestError(
+                ErrorCode.SENSOR_INFO_STALE,
+                f'the last message on {self.body.topic} was refused: {self.body.refusal}',
+            )
         body = self.body.value.at(now)
+        if body.expired:
+            raise RequestError(
+                ErrorCode.SENSOR_INFO_STALE,
+                f'lost parts of the body on {self.body.topic}, whose lifetime has passed: '
+                f'{body.expired_names}; expected each of them again, or its DELETE',
+            )
         if body.n_boxes == 0:
             raise RequestError(
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-                f'the body on {self.body.topic} is empty: every box was deleted or its lifetime '
-                'has passed; expected at least one box of the wearer, since no motion is planned '
-                'blindly',
+                f'the body on {self.body.topic} is empty: every box was deleted; expected at '
+                'least one box of the wearer, since no motion is planned blindly',
             )
         _require_fresh(
             self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE

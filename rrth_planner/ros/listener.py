@@ -9,7 +9,7 @@ from typing import Any
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
-from rrth_planner.errors import MessageError
+from rrth_planner.errors import MessageError, one_line
 from rrth_planner.goal import PointingGoal
 from rrth_planner.ros.body_history import BodyHistory
 from rrth_planner.ros.edits import read_edits
@@ -59,8 +59,10 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
-        # Called after each good body with when it came [ns]; set once there is somebody to tell.
+        # Called after each body, good or refused, with when it came [ns], and after an error that
+        # nobody expected with what it is; set once there is somebody to tell.
         self.on_body: Callable[[int], None] = lambda arrived: None
+        self.on_error: Callable[[str], None] = lambda what: None
         self._history, self._rest = BodyHistory(), Breather()
         self._subscriptions = [
             self._subscribe(
@@ -87,14 +89,34 @@ class Listener:
         way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
     ) -> OpenSubscription:
+        def supervised(take: Callable[..., None]) -> Callable[..., None]:
+            def supervise(*arguments: Any) -> None:
+                try:
+                    take(*arguments)
+                except Exception as problem:
+                    self.on_error(one_line(f'{topic}: {type(problem).__name__}: {problem}'))
+                    raise
+
+            return supervise
+
         def refuse(problem: MessageError) -> None:
             def read() -> Any:
                 raise problem
 
             self._take(heard, read, self._now())
+            if heard is self._inputs.body:
+                self.on_body(time.time_ns())
 
         return OpenSubscription(
-            self._node, kind, topic, on_message, on_late, refuse, way, decode, self._rest
+            self._node,
+            kind,
+            topic,
+            supervised(on_message),
+            None if on_late is None else supervised(on_late),
+            supervised(refuse),
+            way,
+            decode,
+            self._rest,
         )
 
     def body_progress(self) -> tuple[int, int]:
@@ -114,8 +136,8 @@ class Listener:
             edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
             return self._history.apply(body.value, edits, sent, now)
 
-        if self._take(body, read, now):
-            self.on_body(arrived)
+        self._take(body, read, now)
+        self.on_body(arrived)
 
     def _on_target(self, msg: PointStamped, *_: int) -> None:
         if not msg.header.frame_id:

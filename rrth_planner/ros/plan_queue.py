@@ -243,7 +243,11 @@ class PlanQueue:
         if n_brakes != self.guard.n_brakes:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the arm was stopped for the wearer while its motion was planned',
+                f'the arm was stopped while its motion was planned: {self.guard.cause}',
+            )
+        if self.guard.due:
+            raise RequestError(
+                ErrorCode.FAILURE, f'a stop of the arm could not be published: {self.guard.due}'
             )
 
     def _should_stop(self, ticket: _Ticket) -> bool:

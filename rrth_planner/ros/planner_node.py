@@ -7,7 +7,9 @@ import gc
 from importlib.util import find_spec
 import signal
 import sys
+from threading import Event
 import time
+import traceback
 from typing import Any
 
 from geometry_msgs.msg import PointStamped, Pose
@@ -18,9 +20,9 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
-from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+from rclpy.signals import SignalHandlerOptions
 from rrth_planner.compiling import compile_kernels
-from rrth_planner.errors import MessageError, ModelError, RrthError
+from rrth_planner.errors import MessageError, ModelError, one_line, RrthError
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
@@ -63,6 +65,7 @@ class PlannerNode(Node):
         catch_up = CatchUp(self, self._listener.body_progress)
         self._queue = PlanQueue(self, heard, self._reporter, self._load_planner(), catch_up)
         self._listener.on_body = self._queue.guard.on_body
+        self._listener.on_error = self.fail
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)
@@ -71,8 +74,12 @@ class PlannerNode(Node):
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
     def close(self) -> None:
-        """End the plan in progress, those that wait, and the worker."""
+        """Stop an arm in motion; end the plan in progress, those that wait, and the worker."""
         self._queue.close()
+
+    def fail(self, what: str) -> None:
+        """Stop an arm in motion for an error that nobody expected."""
+        self._queue.guard.fail(what, is_again=False)
 
     def _compile(self) -> None:
         """Compile all kernels, in processes of their own where they can be kept."""
@@ -151,19 +158,15 @@ def main(args: list[str] | None = None) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = PlannerNode()
         _settle_interpreter()
-        _on_signals(_leave_to_ros)
-        install_signal_handlers(SignalHandlerOptions.ALL)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
+        is_told_to_end = Event()
+        # Not ROS's own handlers, which end the context: an arm in motion is still to be stopped.
+        _on_signals(lambda *_: is_told_to_end.set())
+        _spin(node, is_told_to_end)
+    except KeyboardInterrupt:
         pass
     except (RrthError, ParameterException, RuntimeError) as problem:
         if node is not None:
-            if rclpy.ok():
-                raise
-            # The executor was about to wait when a signal ended the context.
-            return 0
+            raise
         get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
         return 1
     finally:
@@ -172,6 +175,23 @@ def main(args: list[str] | None = None) -> int:
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
+
+
+def _spin(node: PlannerNode, is_told_to_end: Event) -> None:
+    """Run the node until it is told to end; an error of a callback stops the arm, not the node."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    # The timers of the node wake it up often enough to see that it is to end.
+    while rclpy.ok() and not is_told_to_end.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            return
+        except Exception as problem:
+            if not rclpy.ok():
+                return
+            node.get_logger().error(traceback.format_exc())
+            node.fail(one_line(f'{type(problem).__name__}: {problem}'))
 
 
 def _settle_interpreter() -> None:
@@ -191,10 +211,6 @@ def _on_signals(handler: Callable[..., None]) -> None:
 
 def _exit_at_once(*_: Any) -> None:
     raise SystemExit(0)
-
-
-def _leave_to_ros(*_: Any) -> None:
-    """Do nothing: ROS's own handler, which comes first, ends the spinning."""
 
 
 if __name__ == '__main__':

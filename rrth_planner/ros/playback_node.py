@@ -11,6 +11,7 @@ from typing import Any
 from geometry_msgs.msg import PoseStamped
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -26,6 +27,7 @@ from rrth_planner.ros.playback_parameters import (
     initial_positions,
     playback_rules,
 )
+from rrth_planner.ros.profiles import SUPERVISED
 from rrth_planner.ros.subscriptions import decoded
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg, pose_to_msg
 from sensor_msgs.msg import JointState
@@ -66,6 +68,17 @@ class PlaybackNode(Node):
         self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
         self.create_subscription(
             JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
+        )
+        # Its messages are those of the subscription above; what counts is who is alive.
+        self.create_subscription(
+            JointTrajectory,
+            'joint_trajectory',
+            lambda _: None,
+            SUPERVISED,
+            event_callbacks=SubscriptionEventCallbacks(
+                liveliness=self._on_liveliness, use_default_callbacks=False
+            ),
+            raw=True,
         )
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_timer(
@@ -145,10 +158,21 @@ class PlaybackNode(Node):
             f'{self._playback.end_time - time:.2f} s'
         )
 
-    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _on_liveliness(self, status: Any) -> None:
+        if status.not_alive_count_change > 0 and self._advance()[0] < self._playback.end_time:
+            self.get_logger().error(
+                f'the planner is lost, nobody watches over the motion: the arm brakes along its '
+                f'path, at rest in {self._brake():.2f} s'
+            )
+
+    def _brake(self) -> float:
+        """Stop along the path; return how long that takes, <= 0.0 at rest [s]."""
         time, _ = self._advance()
         self._follow(stop(self._playback, playback_rules(self, self._arm).limits, time))
-        left = self._playback.end_time - time
+        return self._playback.end_time - time
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        left = self._brake()
         response.success = True
         response.message = (
             f'SUCCESS (1): brakes along its path, at rest in {left:.2f} s'

@@ -5,18 +5,20 @@
 from collections.abc import Callable
 
 from nav_msgs.msg import Path
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rrth_planner.arrays import Array
 from rrth_planner.ros.markers import plan_markers
 from rrth_planner.ros.messages import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.ros.parameters import PlannerParameters
-from rrth_planner.ros.profiles import LATCHED
+from rrth_planner.ros.profiles import COMMANDED, LATCHED
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 TOOL_PATH_POSES = 25
+LONGEST_FLUSH = 0.5
 
 
 class PlanPublishers:
@@ -24,7 +26,7 @@ class PlanPublishers:
 
     def __init__(self, node: Node) -> None:
         """Advertise them."""
-        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', LATCHED)
+        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', COMMANDED)
         self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
 
@@ -45,6 +47,14 @@ class PlanPublishers:
     def tell(self, msg: JointTrajectory) -> None:
         """Publish the message of a motion."""
         self._trajectory.publish(msg)
+
+    def assert_liveliness(self) -> None:
+        """Say that the motion that runs is watched."""
+        self._trajectory.assert_liveliness()
+
+    def flush(self) -> None:
+        """Wait, but not for long, until everybody has the last motion."""
+        self._trajectory.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
 
     def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
         """Return the tool's path along a motion."""

@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.errors import one_line
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
@@ -116,10 +117,10 @@ class Reporter:
             if len(self._named) > MOST_NAMED:
                 self._named = {key for key, _ in expired}
             self._named.update(key for key, _ in new)
-            names = one_line(', '.join(f'"{box.name}"' for _, p in new for box in p.boxes))
+            names = WearerBody(expired=tuple(new)).expired_names
             self._node.get_logger().warning(
-                f'{self._heard.body.topic}: the lifetime of {names} has passed, plans no longer '
-                'regard them'
+                f'{self._heard.body.topic}: the lifetime of {names} has passed: no motion until '
+                'they come again or are deleted'
             )
 
     def refuse(self, code: ErrorCode, sentence: str) -> None:

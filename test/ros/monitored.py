@@ -1,0 +1,110 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A monitor of a motion on a clock of its own, for tests of what it does."""
+
+from dataclasses import replace
+from threading import RLock
+from types import SimpleNamespace
+
+import numpy as np
+from rrth_planner import oracle
+from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.edits import BodyPart
+from rrth_planner.ros.guard import Guard
+from rrth_planner.ros.inputs import Inputs
+from rrth_planner.ros.joints import JointReading
+from rrth_planner.ros.messages import WearerBody
+from rrth_planner.ros.parameters import declare_parameters
+from rrth_planner.running_motion import RunningMotion
+from rrth_planner.scene import Box
+from rrth_planner.trajectory import sample, Trajectory
+import worlds
+
+ARM = worlds.table_1_arm()
+# How far the motion has come [s].
+PHASE = 0.5
+FAR = Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3))
+
+
+class Monitored:
+    """A monitor of a motion that runs, on a clock of its own, and what it publishes."""
+
+    def __init__(self, node, parameters=None):
+        """Let the pointing ray turn in the free."""
+        q = worlds.free_configuration(np.random.default_rng(4), worlds.wearer_world())
+        still = np.zeros((2, ARM.dof))
+        self.motion = Trajectory(
+            times=[0.0, 1.5],
+            positions=[q, q - [0.0, 0.0, 0.8, 0.0]],
+            velocities=still,
+            accelerations=still,
+        )
+        self.now = 100.0 + PHASE
+        self.published, self.said, self.took, self.alive = [], [], [], []
+        # How long a body waits until it is judged [s].
+        self.late = 0.0
+        self.reporter = SimpleNamespace(
+            parameters=replace(parameters or declare_parameters(node), replan=False),
+            guard=('', ''),
+            publish_soon=lambda: None,
+            recertified=lambda took: self.said.append('free'),
+            braked=lambda took: self.said.append('braked') or self.took.append(took),
+        )
+        self.heard = Inputs('body', 'target', 'joints')
+        publishers = SimpleNamespace(
+            publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin)),
+            assert_liveliness=lambda: self.alive.append(self.now),
+            flush=lambda: None,
+        )
+        self.guard = Guard(node, self.heard, self.reporter, publishers, RLock())
+        self.guard._now = lambda: self.now
+        self.guard._waited = lambda arrived: self.late
+        self.see(FAR)
+        self.read(*self.on_time(PHASE))
+        self.begin()
+        self.said.clear()
+
+    def begin(self):
+        """Let a motion begin."""
+        running = RunningMotion(trajectory=self.motion, start_time=100.0)
+        self.tell(running)
+
+    def tell(self, running, publish=lambda: None):
+        """Tell the arm a motion."""
+        self.guard.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
+
+    def on_time(self, phase):
+        """Return positions and velocities of an arm that follows."""
+        return tuple(row[0] for row in sample(self.motion, [phase])[:2])
+
+    def read(self, q, v):
+        """Let joint states come."""
+        reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
+        self.heard.joints.value, self.heard.joints.received = reading, self.now
+
+    def see(self, *boxes, expires=float('inf')):
+        """Let a body come."""
+        parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
+        self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
+        self.guard.on_body(0)
+
+    def hand(self, ahead, away, motion=None):
+        """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
+        at = PHASE + ahead if motion is None else ahead
+        T = oracle.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
+        tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]
+        onward = (next_tip - tip) / np.linalg.norm(next_tip - tip)
+        return Box('hand', tip - away * onward, np.full(3, 0.05), np.eye(3))
+
+    def run(self, seconds, arm):
+        """Let time pass; arm: which positions and velocities it has at a time after PHASE [s]."""
+        for k in range(1, int(round(seconds / 0.01)) + 1):
+            self.now = 100.0 + PHASE + 0.01 * k
+            self.read(*arm(0.01 * k))
+            if k % 2 == 0:
+                self.guard._on_timer()
+
+    def obeys(self):
+        """Return where an arm is, and how fast, that follows the last stop that was published."""
+        stop, begin = self.published[-1]
+        return tuple(row[0] for row in sample(stop, [self.now - begin])[:2])

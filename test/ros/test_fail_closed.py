@@ -1,0 +1,260 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever goes wrong while a motion is monitored, the arm stops: faults at every call of that."""
+
+from dataclasses import replace
+from pathlib import Path
+import sys
+from types import FunctionType
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('fcl')
+
+from monitored import FAR, Monitored  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+import rrth_planner  # noqa: E402
+from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.ros import followed, guard  # noqa: E402
+from rrth_planner.ros.bodies import WearerBody  # noqa: E402
+from rrth_planner.ros.followed import Followed  # noqa: E402
+from rrth_planner.ros.guard import Guard  # noqa: E402
+from rrth_planner.ros.inputs import Input  # noqa: E402
+from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.profiles import LEASE  # noqa: E402
+from rrth_planner.running_motion import RunningMotion  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+PACKAGE = str(Path(rrth_planner.__file__).parent)
+# A body comes so often, and the timer of the monitor is due so often [s].
+PERIOD = 0.02
+# What a call may come to: an error, or 100 ms before or after what it does.
+FAULTS = ('raise', 'delay', 'return late')
+DELAY = 0.1
+# Enough for a stop of the motion below [s].
+LONGEST_STOP = 0.6
+
+
+class Fault(Exception):
+    """Nothing that any code expects."""
+
+
+class Injector:
+    """
+    Counts the calls that the package makes, and puts a fault into one of them.
+
+    Parameters
+    ----------
+    kind : str
+        Of `FAULTS`.
+    at : int or None
+        Which call; None: only counts.
+    on_delay : callable
+        Lets the time of a delay pass.
+
+    """
+
+    def __init__(self, kind, at, on_delay):
+        self.n, self.is_hit = 0, False
+        self._kind, self._at, self._on_delay = kind, at, on_delay
+
+    def __call__(self, frame, event, _):
+        """Look at one event of the interpreter."""
+        wanted = 'return' if self._kind == 'return late' else 'call'
+        if event.removeprefix('c_') != wanted:
+            return
+        caller = frame if event.startswith('c_') else frame.f_back
+        if caller is None or not caller.f_code.co_filename.startswith(PACKAGE):
+            return
+        self.n += 1
+        if self.n - 1 == self._at:
+            self.is_hit = True
+            if self._kind == 'raise':
+                raise Fault(f'at call {self._at}')
+            self._on_delay()
+
+    def __enter__(self):
+        sys.setprofile(self)
+        return self
+
+    def __exit__(self, *_):
+        sys.setprofile(None)
+
+
+@pytest.fixture
+def monitored():
+    """Give what makes a monitor of a motion that has just begun."""
+    node = Node('fail_closed')
+    parameters = declare_parameters(node)
+    yield lambda: Monitored(node, parameters)
+    node.destroy_node()
+
+
+def supervised(arm, step):
+    """Do as the node does where an error is not even within the monitor."""
+    try:
+        step()
+    except Fault as problem:
+        arm.guard.fail(f'{problem}', is_again=False)
+
+
+def follow(arm):
+    """Let the arm do what it was told last, with bodies and timers, for the time of a stop."""
+    begin, waits = arm.now, 0.0
+    while arm.now - begin < LONGEST_STOP:
+        arm.now += PERIOD
+        waits = arm.now - (arm.alive[-1] if arm.alive else begin)
+        if not arm.published and waits > LEASE:
+            # The playback, or who watches on a real arm, stops it.
+            return 'its planner is lost'
+        arm.read(*(arm.obeys() if arm.published else arm.on_time(arm.now - 100.0)))
+        supervised(arm, lambda: arm.see(*arm.boxes))
+        # A body that came while the one before was still looked at has waited since then.
+        arm.late = 0.0
+        supervised(arm, arm.guard._on_timer)
+    return 'stopped' if arm.published and not arm.obeys()[1].any() else 'goes on'
+
+
+def look(arm, which, kind, at):
+    """Have the monitor look once, with a fault at one call; return the injector."""
+
+    def delay():
+        arm.now += DELAY
+        arm.late += DELAY
+
+    arm.late = 0.0
+    with Injector(kind, at, delay) as injector:
+        supervised(arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.guard._on_timer)
+    arm.late = max(0.0, arm.late - PERIOD)
+    return injector
+
+
+@pytest.mark.parametrize('kind', FAULTS)
+@pytest.mark.parametrize('which', ['body', 'timer'])
+@pytest.mark.parametrize('is_hand', [True, False])
+def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which, is_hand):
+    n_hit = 0
+    while True:
+        arm = monitored()
+        arm.boxes = [FAR]
+        look(arm, 'body', kind, None)
+        arm.boxes += [arm.hand(0.6, 0.0)] * is_hand
+        if not look(arm, which, kind, n_hit).is_hit:
+            break
+        assert follow(arm) == 'stopped', f'{kind} at call {n_hit}'
+        arm.guard.close()
+        n_hit += 1
+    assert n_hit >= (50 if which == 'body' else 25)
+
+
+def places():
+    """Return what the monitor calls, as (owner, name)."""
+    names = 'scene_of out_of_sight is_still_free leads_away emergency_stop arm_world'
+    found = [(guard, name) for name in names.split()]
+    found += [(followed, name) for name in ('phase_of', 'sample', 'goes_on', 'is_on_other')]
+    for owner in (Guard, Followed, Input, WearerBody, RunningMotion):
+        found += [
+            (owner, name)
+            for name, value in vars(owner).items()
+            if isinstance(value, FunctionType) and not name.startswith('__')
+        ]
+    return found
+
+
+PLACES = [pytest.param(*place, id=f'{place[0].__name__}.{place[1]}') for place in places()]
+
+
+@pytest.mark.parametrize('is_hand', [True, False])
+@pytest.mark.parametrize(('owner', 'name'), PLACES)
+def test_what_fails_for_ever_stops_the_arm_or_loses_its_planner(
+    monitored, monkeypatch, owner, name, is_hand
+):
+    arm = monitored()
+    arm.boxes = [FAR, *([arm.hand(0.6, 0.0)] * is_hand)]
+    n_calls = []
+
+    def fail(*_, **__):
+        n_calls.append(name)
+        raise Fault(name)
+
+    monkeypatch.setattr(owner, name, fail)
+    found = follow(arm)
+    if is_hand or n_calls:
+        assert found in ('stopped', 'its planner is lost')
+    else:
+        assert found == 'goes on'
+
+
+def test_a_message_that_cannot_be_published_is_published_again(monitored, monkeypatch):
+    arm, publish = monitored(), None
+    arm.boxes = [FAR, arm.hand(0.6, 0.0)]
+    publish, n_tries = arm.guard._publishers.publish_motion, []
+
+    def at_the_third_time(*arguments):
+        n_tries.append(arm.now)
+        if len(n_tries) < 3:
+            raise Fault('no middleware')
+        publish(*arguments)
+
+    arm.guard._publishers.publish_motion = at_the_third_time
+    assert follow(arm) == 'stopped'
+    assert len(n_tries) == 3
+    # Nobody said meanwhile that the motion was watched.
+    assert not [time for time in arm.alive if n_tries[0] <= time < n_tries[-1]]
+
+
+def test_a_body_that_is_refused_stops_the_arm_and_says_why(monitored):
+    arm = monitored()
+    arm.boxes = [FAR]
+
+    def refuse():
+        raise MessageError('marker 3 ("shoe"): pose.position: nan')
+
+    arm.heard.body.accept(refuse, arm.now)
+    arm.guard.on_body(0)
+    assert len(arm.published) == 1
+    assert arm.reporter.guard[0] == 'brakes'
+    assert 'the last body was refused, marker 3 ("shoe")' in arm.reporter.guard[1]
+
+
+def test_joint_positions_that_are_refused_stop_the_arm(monitored):
+    arm = monitored()
+    arm.heard.joint_refusal = MessageError('position: nan')
+    arm.guard._on_timer()
+    assert len(arm.published) == 1
+    assert 'the last joint positions were refused, position: nan' in arm.reporter.guard[1]
+
+
+@pytest.mark.parametrize(('late', 'n_stops'), [(0.049, 0), (0.051, 1)])
+def test_a_body_that_is_judged_late_stops_the_arm(monitored, late, n_stops):
+    arm = monitored()
+    arm.late = late
+    arm.see(FAR)
+    assert len(arm.published) == n_stops
+    assert ('was judged 0.051 s after it came' in arm.reporter.guard[1]) == bool(n_stops)
+
+
+@pytest.mark.parametrize('replan', [True, False])
+@pytest.mark.parametrize(('late', 'n_again'), [(0.0, 0), (0.2, 1)])
+def test_after_an_error_nothing_is_planned_by_itself(
+    monitored, monkeypatch, replan, late, n_again
+):
+    arm, asked = monitored(), []
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
+    arm.guard.plan_again = lambda *arguments: asked.append(arguments)
+    arm.late = late
+    if not late:
+        monkeypatch.setattr(guard, 'is_still_free', lambda *_, **__: 1 / 0)
+    arm.see(FAR)
+    assert len(arm.published) == 1
+    assert len(asked) == n_again * replan
+
+
+def test_a_planner_that_ends_stops_its_arm(monitored):
+    arm = monitored()
+    arm.guard.close()
+    assert len(arm.published) == 1
+    assert 'the planner ends' in arm.reporter.guard[1]
+    arm.guard.close()
+    assert len(arm.published) == 1
