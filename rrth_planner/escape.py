@@ -11,9 +11,8 @@ from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.path import Path
 from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import after
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.trajectory import MotionLimits, part_of, Trajectory
 from rrth_planner.world import grown, World
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
@@ -119,7 +118,8 @@ def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
     """Return what is left of a motion when the arm is out, at one of its points [s]."""
     if escape_time == 0.0:
         return trajectory
-    return after(trajectory, int(np.abs(trajectory.times - escape_time).argmin()))
+    begin = trajectory.times[np.abs(trajectory.times - escape_time).argmin()]
+    return part_of(trajectory, float(begin), trajectory.duration)
 
 
 def _said(world: World, depths: Array, hair: float) -> str:

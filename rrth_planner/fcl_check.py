@@ -14,9 +14,8 @@ from rrth_planner.arrays import Array
 from rrth_planner.fcl_shapes import Bar, boxes_of, DOUBT
 from rrth_planner.reach import bar_ends
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import until
 from rrth_planner.touch import Touch
-from rrth_planner.trajectory import positions_at, Trajectory
+from rrth_planner.trajectory import part_of, positions_at, Trajectory
 from rrth_planner.travel import travelled
 
 # Longest time between two instants that may be looked at [s].
@@ -223,7 +222,7 @@ def touch_on_way_out(
         if not (size > 0.0).all():
             return Touch(0.0, by, 'the arm', box.name)
         boxes.append(Box(box.name, box.center, size, box.rotation))
-    way = until(trajectory, escape_time)
+    way = part_of(trajectory, 0.0, escape_time)
     touch = first_touch(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0, pause)
     if touch is None:
         return None

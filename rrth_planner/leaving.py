@@ -10,8 +10,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
 from rrth_planner.kernels.depths import depths
 from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
-from rrth_planner.takeover import until
-from rrth_planner.trajectory import positions_at, Trajectory
+from rrth_planner.trajectory import part_of, positions_at, Trajectory
 from rrth_planner.world import World
 
 # Stretches of time in each of which the arm gets no deeper than it is at the beginning.
@@ -100,7 +99,9 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
             return False
         # Once it is out of all boxes, the rest of the way is one stretch.
         is_out = not by.any()
-        if not certify(until(trajectory, end if is_out else stop), smaller, start).is_proven:
+        if not certify(
+            part_of(trajectory, 0.0, end if is_out else stop), smaller, start
+        ).is_proven:
             return False
         if is_out:
             break

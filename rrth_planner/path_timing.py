@@ -17,10 +17,10 @@ from rrth_planner.path import Path
 from rrth_planner.refusal import CANCELLED, Refusal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import joined, Lead, reserved
+from rrth_planner.takeover import Lead, reserved
 from rrth_planner.timing import parameterize, TooFastError
 from rrth_planner.touch import Disagreement
-from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.world import grown, World
 
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof

@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.braking import brake
 from rrth_planner.kernels.speeds import ramp_time
-from rrth_planner.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.trajectory import MotionLimits, near_point, sample, Trajectory
 
 # An arm that moves no faster is at rest [rad/s].
 REST_SPEED = 0.01
@@ -26,8 +26,6 @@ SEARCH_SPACING = 1e-3
 SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
 # No arm goes much faster than it was told.
 FASTEST_RATE = 1.05
-# Two points of a part of a motion are at least so far apart [s].
-CLOSEST = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -119,46 +117,6 @@ def reserved(limits: MotionLimits) -> MotionLimits:
     )
 
 
-def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return two trajectories in one, the second from the last point of the first on."""
-    return Trajectory(
-        times=np.concatenate([before.times, before.times[-1] + after.times[1:]]),
-        positions=np.concatenate([before.positions, after.positions[1:]]),
-        velocities=np.concatenate([before.velocities, after.velocities[1:]]),
-        accelerations=np.concatenate([before.accelerations, after.accelerations[1:]]),
-    )
-
-
-def until(trajectory: Trajectory, time: float) -> Trajectory:
-    """
-    Return a trajectory up to a time within it [s].
-
-    A part of a quintic is the quintic through its ends: nothing changes but the points.
-    """
-    if time >= trajectory.duration:
-        return trajectory
-    q, v, a = sample(trajectory, [time])
-    is_before = trajectory.times < time - CLOSEST
-    if not is_before.any():
-        return Trajectory(times=np.zeros(1), positions=q, velocities=v, accelerations=a)
-    return Trajectory(
-        times=np.append(trajectory.times[is_before], time),
-        positions=np.concatenate([trajectory.positions[is_before], q]),
-        velocities=np.concatenate([trajectory.velocities[is_before], v]),
-        accelerations=np.concatenate([trajectory.accelerations[is_before], a]),
-    )
-
-
-def after(trajectory: Trajectory, index: int) -> Trajectory:
-    """Return a trajectory from one of its points on."""
-    return Trajectory(
-        times=trajectory.times[index:] - trajectory.times[index],
-        positions=trajectory.positions[index:],
-        velocities=trajectory.velocities[index:],
-        accelerations=trajectory.accelerations[index:],
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Takeover:
     """
@@ -227,7 +185,8 @@ def takeover(
             )
         )
     phase, rate = found
-    time = min(phase + rate * ahead, running.duration)
+    # At a point of the motion where there is one: no piece of what follows is too short.
+    time = near_point(running, min(phase + rate * ahead, running.duration))
     q, v, a = (values[0] for values in sample(running, [time]))
     return Takeover(
         state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time

@@ -10,6 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
 
+# A point so near to a cut gives way to it [s]: in a shorter piece the last digit of a position is
+# a jerk. The polynomial of the piece beyond the point goes on over that time; where the jerk jumps
+# by 80 rad/s^3 at the point it is 1.3e-14 rad from that of the piece before.
+NEAR_POINT = 1e-5
 # Of a trajectory.
 _FIELDS = ('times', 'positions', 'velocities', 'accelerations')
 
@@ -186,14 +190,8 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
         return held, np.zeros_like(held), np.zeros_like(held)
     i, u, width = _locate(trajectory, t)
     is_outside = ((t < 0.0) | (t > trajectory.times[-1]))[:, None]
-    c = piece_coefficients(trajectory)[i]
-    v = (((5 * c[:, 5] * u + 4 * c[:, 4]) * u + 3 * c[:, 3]) * u + 2 * c[:, 2]) * u + c[:, 1]
-    a = ((20 * c[:, 5] * u + 12 * c[:, 4]) * u + 6 * c[:, 3]) * u + 2 * c[:, 2]
-    return (
-        _position(c, u),
-        np.where(is_outside, 0.0, v / width),
-        np.where(is_outside, 0.0, a / width**2),
-    )
+    q, v, a = _state(piece_coefficients(trajectory)[i], u, width)
+    return q, np.where(is_outside, 0.0, v), np.where(is_outside, 0.0, a)
 
 
 def jerks_at(trajectory: Trajectory, times: ArrayLike) -> Array:
@@ -210,6 +208,76 @@ def jerks_at(trajectory: Trajectory, times: ArrayLike) -> Array:
     return np.asarray(((60 * c[:, 5] * u + 24 * c[:, 4]) * u + 6 * c[:, 3]) / width**3)
 
 
+def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
+    """
+    Return what a trajectory does between two times, which then begins at time 0.
+
+    It is that trajectory to rounding: a part of a quintic is the quintic through its ends, and
+    every point between the two times stays.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    begin, end : float
+        Clipped to its times; where end <= begin, the result is a single point [s].
+
+    """
+    times = trajectory.times
+    begin = min(max(begin, 0.0), trajectory.duration)
+    end = min(max(end, 0.0), trajectory.duration)
+    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
+    if end <= begin:
+        return Trajectory(
+            times=np.zeros(1),
+            **dict(zip(_FIELDS[1:], _state_by(trajectory, end, 0.0), strict=True)),
+        )
+    is_inside = (times > begin + NEAR_POINT) & (times < end - NEAR_POINT)
+    ends = _state_by(trajectory, begin, NEAR_POINT), _state_by(trajectory, end, -NEAR_POINT)
+    q, v, a = (
+        np.concatenate([first, row[is_inside], last])
+        for first, row, last in zip(ends[0], rows, ends[1], strict=True)
+    )
+    return Trajectory(
+        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
+        positions=q,
+        velocities=v,
+        accelerations=a,
+    )
+
+
+def near_point(trajectory: Trajectory, time: float) -> float:
+    """Return a time, or that of the point of the trajectory that is next to it [s]."""
+    near = float(trajectory.times[np.abs(trajectory.times - time).argmin()])
+    return near if abs(near - time) <= NEAR_POINT else time
+
+
+def joined(before: Trajectory, after: Trajectory) -> Trajectory:
+    """Return two trajectories in one, the second from the last point of the first on."""
+    return Trajectory(
+        times=np.concatenate([before.times, before.times[-1] + after.times[1:]]),
+        positions=np.concatenate([before.positions, after.positions[1:]]),
+        velocities=np.concatenate([before.velocities, after.velocities[1:]]),
+        accelerations=np.concatenate([before.accelerations, after.accelerations[1:]]),
+    )
+
+
+def _state_by(trajectory: Trajectory, time: float, ahead: float) -> tuple[Array, Array, Array]:
+    """
+    Return the state at a time, each (1, dof), by the polynomial that holds a little ahead [s].
+
+    At one of its points the state is that of the point, to the bit.
+    """
+    times = trajectory.times
+    i = int(times.searchsorted(time))
+    if times[i] == time:
+        rows = trajectory.positions, trajectory.velocities, trajectory.accelerations
+        return rows[0][i : i + 1], rows[1][i : i + 1], rows[2][i : i + 1]
+    i = int(np.searchsorted(times[1:-1], time + ahead, side='right'))
+    width = times[i + 1] - times[i]
+    u = np.full((1, 1), (time - times[i]) / width)
+    return _state(piece_coefficients(trajectory)[i : i + 1], u, width)
+
+
 def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
     """Return the piece of each time, how far in it from 0 to 1, and its width [s]."""
     grid = trajectory.times
@@ -217,6 +285,12 @@ def _locate(trajectory: Trajectory, times: Array) -> tuple[NDArray[np.intp], Arr
     width = grid[i + 1] - grid[i]
     u = (times - grid[i]) / width
     return i, np.minimum(np.maximum(u, 0.0), 1.0)[:, None], width[:, None]
+
+
+def _state(c: Array, u: Array, width: Array | float) -> tuple[Array, Array, Array]:
+    v = (((5 * c[:, 5] * u + 4 * c[:, 4]) * u + 3 * c[:, 3]) * u + 2 * c[:, 2]) * u + c[:, 1]
+    a = ((20 * c[:, 5] * u + 12 * c[:, 4]) * u + 6 * c[:, 3]) * u + 2 * c[:, 2]
+    return _position(c, u), v / width, a / width**2
 
 
 def _position(c: Array, u: Array) -> Array:

@@ -13,43 +13,21 @@ from rrth_planner.kernels import pieces
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import joined
-from rrth_planner.trajectory import positions_at, sample, Trajectory
+from rrth_planner.trajectory import (
+    joined,
+    near_point,
+    part_of,
+    positions_at,
+    sample,
+    Trajectory,
+)
 from rrth_planner.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 
-# Two points of a part of a motion are at least so far apart [s].
-CLOSEST = 1e-4
-# Where one motion takes over from another no joint is further apart [rad].
-SEAM = 1e-7
-
-
-def between(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
-    """
-    Return the part of a trajectory between two times within it [s], which begins at time 0.
-
-    A part of a quintic is the quintic through its ends: nothing changes but the points.
-    """
-    states = sample(trajectory, [begin, end])
-    times = trajectory.times
-    is_inside = (times > begin + CLOSEST) & (times < end - CLOSEST)
-    if end - begin < CLOSEST:
-        return Trajectory(
-            times=np.zeros(1),
-            positions=states[0][1:],
-            velocities=states[1][1:],
-            accelerations=states[2][1:],
-        )
-    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
-    q, v, a = (
-        np.concatenate([ends[:1], row[is_inside], ends[1:]])
-        for ends, row in zip(states, rows, strict=True)
-    )
-    return Trajectory(
-        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
-        positions=q,
-        velocities=v,
-        accelerations=a,
-    )
+# Where one motion takes over from another their states are the same: positions, velocities and
+# accelerations to rounding [rad, rad/s, rad/s^2].
+SAME_STATE = 1e-11, 1e-9, 1e-6
+# Newton's steps to the time of that state; a square of a speed that counts as none [rad^2/s^2].
+REFINEMENTS, TINY = 3, 1e-12
 
 
 def taken_over(
@@ -72,14 +50,26 @@ def taken_over(
     if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:
         return after
     # By place, not by time: clocks differ by microseconds, and an arm may be slower than its
-    # motion. What is between the two where they meet is jumped in the time to the next point.
+    # motion.
     first = after.trajectory.positions[0]
-    end = min(before.near(min(phase + after.start_time - now, duration), first), duration)
-    is_known = phase + CLOSEST < end
-    if not is_known or np.abs(positions_at(before.trajectory, [end])[0] - first).max() > SEAM:
+    end = before.near(min(phase + after.start_time - now, duration), first)
+    for _ in range(REFINEMENTS):
+        q, v, _ = (row[0] for row in sample(before.trajectory, [end]))
+        end += float((first - q) @ v) / max(float(v @ v), TINY)
+    end = near_point(before.trajectory, end)
+    if not phase < end <= duration or not _is_same_state(before.trajectory, end, after.trajectory):
         return after
-    way = between(before.trajectory, phase, end)
+    way = part_of(before.trajectory, phase, end)
     return replace(after, trajectory=joined(way, after.trajectory), start_time=now)
+
+
+def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
+    """Return whether a motion begins with the state of another one at a time [s]."""
+    begin = (after.positions[0], after.velocities[0], after.accelerations[0])
+    return all(
+        np.abs(one[0] - other).max() <= same
+        for one, other, same in zip(sample(before, [end]), begin, SAME_STATE, strict=True)
+    )
 
 
 def is_still_free(

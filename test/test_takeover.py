@@ -16,7 +16,6 @@ from rrth_planner.pipeline import plan_motion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import (
-    joined,
     lead_in,
     MotionState,
     reserved,
@@ -26,7 +25,7 @@ from rrth_planner.takeover import (
     takeover,
 )
 from rrth_planner.timing import limit_ratio, parameterize
-from rrth_planner.trajectory import piece_coefficients, sample
+from rrth_planner.trajectory import joined, piece_coefficients, sample
 from worlds import (
     dense_touch,
     examples,

@@ -10,17 +10,18 @@ import pytest
 from rrth_planner import oracle
 from rrth_planner.certificate import certify
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
-from rrth_planner.goal import PointingGoal
-from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import frames, quintic_states
-from rrth_planner.pipeline import plan_motion
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import joined
 from rrth_planner.timing import limit_ratio
-from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
+from rrth_planner.trajectory import (
+    joined,
+    part_of,
+    piece_coefficients,
+    sample,
+    Trajectory,
+)
 from rrth_planner.underway import (
-    between,
     is_place_free,
     is_still_free,
     leads_away,
@@ -30,33 +31,16 @@ from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
     examples,
-    free_configuration,
     limits,
     MARGIN,
     random_boxes,
+    random_motion,
     RAY,
     table_1_arm,
     wearer,
-    wearer_world,
 )
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def random_motion(rng):
-    """Return a motion round the wearer, or None."""
-    plan = plan_motion(
-        table_1_arm(),
-        wearer(),
-        free_configuration(rng, wearer_world()),
-        PointingGoal(rng.uniform(-2.0, 2.0, 3)),
-        limits(),
-        RRTHOptions(),
-        margin=MARGIN,
-        ray_guard_length=RAY,
-        seed=1,
-    )
-    return plan.trajectory
 
 
 def off_the_path(trajectory, q):
@@ -136,7 +120,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
         margin=MARGIN,
         ray_guard_length=RAY,
     )
-    rest = between(motion, phase, motion.duration)
+    rest = part_of(motion, phase, motion.duration)
     touches = any(
         dense_touch(arm, scene, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
         for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
@@ -243,7 +227,7 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
         # Its first two points are close, as those of a lead-in.
         at = begin + rate * begin_ahead
         later = joined(
-            between(motion, at, at + 0.001), between(motion, at + 0.001, motion.duration)
+            part_of(motion, at, at + 0.001), part_of(motion, at + 0.001, motion.duration)
         )
         after = RunningMotion(trajectory=later, start_time=150.0)
         now = 150.0 - begin_ahead
@@ -268,7 +252,7 @@ def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
     motion = some_motions()[0]
     before = RunningMotion(trajectory=motion, start_time=100.0)
     half = 0.5 * motion.duration
-    later = between(motion, half, motion.duration)
+    later = part_of(motion, half, motion.duration)
     after = RunningMotion(trajectory=later, start_time=100.0 + half)
     assert taken_over(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
     # Its motion is over before, has not begun, or does not lead there.

@@ -10,8 +10,9 @@ import numpy as np
 from rrth_planner.aiming import target_in_mount
 from rrth_planner.arm import arm_from_mapping, ArmModel, tool_pose
 from rrth_planner.goal import PointingGoal
-from rrth_planner.options import RRTOptions
+from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.oracle import bars
+from rrth_planner.pipeline import plan_motion
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.reach import bar_ends
@@ -219,6 +220,22 @@ def free_configuration(rng, world: World):
         if world.is_valid(q):
             return q
     raise AssertionError('a world without a free configuration')
+
+
+def random_motion(rng):
+    """Return a motion planned round the wearer from a random start, or None."""
+    plan = plan_motion(
+        table_1_arm(),
+        wearer(),
+        free_configuration(rng, wearer_world()),
+        PointingGoal(rng.uniform(-2.0, 2.0, 3)),
+        limits(),
+        RRTHOptions(),
+        margin=MARGIN,
+        ray_guard_length=RAY,
+        seed=1,
+    )
+    return plan.trajectory
 
 
 def aiming_candidates(kernels, arm, target, q_near, n_draws, longest=np.inf):

@@ -324,9 +324,15 @@ class Guard:
             self.due = ''
             return
         try:
-            stopped = self._stop_from_here(running)
-            if stopped is None:
+            now = self._now()
+            phase = self._phase_for_certain(running, now)
+            if phase is None:
                 return
+            if phase >= running.trajectory.duration:
+                # It has come to its end.
+                self.due = ''
+                return
+            stopped = self._stop_of(running, phase, now)
             self._publish_stop(stopped, self.due)
         except Exception:
             # It is tried again at the next look, and nobody says that the planner is alive.
@@ -341,15 +347,13 @@ class Guard:
             if self._is_again and goal is not None and self._reporter.parameters.replan:
                 self.plan_again(goal, stopped.trajectory.duration)
 
-    def _stop_from_here(self, running: RunningMotion) -> RunningMotion | None:
-        """Return the stop of a motion from where the arm is; None where it is nowhere on it."""
-        now = self._now()
+    def _phase_for_certain(self, running: RunningMotion, now: float) -> float | None:
+        """Return the time within a motion, whatever is wrong; None where the arm is not on it."""
         try:
-            phase = self._followed.phase(now)
+            return self._followed.phase(now)
         except Exception:
             # What is told of where the arm is may be what is wrong; it was told to be here.
-            phase = now - running.start_time
-        return None if phase is None else self._stop_of(running, phase, now)
+            return now - running.start_time
 
     def _publish_stop(self, stop: RunningMotion, why: str) -> None:
         """Publish a stop, and follow the arm on that."""

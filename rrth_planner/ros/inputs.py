@@ -132,7 +132,10 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
         known = None
-        if running is not None and not self.is_moving(joints.taken):
+        if running is not None and joints.taken < running.start_time <= time:
+            # The arm was not on it yet: a stop, for one, may just have been told.
+            known = joints.taken - running.start_time, 1.0
+        elif running is not None and not self.is_moving(joints.taken):
             known = self._followed(running)
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):

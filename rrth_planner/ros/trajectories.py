@@ -20,8 +20,6 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # joint_trajectory_controller refuses a last point that is faster (float epsilon) [rad/s].
 REST_VELOCITY = float(np.finfo(np.float32).eps)
-# Residues of rounding at the ends, which are written as exact zeros.
-RESIDUE = 1e-6
 # More is refused: looking through them holds up the node.
 MOST_POINTS = 10_000
 UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
@@ -33,8 +31,8 @@ def joint_trajectory_to_msg(
     """
     Return a trajectory as a message that starts at a time [s], or on reception (stamp 0).
 
-    Times are rounded to whole nanoseconds; velocities and accelerations of both ends are exact
-    zeros where they are zero but for rounding.
+    Its numbers are those of the trajectory, which was proven; times are rounded to whole
+    nanoseconds.
 
     Raises
     ------
@@ -44,10 +42,7 @@ def joint_trajectory_to_msg(
     """
     # Numbers one by one, as in what follows: of few points arrays take longer.
     velocities, accelerations = trajectory.velocities.tolist(), trajectory.accelerations.tolist()
-    for rows in (velocities, accelerations):
-        for end in (0, -1):
-            rows[end] = [0.0 if abs(value) <= RESIDUE else value for value in rows[end]]
-    if any(velocities[-1]):
+    if any(abs(value) > REST_VELOCITY for value in velocities[-1]):
         raise MessageError(f'velocity of the last point: {velocities[-1]}, expected 0 [rad/s]')
     times = [round(t * NANOSECONDS) for t in trajectory.times.tolist()]
     _check_times(times)

@@ -12,6 +12,7 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
 from rrth_planner.arm import tool_pose  # noqa: E402
+from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import bodies, edits  # noqa: E402
@@ -37,6 +38,7 @@ from rrth_planner.status import PlanStatus  # noqa: E402
 from rrth_planner.trajectory import Trajectory  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
+import worlds  # noqa: E402
 
 NAN, INF = float('nan'), float('inf')
 
@@ -284,12 +286,25 @@ def test_times_are_rounded_to_nanoseconds_and_increase(steps):
     np.testing.assert_allclose(np.array(ns) * 1e-9, times, atol=1e-9)
 
 
-def test_residues_at_the_ends_become_exact_zeros():
-    v = np.full((2, 4), 4e-7)
-    moving = Trajectory(times=[0, 1], positions=np.zeros((2, 4)), velocities=v, accelerations=-v)
-    for point in joint_trajectory_to_msg(moving, JOINTS, 'torso').points:
-        assert list(point.velocities) == list(point.accelerations) == [0.0] * 4
-    moving = Trajectory(times=[0, 1], positions=v, velocities=v + 1e-3, accelerations=v)
+@worlds.examples(60)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_what_is_sent_is_what_was_proven_to_the_bit(seed):
+    rng = np.random.default_rng(seed)
+    moving = worlds.random_motion(rng)
+    if moving is None:
+        return
+    stop = emergency_stop(moving, rng.uniform(0.0, moving.duration), worlds.limits())
+    for sent in (moving, stop):
+        back = joint_trajectory_from_msg(joint_trajectory_to_msg(sent, JOINTS, 'torso'), JOINTS)
+        for name in ('positions', 'velocities', 'accelerations'):
+            assert np.array_equal(getattr(back, name), getattr(sent, name))
+        # Whole nanoseconds, but for the last digit.
+        assert np.abs(back.times - sent.times).max() < 1e-15
+
+
+def test_a_trajectory_that_does_not_end_at_rest_is_no_message():
+    v = np.full((2, 4), 1e-3)
+    moving = Trajectory(times=[0, 1], positions=v, velocities=v, accelerations=v)
     with pytest.raises(MessageError, match=r'velocity of the last point: .*expected 0 \[rad/s\]'):
         joint_trajectory_to_msg(moving, JOINTS, 'torso')
 

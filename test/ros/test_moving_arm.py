@@ -14,11 +14,12 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
+from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.ros import start  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
-from rrth_planner.ros.inputs import Input, Inputs  # noqa: E402
+from rrth_planner.ros.inputs import Input, Inputs, PlanInputs  # noqa: E402
 from rrth_planner.ros.joints import JointReading  # noqa: E402
 from rrth_planner.ros.last_look import LastLook, require_news  # noqa: E402
 from rrth_planner.ros.messages import WearerBody  # noqa: E402
@@ -216,3 +217,18 @@ def test_a_motion_that_nobody_knows_pauses_unseen(ask):
     # The arm's own rest is all there is to go by.
     outcome, _ = ask(_swings(), 1.0, is_known=False)
     assert outcome.start is None
+
+
+def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
+    motion = _swings()
+    stop = emergency_stop(motion, 0.4, worlds.limits())
+    q, v, _ = (row[0] for row in sample(motion, [0.39]))
+    reading = JointReading(q, v, BEGIN + 0.39, BEGIN + 0.39, float('inf'))
+    inputs = PlanInputs(worlds.wearer(), TARGET, reading)
+    running = RunningMotion(trajectory=stop, start_time=BEGIN + 0.4)
+    found = inputs.ahead(running, BEGIN + 0.46, worlds.table_1_arm())
+    assert found.running is stop
+    assert np.abs(found.state.positions - sample(stop, [0.06])[0][0]).max() < 1e-9
+    # Where it was before the stop began its own velocity tells.
+    found = inputs.ahead(running, BEGIN + 0.395, worlds.table_1_arm())
+    assert np.abs(found.state.positions - (q + 0.005 * v)).max() < 1e-12

@@ -707,7 +707,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
         patch.setattr(requests, 'plan_motion', plan_while_the_arm_is_stopped)
         message = stranger.answer().message
     assert message.startswith(
-        'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped for the wearer'
+        'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
     )
     assert not stranger.heard['joint_trajectory']
     assert stranger.answer().success
@@ -954,21 +954,28 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
     assert order == ['RRTOptions', 'plan']
 
 
-def test_a_box_whose_lifetime_has_passed_is_named_and_no_obstacle(start, monkeypatch):
+def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, monkeypatch):
     planner, stranger = start()
     warnings = []
     monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
     body = wearer()
-    # The folded arm is in it.
-    pack = box('pack', center=(-0.3, -0.1, 0.3), text='a pack')
+    pack = box('pack', center=(-1.0, 0.0, -1.0), text='a pack')
     pack.lifetime.nanosec = 10**8
     body.markers.append(pack)
     say_all(planner, stranger, body_boxes=body)
     stranger.wait_until(lambda: stranger.value('expired boxes') == 'a pack')
-    stranger.wait_until(lambda: any('"a pack"' in line for line in warnings))
+    stranger.wait_until(lambda: any('lifetime of "a pack"' in line for line in warnings))
+    for _ in range(2):
+        message = stranger.answer().message
+        assert message.startswith('SENSOR_INFO_STALE (-24): lost parts of the body'), message
+        assert '"a pack"' in message
+    assert sum('lifetime of "a pack"' in line for line in warnings) == 1
+    assert not stranger.heard['joint_trajectory']
+    gone = box('pack')
+    gone.action = Marker.DELETE
+    stranger.publishers['body_boxes'].publish(array(gone))
+    stranger.wait_until(lambda: not stranger.value('expired boxes'))
     assert stranger.answer().success
-    assert stranger.answer().success
-    assert sum('"a pack"' in line for line in warnings) == 1
 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
@@ -1039,7 +1046,9 @@ def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until)
         ('joint_states', joints(FOLDED[:3], JOINTS[:3]), "no ['joint_4']"),
     ],
 )
-def test_a_refused_message_is_reported_and_changes_nothing(start, topic, msg, sentence):
+def test_a_refused_message_is_reported_and_nothing_is_planned_until_a_good_one(
+    start, topic, msg, sentence
+):
     planner, stranger = start()
     say_all(planner, stranger)
     inputs = inputs_of(planner)
@@ -1049,6 +1058,13 @@ def test_a_refused_message_is_reported_and_changes_nothing(start, topic, msg, se
     stranger.wait_until(lambda: stranger.value(f'refused messages, {name}') == '1')
     assert sentence in stranger.value(f'last refusal, {name}')
     assert (inputs.body.value, inputs.joints.value) == before
+    if topic == 'body_boxes':
+        # Of joint positions only those of all joints count.
+        message = stranger.answer().message
+        assert message.startswith('SENSOR_INFO_STALE (-24): the last message on'), message
+        assert sentence in message
+        stranger.publishers[topic].publish(wearer())
+        stranger.wait_until(lambda: not inputs.body.is_last_refused)
     assert stranger.answer().success
 
 
