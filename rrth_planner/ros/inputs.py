@@ -56,8 +56,13 @@ class Input(Generic[T]):
         self.refusal: MessageError | None = None
         self.is_last_refused = False
 
-    def accept(self, read: Callable[[], T], now: float) -> bool:
-        """Take what `read` returns, heard at a time [s]; return False when it refuses."""
+    def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
+        """
+        Take what `read` returns, heard at a time [s]; return False when it refuses.
+
+        is_news: False where something newer has come before; then it is no younger for this, and a
+        refusal of that newer one stands.
+        """
         try:
             self.value = read()
         except MessageError as problem:
@@ -68,10 +73,12 @@ class Input(Generic[T]):
                 MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
             )
             raise
-        self.received = now
         self.n_good += 1
-        self.is_last_refused = False
-        return True
+        if is_news or self.received is None:
+            self.received = now
+        if is_news:
+            self.is_last_refused = False
+        return not self.is_last_refused
 
     def _refuse(self, problem: MessageError) -> None:
         self.n_refused += 1

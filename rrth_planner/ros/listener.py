@@ -11,15 +11,15 @@ from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rrth_planner.errors import MessageError, one_line
 from rrth_planner.goal import PointingGoal
-from rrth_planner.ros.body_history import BodyHistory
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.frames import Frames
 from rrth_planner.ros.inputs import Input, Inputs
+from rrth_planner.ros.marker_order import MarkerOrder
 from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.quick_decoding import quick_decoder
 from rrth_planner.ros.right_of_way import Breather
-from rrth_planner.ros.subscriptions import OpenSubscription
+from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -63,7 +63,7 @@ class Listener:
         # nobody expected with what it is; set once there is somebody to tell.
         self.on_body: Callable[[int], None] = lambda arrived: None
         self.on_error: Callable[[str], None] = lambda what: None
-        self._history, self._rest = BodyHistory(), Breather()
+        self._order, self._rest = MarkerOrder(), Breather()
         self._subscriptions = [
             self._subscribe(
                 MarkerArray,
@@ -84,8 +84,8 @@ class Listener:
         kind: type,
         topic: str,
         heard: Input[Any],
-        on_message: Callable[[Any, int, int], None],
-        on_late: Callable[[Any, int, int], None] | None = None,
+        on_message: Callable[[Any, Arrival], None],
+        on_late: Callable[[Any, Arrival], None] | None = None,
         way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
     ) -> OpenSubscription:
@@ -127,24 +127,24 @@ class Listener:
         """Return the goal of a request's own target, or raise MessageError."""
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
-    def _on_body(self, msg: MarkerArray, sent: int, arrived: int) -> None:
+    def _on_body(self, msg: MarkerArray, arrival: Arrival) -> None:
         now, body = self._now(), self._inputs.body
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(body)
 
         def read() -> WearerBody:
             edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
-            return self._history.apply(body.value, edits, sent, now)
+            return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
 
-        self._take(body, read, now)
-        self.on_body(arrived)
+        self._take(body, read, now, is_news=arrival.is_newer is None)
+        self.on_body(arrival.received)
 
-    def _on_target(self, msg: PointStamped, *_: int) -> None:
+    def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:
             self._warn_of_empty_frame(self._inputs.target)
         self._take(self._inputs.target, lambda: self.goal(msg), self._now())
 
-    def _on_joints(self, msg: JointState, *_: int) -> None:
+    def _on_joints(self, msg: JointState, _: Arrival) -> None:
         # Other machines share this topic; a message without any joint of ours is none of ours.
         if not has_joint_of(msg, self._joint_names):
             return
@@ -153,10 +153,12 @@ class Listener:
         if set(self._joint_names) <= set(msg.name):
             self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
 
-    def _take(self, heard: Input[Any], read: Callable[[], Any], now: float) -> bool:
+    def _take(
+        self, heard: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
+    ) -> bool:
         was_good = heard.received is not None and not heard.is_last_refused
         with self._inputs.lock:
-            is_good = heard.accept(read, now)
+            is_good = heard.accept(read, now, is_news)
         if not is_good:
             self._warn(heard)
         if is_good != was_good:

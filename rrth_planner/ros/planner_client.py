@@ -17,7 +17,7 @@ from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.profiles import LATCHED
-from rrth_planner.ros.subscriptions import OpenSubscription
+from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -159,7 +159,7 @@ class PlannerClient(Node):
         while time.monotonic() < end:
             self.take_messages()
 
-    def _on_state(self, msg: JointState, *_: int) -> None:
+    def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
             configuration_from_msg(msg, self._joint_names)
         except MessageError:

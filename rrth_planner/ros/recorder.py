@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.errors import RrthError
 from rrth_planner.ros.definitions import definition_of, type_name, type_of_name
-from rrth_planner.ros.subscriptions import OpenSubscription
+from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 
 # What has come is on the disk once it is so much; a recorder that is killed loses no more [bytes].
 CHUNK = 128 * 1024
@@ -115,18 +115,12 @@ class RecordingFile:
 
 
 class RawSubscription(OpenSubscription):
-    """Hears the same as its parent, and hands on the bytes, with their own time of sending."""
+    """Hears the same as its parent, and hands on the bytes."""
 
     def _hand_on(
-        self,
-        data: bytes,
-        hearer: Callable[[Any, int, int], None],
-        sent: int,
-        info: dict[str, Any],
+        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
-        # Not every middleware says when it came. `sent` never falls; a recording wants to know.
-        received = info.get('received_timestamp') or time.time_ns()
-        hearer(data, info['source_timestamp'], received)
+        hearer(data, arrival)
 
 
 class Recorder(Node):
@@ -174,10 +168,10 @@ class Recorder(Node):
             return
         self._file.add_topic(name, msg_type)
 
-        def write(data: bytes, sent: int, received: int) -> None:
+        def write(data: bytes, arrival: Arrival) -> None:
             if self._problem is None:
                 try:
-                    self._file.add(name, data, sent, received)
+                    self._file.add(name, data, arrival.sent[0], arrival.received)
                 except RrthError as problem:
                     self._problem = problem
 

@@ -15,9 +15,9 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.errors import MessageError, RecordError
 from rrth_planner.recording import Recording, Told
 from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.body_history import BodyHistory
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.marker_order import MarkerOrder
 from rrth_planner.ros.messages import (
     goal_from_msg,
     has_joint_of,
@@ -172,13 +172,15 @@ class RecordingReader:
         return goal_from_msg(msg, self._base_frame).target
 
     def _bodies(self) -> list[tuple[float, Scene]]:
-        history, body = BodyHistory(), WearerBody()
+        order, body = MarkerOrder(), WearerBody()
 
         def read(heard: Heard) -> tuple[float, WearerBody]:
             nonlocal body
             now = self._when(heard)
             edits = read_edits(heard.msg, now, self._base_frame)
-            body = history.apply(body, edits, heard.sent, now)
+            body = order.apply(
+                body, edits, (heard.sent, 0), now, lambda other: other[0] > heard.sent
+            )
             return now, body
 
         bodies = self._good('body_boxes', read)

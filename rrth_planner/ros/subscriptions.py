@@ -4,6 +4,8 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from functools import partial
 import time
 import traceback
 from typing import Any
@@ -15,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rrth_planner.errors import MessageError
+from rrth_planner.ros.marker_order import Stamp
 
 DEPTH = 50
 # Longer messages are not decoded, which would hold up everything else: half a second for a
@@ -24,9 +27,6 @@ MOST_BYTES = 512 * 1024
 REMEMBERED = 1024
 # How often publishers are looked at where the middleware does not announce them [s].
 POLL_PERIOD = 0.2
-
-# (source timestamp, sequence number): the same for all copies of a message.
-Stamp = tuple[int, int]
 
 
 def decoded(
@@ -46,48 +46,86 @@ def decoded(
         raise MessageError(f'{len(data)} bytes that are no {name}: {problem}') from problem
 
 
-class DuplicateFilter:
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """
+    When a message was sent and came, and what had come before it.
+
+    Parameters
+    ----------
+    sent : (int, int)
+        Source timestamp [ns] and sequence number.
+    received : int
+        [ns].
+    is_newer : callable or None
+        Of a message that comes late, after one that was sent later: whether what was sent then was
+        sent after it. None: nothing was, as far as is known.
+
+    """
+
+    sent: Stamp
+    received: int
+    is_newer: Callable[[Stamp], bool] | None = None
+
+
+class Copies:
     """
     Which of the copies of messages count, and which of those come late.
 
-    No single quality of service hears everybody, so a message may come twice: live, and from a
-    reliable reader, which may be late but misses nothing. The first copy counts. A copy of a
-    reliable reader is late when something that was sent after it, by whomever, has counted: it
-    was latched before, or missed live.
+    No single quality of service hears everybody, so a message may come by several readers. The
+    first copy counts. It is late when another message came before it that was sent after it. By
+    what clock, if publishers have several? A reader hands over what one publisher sends in the
+    order in which it was sent, though it may lose some: so what this reader has handed over before
+    was not sent later by the same publisher, whatever the clocks say. Of what it has not handed
+    over before the stamps decide: those of one publisher are of one clock.
+
+    Parameters
+    ----------
+    takes_late : bool
+        Whether a copy that comes late counts; without, the next copy may.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(self, takes_late: bool) -> None:
         """Start with nothing seen."""
-        self._seen: dict[Stamp, None] = {}
-        self._seen_late: dict[Stamp, None] = {}
-        self.newest = 0
+        self._takes_late = takes_late
+        # By which readers each message has come, and whether it has counted.
+        self._readers: dict[Stamp, set[Any]] = {}
+        self._counted: dict[Stamp, None] = {}
+        self._newest = 0
 
-    def counts_live(self, stamp: Stamp) -> bool:
-        """Return whether a copy of the best-effort reader counts, and remember it."""
-        if stamp in self._seen:
-            return False
-        # What comes live is the news, even from a machine whose clock is behind.
-        self.newest = max(self.newest, stamp[0])
-        _remember(self._seen, stamp)
-        return True
+    def take(self, sent: Stamp, received: int, reader: Any) -> Arrival | None:
+        """Return the arrival of a copy that counts, and remember it; None: it does not."""
+        readers = self._readers.setdefault(sent, set())
+        if sent in self._counted:
+            readers.add(reader)
+            return None
+        is_newer = self._newer_than(sent, reader)
+        readers.add(reader)
+        if len(self._readers) > REMEMBERED:
+            del self._readers[next(iter(self._readers))]
+        if is_newer is not None and not self._takes_late:
+            return None
+        self._newest = max(self._newest, sent[0])
+        self._counted[sent] = None
+        if len(self._counted) > REMEMBERED:
+            oldest = next(iter(self._counted))
+            del self._counted[oldest]
+            if oldest[0] == self._newest:
+                self._newest = max(stamp for stamp, _ in self._counted)
+        return Arrival(sent, received, is_newer)
 
-    def is_late(self, stamp: Stamp) -> bool:
-        """Return whether a copy of a reliable reader is older than what has counted."""
-        return stamp[0] < self.newest
+    def _newer_than(self, sent: Stamp, reader: Any) -> Callable[[Stamp], bool] | None:
+        """Return what tells what was sent after a message that came by a reader; None: nothing."""
 
-    def counts_reliable(self, stamp: Stamp) -> bool:
-        """Return whether a copy of a reliable reader counts, and remember it."""
-        if not self.is_late(stamp):
-            return self.counts_live(stamp)
-        is_new = stamp not in self._seen and stamp not in self._seen_late
-        _remember(self._seen_late, stamp)
-        return is_new
+        def is_newer(other: Stamp) -> bool:
+            # What is forgotten has come long ago: stamps are all there is to go by.
+            return other[0] > sent[0] and reader not in self._readers.get(other, ())
 
-
-def _remember(stamps: dict[Stamp, None], stamp: Stamp) -> None:
-    stamps[stamp] = None
-    if len(stamps) > REMEMBERED:
-        del stamps[next(iter(stamps))]
+        # Nearly always it is the newest of all.
+        if self._newest <= sent[0] or not any(map(is_newer, self._counted)):
+            return None
+        return is_newer
 
 
 class OpenSubscription:
@@ -103,10 +141,10 @@ class OpenSubscription:
     msg_type : type
     topic : str
     on_message : callable
-        Gets each message, when it was sent and when it came [ns]: the first of these never fall.
+        Gets each message and its Arrival.
     on_late : callable, optional
-        Gets each message that is older than one before, when it was sent and when it came [ns];
-        without, these are dropped, since the last one wins.
+        Gets each message that comes late, and its Arrival; without, these are dropped, since the
+        last one wins.
     on_refusal : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
     way : context manager, optional
@@ -123,8 +161,8 @@ class OpenSubscription:
         node: Node,
         msg_type: type,
         topic: str,
-        on_message: Callable[[Any, int, int], None],
-        on_late: Callable[[Any, int, int], None] | None = None,
+        on_message: Callable[[Any, Arrival], None],
+        on_late: Callable[[Any, Arrival], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
         way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
@@ -135,7 +173,7 @@ class OpenSubscription:
         self._decode, self._rest = decode, rest
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
-        self._filter = DuplicateFilter()
+        self._copies = Copies(on_late is not None)
         self._n_read = self._live_came = 0
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -176,7 +214,7 @@ class OpenSubscription:
                 )
                 self._reliable[durability] = self._subscribe(
                     profile,
-                    self._on_reliable,
+                    partial(self._on_copy, reader=durability),
                     SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
 
@@ -190,28 +228,23 @@ class OpenSubscription:
 
     def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
         self._live_came = info.get('received_timestamp') or 0
-        self._n_read += 1
-        if self._filter.counts_live(_stamp_of(info)):
-            self._hand_on(data, self._on_message, self._filter.newest, info)
-        self._rest()
+        self._on_copy(data, info, None)
 
-    def _on_reliable(self, data: bytes, info: dict[str, Any]) -> None:
+    def _on_copy(self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None) -> None:
+        """Hand on a message that came by a reader; None: by the one that hears everybody."""
         self._n_read += 1
-        stamp = _stamp_of(info)
-        is_late = self._filter.is_late(stamp)
-        if self._filter.counts_reliable(stamp):
-            if not is_late:
-                self._hand_on(data, self._on_message, self._filter.newest, info)
-            elif self._on_late is not None:
-                self._hand_on(data, self._on_late, stamp[0], info)
+        sent = info['source_timestamp'], info['publication_sequence_number']
+        # Not every middleware says when it came.
+        received = info.get('received_timestamp') or time.time_ns()
+        arrival = self._copies.take(sent, received, reader)
+        if arrival is not None:
+            hearer = self._on_message if arrival.is_newer is None else self._on_late
+            assert hearer is not None
+            self._hand_on(data, hearer, arrival)
         self._rest()
 
     def _hand_on(
-        self,
-        data: bytes,
-        hearer: Callable[[Any, int, int], None],
-        sent: int,
-        info: dict[str, Any],
+        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
         with self._way:
@@ -221,13 +254,8 @@ class OpenSubscription:
                 self._on_refusal(problem)
                 return
             try:
-                # Not every middleware says when it came.
-                hearer(msg, sent, info.get('received_timestamp') or time.time_ns())
+                hearer(msg, arrival)
             except Exception:
                 self._node.get_logger().error(
                     f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
                 )
-
-
-def _stamp_of(info: dict[str, Any]) -> Stamp:
-    return info['source_timestamp'], info['publication_sequence_number']

@@ -27,7 +27,7 @@ from rrth_planner.ros.listener import Listener
 from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
 from rrth_planner.ros.parameters import declare_parameters
 from rrth_planner.ros.profiles import LATCHED
-from rrth_planner.ros.subscriptions import OpenSubscription
+from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 from std_srvs.srv import Trigger
@@ -177,7 +177,7 @@ class ViewerFeed(Node):
         with self._lock:
             self._is_asking = False
 
-    def _on_motion(self, msg: JointTrajectory, *_: int) -> None:
+    def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
         try:
             self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:

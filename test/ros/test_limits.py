@@ -14,9 +14,7 @@ from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.resources import load_arm  # noqa: E402
-from rrth_planner.ros import body_history  # noqa: E402
 from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
 from rrth_planner.ros.edits import (  # noqa: E402
     LONGEST_NAME,
     LONGEST_NAMESPACE,
@@ -149,29 +147,6 @@ def test_long_names_of_a_motion_are_named_in_short():
     msg = _motion(1)
     msg.joint_names = ['j' * 10**6]
     assert refusal(joint_trajectory_from_msg, msg, JOINTS).startswith('joint_names: ')
-
-
-def test_the_history_keeps_to_a_number_of_boxes(monkeypatch):
-    monkeypatch.setattr(body_history, 'REMEMBERED_BOXES', 25)
-    history, body = BodyHistory(), WearerBody()
-    for k in range(10):
-        edits = read_edits(array(cube_list(10)), 0.0, 'torso')
-        body = history.apply(body, edits, 100 + k, 0.0)
-    assert len(history._heard) == 2
-    # One that is larger than all that is remembered is remembered alone.
-    body = history.apply(body, read_edits(array(cube_list(40)), 0.0, 'torso'), 200, 0.0)
-    assert len(history._heard) == 1
-    old = read_edits(array(command(Marker.DELETEALL), box('pack')), 0.0, 'torso')
-    assert history.apply(body, old, 50, 0.0).n_boxes == 41
-
-
-def test_the_history_keeps_to_a_number_of_arrays(monkeypatch):
-    monkeypatch.setattr(body_history, 'REMEMBERED', 3)
-    history, body = BodyHistory(), WearerBody()
-    for k in range(10):
-        edits = read_edits(array(command(Marker.DELETE, 'hat', k)), 0.0, 'torso')
-        body = history.apply(body, edits, 100 + k, 0.0)
-    assert [sent for sent, *_ in history._heard] == [107, 108, 109]
 
 
 def test_the_last_of_many_that_have_expired_are_kept():

@@ -115,7 +115,7 @@ def test_who_hears_may_rest_after_each_copy_of_a_message():
             info = {'source_timestamp': k, 'publication_sequence_number': k}
             heard._on_live(data, info)
             # A copy that does not count takes its time, too.
-            heard._on_reliable(data, info)
+            heard._on_copy(data, info, 'reliable')
         assert (len(n_heard), len(n_rested)) == (3, 6)
     finally:
         node.destroy_node()

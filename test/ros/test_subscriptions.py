@@ -2,21 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Copies of messages: each counts once, and what was sent last stays last."""
 
+from functools import partial
+
 import pytest
 
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
-from hypothesis import given, strategies as st  # noqa: E402
+from hypothesis import given, settings, strategies as st  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.ros import body_history  # noqa: E402
+from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.ros import marker_order  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.body_history import BodyHistory  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402
+from rrth_planner.ros.inputs import Input  # noqa: E402
+from rrth_planner.ros.marker_order import MarkerOrder  # noqa: E402
 from rrth_planner.ros.messages import joint_reading  # noqa: E402
 from rrth_planner.ros.subscriptions import (  # noqa: E402
-    DuplicateFilter,
+    Copies,
     OpenSubscription,
     REMEMBERED,
 )
@@ -24,10 +28,13 @@ from samples import array, box, command, FOLDED, JOINTS, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
 
+LIVE, RELIABLE = None, 'reliable'
 
-def told(history, body, sent, *markers, now=0.0):
-    """Return a body after an array that was sent at a time [ns]."""
-    return history.apply(body, read_edits(array(*markers), now, 'torso'), sent, now)
+
+def told(order, body, sent, *markers, now=0.0, newer=None):
+    """Return a body after an array that was sent at a time [ns]; newer: it comes after those."""
+    edits = read_edits(array(*markers), now, 'torso')
+    return order.apply(body, edits, (sent, 1), now, newer and (lambda other: other[0] in newer))
 
 
 def names(body):
@@ -35,42 +42,91 @@ def names(body):
     return {b.name for b in scene_of(body).boxes}
 
 
+def take(copies, sent, number, reader=LIVE):
+    """Return what becomes of a copy: None, 'news' or 'late'."""
+    arrival = copies.take((sent, number), 0, reader)
+    return arrival and ('news' if arrival.is_newer is None else 'late')
+
+
 def test_a_copy_counts_once_whichever_comes_first():
-    copies = DuplicateFilter()
-    assert copies.counts_live((10, 1))
-    assert not copies.counts_reliable((10, 1))
-    assert copies.counts_reliable((20, 2))
-    assert not copies.counts_live((20, 2))
+    copies = Copies(takes_late=True)
+    assert take(copies, 10, 1) == 'news'
+    assert take(copies, 10, 1, RELIABLE) is None
+    assert take(copies, 20, 2, RELIABLE) == 'news'
+    assert take(copies, 20, 2) is None
 
 
 def test_a_latched_message_of_a_late_publisher_is_late():
-    copies = DuplicateFilter()
-    assert copies.counts_live((100, 7))
-    assert copies.is_late((50, 1))
-    assert copies.counts_reliable((50, 1))
-    assert not copies.counts_reliable((50, 1))
-    assert not copies.is_late((100, 3))
-
-
-def test_no_more_than_a_number_of_copies_are_remembered():
-    copies = DuplicateFilter()
-    assert copies.counts_live((10**6, 0))
-    for k in range(2 * REMEMBERED):
-        assert copies.counts_live((10**6 + k, 1))
-        assert copies.counts_reliable((k, 2))
-    assert len(copies._seen) == len(copies._seen_late) == REMEMBERED
-    # The newest ones.
-    assert not copies.counts_live((10**6 + 2 * REMEMBERED - 1, 1))
+    copies = Copies(takes_late=True)
+    assert take(copies, 100, 7) == 'news'
+    assert take(copies, 50, 1, RELIABLE) == 'late'
+    assert take(copies, 50, 1, RELIABLE) is None
 
 
 def test_what_comes_live_counts_even_from_a_clock_that_is_behind():
-    copies = DuplicateFilter()
-    assert copies.counts_live((100, 7))
+    for takes_late in (True, False):
+        copies = Copies(takes_late)
+        assert take(copies, 100, 7) == 'news'
+        assert take(copies, 50, 1) == 'news'
     # The copy of the reliable reader may come first, and is taken for a latched one.
-    assert copies.is_late((50, 1))
-    copies.counts_reliable((50, 1))
-    assert copies.counts_live((50, 1))
-    assert copies.newest == 100
+    copies = Copies(takes_late=False)
+    assert take(copies, 100, 7) == 'news'
+    assert take(copies, 50, 1, RELIABLE) is None
+    assert take(copies, 50, 1) == 'news'
+
+
+def test_no_more_than_a_number_of_copies_are_remembered():
+    copies = Copies(takes_late=True)
+    assert take(copies, 10**9, 0) == 'news'
+    for k in range(2 * REMEMBERED):
+        assert take(copies, 10**6 + k, 1)
+        assert take(copies, k, 2, RELIABLE)
+    assert len(copies._readers) == len(copies._counted) == REMEMBERED
+    # A publisher whose clock was ahead is forgotten with its messages.
+    assert copies._newest < 10**9
+    assert take(copies, 2 * REMEMBERED - 1, 2, RELIABLE) is None
+
+
+@st.composite
+def streams(draw):
+    """Draw what publishers send, and in which order copies of it come by two readers."""
+    sent = []
+    for publisher in range(draw(st.integers(1, 3))):
+        # Their clocks differ by up to 50 ms, and they send every 10 ms.
+        ahead = draw(st.integers(-50, 50))
+        n, kind = draw(st.integers(1, 8)), draw(st.sampled_from(['both', 'live']))
+        for k in range(n):
+            stamp = (10**6 + 10 * k + ahead) * 3 + publisher
+            sent.append((10 * k + publisher, publisher, (stamp, k + 1), kind))
+    queues = {LIVE: [], RELIABLE: []}
+    for _, publisher, stamp, kind in sorted(sent):
+        # The live reader loses some, and the reliable one too where it is too slow.
+        if kind == 'live' or draw(st.integers(0, 3)):
+            queues[LIVE].append((publisher, stamp))
+        if kind == 'both' and draw(st.integers(0, 9)):
+            queues[RELIABLE].append((publisher, stamp))
+    order = []
+    while any(queues.values()):
+        reader = draw(st.sampled_from([name for name, queue in queues.items() if queue]))
+        order.append((reader, *queues[reader].pop(0)))
+    return order
+
+
+@settings(max_examples=500, deadline=None)
+@given(order=streams())
+def test_the_newest_edit_of_each_publisher_stays_whatever_their_clocks_say(order):
+    copies, markers, body = Copies(takes_late=True), MarkerOrder(), WearerBody()
+    newest, n_late = {}, 0
+    for reader, publisher, sent in order:
+        arrival = copies.take(sent, 0, reader)
+        newest[publisher] = max(newest.get(publisher, 0), sent[1])
+        if arrival is not None:
+            # The number of the array tells which one is seen.
+            edits = read_edits(array(box(f'part {publisher}', 0, (sent[1], 0, 0))), 0.0, 'torso')
+            body = markers.apply(body, edits, sent, 0.0, arrival.is_newer)
+            n_late += arrival.is_newer is not None
+        seen = {key[0]: part.boxes[0].center[0] for key, part in body.parts}
+        assert seen == {f'part {name}': number for name, number in newest.items()}
 
 
 @given(
@@ -83,33 +139,29 @@ def test_the_last_message_is_the_last_that_counts_and_none_is_missed(case):
     # Live copies, some lost, and all reliable ones, each stream in its order, mixed at random.
     live = [(10 * k, k) for k in range(1, n + 1) if k not in lost]
     reliable = [(10 * k, k) for k in range(1, n + 1)]
-    copies, applied, late = DuplicateFilter(), [], []
+    copies, heard = Copies(takes_late=True), {'news': [], 'late': []}
     while live or reliable:
-        if live and (not reliable or random.random() < 0.5):
-            stamp = live.pop(0)
-            if copies.counts_live(stamp):
-                applied.append(stamp[1])
-        else:
-            stamp = reliable.pop(0)
-            heard = late if copies.is_late(stamp) else applied
-            if copies.counts_reliable(stamp):
-                heard.append(stamp[1])
-    assert applied == sorted(set(applied))
-    assert applied[-1] == n
-    assert sorted(applied + late) == list(range(1, n + 1))
+        is_live = live and (not reliable or random.random() < 0.5)
+        sent = (live if is_live else reliable).pop(0)
+        found = take(copies, *sent, LIVE if is_live else RELIABLE)
+        if found:
+            heard[found].append(sent[1])
+    assert heard['news'] == sorted(set(heard['news']))
+    assert heard['news'][-1] == n
+    assert sorted(heard['news'] + heard['late']) == list(range(1, n + 1))
 
 
 @pytest.mark.usefixtures('ros_context')
 def test_a_late_latched_target_does_not_override_a_newer_one():
     node, heard, late = Node('hearer'), [], []
     subscriptions = [
-        OpenSubscription(node, PointStamped, 'target', lambda msg, *_: heard.append(msg)),
+        OpenSubscription(node, PointStamped, 'target', lambda msg, _: heard.append(msg)),
         OpenSubscription(
             node,
             PointStamped,
             'target',
-            lambda msg, *_: heard.append(msg),
-            lambda msg, sent, _: late.append((msg.point.x, sent)),
+            lambda msg, _: heard.append(msg),
+            lambda msg, arrival: late.append((msg.point.x, arrival.sent[0])),
         ),
     ]
     new, old = (serialize_message(target(x)) for x in (2.0, 1.0))
@@ -117,12 +169,28 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
         subscription._on_live(new, {'source_timestamp': 200, 'publication_sequence_number': 1})
         # Of another publisher, whose numbers begin at 1 as well.
         for _ in range(2):
-            subscription._on_reliable(
-                old, {'source_timestamp': 100, 'publication_sequence_number': 1}
+            subscription._on_copy(
+                old, {'source_timestamp': 100, 'publication_sequence_number': 1}, RELIABLE
             )
     assert [msg.point.x for msg in heard] == [2.0, 2.0]
     assert late == [(1.0, 100)]
     node.destroy_node()
+
+
+@pytest.mark.usefixtures('ros_context')
+def test_a_body_that_comes_late_is_no_younger_for_it_and_unsays_no_refusal():
+    heard = Input('body', WearerBody())
+
+    def refuse():
+        raise MessageError('no box')
+
+    assert heard.accept(WearerBody, 1.0)
+    assert not heard.accept(refuse, 2.0)
+    assert not heard.accept(WearerBody, 3.0, is_news=False)
+    assert heard.is_last_refused
+    assert heard.age(4.0) == 3.0
+    assert heard.accept(WearerBody, 4.0)
+    assert not heard.is_last_refused
 
 
 @pytest.mark.usefixtures('ros_context')
@@ -134,7 +202,7 @@ def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
     # Copies too: they stand in the queues with the others.
     for read, came, expected in (
         (subscription._on_live, 500, 500),
-        (subscription._on_reliable, 600, 500),
+        (partial(subscription._on_copy, reader=RELIABLE), 600, 500),
         (subscription._on_live, 700, 700),
         # Of a middleware that does not say.
         (subscription._on_live, 0, 0),
@@ -146,37 +214,58 @@ def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
     node.destroy_node()
 
 
-def test_a_late_array_takes_its_place_before_the_newer_ones():
-    history = BodyHistory()
-    body = told(history, WearerBody(), 100, box('torso'), box('hand'))
-    body = told(history, body, 200, command(Marker.DELETE, 'hand'), box('head'))
-    body = told(history, body, 50, command(Marker.DELETEALL), box('hand'), box('pack'))
+def test_a_late_array_does_nothing_to_markers_that_newer_ones_have_edited():
+    order = MarkerOrder()
+    body = told(order, WearerBody(), 100, box('torso'), box('hand'))
+    body = told(order, body, 200, command(Marker.DELETE, 'hand'), box('head'))
+    late = (command(Marker.DELETEALL), box('hand'), box('pack'))
+    body = told(order, body, 50, *late, newer={100, 200})
     assert names(body) == {'torso/0', 'head/0', 'pack/0'}
-    body = told(history, body, 150, box('head', size=(9.0, 9.0, 9.0)))
+    body = told(order, body, 150, box('head', size=(9.0, 9.0, 9.0)), newer={200})
     assert {b.name: b.size[0] for b in scene_of(body).boxes}['head/0'] == 0.3
+    # Of another clock: what seems to be sent before was sent after it.
+    body = told(order, body, 30, box('head', size=(8.0, 8.0, 8.0)))
+    assert {b.name: b.size[0] for b in scene_of(body).boxes}['head/0'] == 8.0
 
 
-def test_a_late_array_takes_nothing_away_that_may_be_forgotten(monkeypatch):
-    monkeypatch.setattr(body_history, 'REMEMBERED', 2)
-    history, body = BodyHistory(), WearerBody()
-    for sent, name in ((100, 'torso'), (200, 'head'), (300, 'hand')):
-        body = told(history, body, sent, box(name))
-    body = told(history, body, 50, command(Marker.DELETEALL), box('pack'), box('head', 1))
-    assert names(body) == {'torso/0', 'head/0', 'hand/0', 'pack/0', 'head/1'}
+def test_a_late_array_adds_nothing_that_was_deleted_since_with_all_others():
+    order = MarkerOrder()
+    body = told(order, WearerBody(), 100, box('torso'), box('hand'), box('hand', 1))
+    body = told(order, body, 200, command(Marker.DELETEALL, 'hand'))
+    late = (box('hand', 1), box('hand', 2), box('torso', 1))
+    body = told(order, body, 150, *late, newer={200})
+    assert names(body) == {'torso/0', 'torso/1'}
+    # A late one deletes what came before it, and that alone.
+    body = told(order, body, 120, command(Marker.DELETEALL), newer={150, 200})
+    assert names(body) == {'torso/1'}
+    body = told(order, body, 300, command(Marker.DELETEALL))
+    assert not body.parts
+    assert not told(order, body, 250, box('torso'), newer={300}).parts
+
+
+def test_what_an_order_remembers_is_bounded(monkeypatch):
+    monkeypatch.setattr(marker_order, 'REMEMBERED', 20)
+    order, body = MarkerOrder(), told(MarkerOrder(), WearerBody(), 1, box('torso'))
+    for k in range(100):
+        body = told(order, body, k, command(Marker.DELETE, 'hat', k), box('torso'))
+        body = told(order, body, k, command(Marker.DELETEALL, f'hats {k}'))
+    assert len(order._markers) <= 22
+    assert len(order._namespaces) == 20
+    assert names(body) == {'torso/0'}
 
 
 def test_what_has_expired_is_remembered_until_it_is_deleted_or_added_again():
     hat = box('hat')
     hat.lifetime.sec = 1
-    history = BodyHistory()
-    body = told(history, WearerBody(), 100, hat, box('torso'))
+    order = MarkerOrder()
+    body = told(order, WearerBody(), 100, hat, box('torso'))
     assert [key for key, _ in body.at(2.0).expired] == [('hat', 0)]
     assert not body.at(0.5).expired
-    later = told(history, body, 200, box('head'), now=2.0)
+    later = told(order, body, 200, box('head'), now=2.0)
     assert [key for key, _ in later.expired] == [('hat', 0)]
-    assert not told(history, later, 300, box('hat'), now=3.0).expired
-    assert not told(history, later, 300, command(Marker.DELETE, 'hat'), now=3.0).expired
-    assert not told(history, later, 300, command(Marker.DELETEALL), now=3.0).expired
+    assert not told(order, later, 300, box('hat'), now=3.0).expired
+    assert not told(order, later, 300, command(Marker.DELETE, 'hat'), now=3.0).expired
+    assert not told(order, later, 300, command(Marker.DELETEALL), now=3.0).expired
 
 
 def test_without_velocities_the_change_of_the_positions_counts():
