@@ -27,7 +27,7 @@ from benchmarks.queries import table_1_arm
 
 # The wearers of the other benchmark are the first hundred.
 FIRST_BODY = 1000
-STEPS = ('round_corners', 'first_proven', 'touch_seen')
+STEPS = ('round_corners', 'in_time', 'first_proven', 'touch_seen')
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -140,19 +140,19 @@ def _motion(body: int, index: int, case: Case, plan: MotionPlan, calls: list[Cal
         case=case,
         plan=plan,
         rounded=last['round_corners'].result if 'round_corners' in last else (),
-        chosen=_chosen(last['first_proven']) if 'first_proven' in last else (),
+        chosen=_chosen(last['in_time'], last['first_proven'].result) if 'in_time' in last else (),
         step_times={
             step: sum(call.duration for call in calls if call.step == step) for step in STEPS
         },
     )
 
 
-def _chosen(proven: Call) -> tuple[Blend, ...]:
+def _chosen(timing: Call, proven: Trajectory | None) -> tuple[Blend, ...]:
     """Return which way to take the corners the trajectory follows: the one that gives it again."""
-    path, choices = proven.arguments['path'], proven.arguments['choices']
+    path, choices = timing.arguments['path'], timing.arguments['choices']
     for blends in choices:
-        again = parameterize(path, blends, proven.arguments['limits'])
-        if proven.result is not None and np.array_equal(again.times, proven.result.times):
+        again = parameterize(path, blends, timing.arguments['limits'])
+        if proven is not None and np.array_equal(again.times, proven.times):
             return tuple(blends)
     return tuple(choices[0])
 

@@ -3,23 +3,23 @@
 """Braking as a motion of its own, and the proof that it is safe."""
 
 import numpy as np
-from rrth_planner.arrays import Array
 from rrth_planner.certificate import Certificate, certify
-from rrth_planner.playback import Playback, stop
-from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.emergency import emergency_stop
+from rrth_planner.trajectory import MotionLimits, part_of, sample, Trajectory
 from rrth_planner.world import World
 
-# Messages carry whole nanoseconds; two points closer than this are one [s].
-TICK, CLOSEST = 1e-9, 1e-5
+# What rounding leaves of an acceleration [rad/s^2].
+ROUNDING = 1e-9
 
 
 def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
     """
     Return the motion from the state of a running trajectory to rest along its path.
 
-    It begins with the very position, velocity and acceleration at that time. The quintics between
-    its points stay within 1e-4 rad of the path and within 1 % of the limits, or of what the
-    trajectory itself does up to there, where that is more.
+    It begins with position, velocity and acceleration of that time. Between its points no
+    joint is further than 1e-4 rad from the path, nor more than 1 % beyond its limits, or beyond
+    what the trajectory itself does up to there, where that is more; a jerk is told to rounding,
+    which in pieces below 0.1 ms is more than that.
 
     Parameters
     ----------
@@ -34,14 +34,20 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
         From time 0 on whole nanoseconds; a single point where the arm stands still.
 
     """
-    running = Playback(trajectory=trajectory, start_time=0.0, time_scale=1.0)
-    stopped = stop(running, limits, time)
-    times = np.append(0.0, np.ceil(_corners(stopped, time) / TICK) * TICK)
-    q, v, a = stopped.states_at(time + times)
-    if len(times) == 1:
-        v, a = np.zeros_like(v), np.zeros_like(a)
-    v[-1] = a[-1] = 0.0
-    return Trajectory(times=times, positions=q, velocities=v, accelerations=a)
+    if not 0.0 < time < trajectory.duration:
+        return part_of(trajectory, time, time)
+    stop = emergency_stop(trajectory, time, limits, lead=0.0)
+    q, v, a = sample(trajectory, [time])
+    if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
+        # At a point of the trajectory, whose jerk jumps: by the piece that follows.
+        return stop
+    # Compiled code rounds the last digit of the first state in another way.
+    return Trajectory(
+        times=stop.times,
+        positions=np.concatenate([q, stop.positions[1:]]),
+        velocities=np.concatenate([v, stop.velocities[1:]]),
+        accelerations=np.concatenate([a, stop.accelerations[1:]]),
+    )
 
 
 def certify_braking(
@@ -62,17 +68,3 @@ def certify_braking(
 
     """
     return certify(brake(trajectory, time, limits), world)
-
-
-def _corners(playback: Playback, time: float) -> Array:
-    """Return when pieces of a motion that comes to rest end, from now on, (n,) [s]."""
-    if len(playback.trajectory.times) == 1:
-        return np.empty(0)
-    knots = (playback.trajectory.times - playback.start_time) / playback.time_scale - time
-    if playback.brake is None:
-        corners = knots
-    else:
-        corners = np.union1d(playback.brake.times, playback.brake.times_of(knots))
-    corners = corners[corners > CLOSEST]
-    # Where two are too close, the later one stays.
-    return corners[np.append(np.diff(corners) > CLOSEST, True)] if len(corners) else corners

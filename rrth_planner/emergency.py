@@ -4,20 +4,21 @@
 
 import numpy as np
 from rrth_planner.kernels.quick_stop import quick_stop
-from rrth_planner.kernels.stop_points import SPACING
+from rrth_planner.kernels.stop_points import SPACINGS
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # A stop is not expected to reach the controller before [s].
 ON_ITS_WAY = 0.01
 
 
-def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
+def emergency_stop(
+    trajectory: Trajectory, time: float, limits: MotionLimits, lead: float = ON_ITS_WAY
+) -> Trajectory:
     """
     Return how an arm that is at a time within a motion comes to rest along it.
 
     For as long as a message may be on its way the motion goes on as it is: a controller that gets
-    the stop a little late finds itself on it. From there on it is about as soon at rest as by
-    `braking.brake`, which takes several milliseconds to prove what here is only looked at.
+    the stop a little late finds itself on it.
 
     Parameters
     ----------
@@ -25,13 +26,17 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
     time : float
         Within it [s].
     limits : MotionLimits
-        The stop exceeds them by no more than the motion does up to there, or by less than 1 %.
+        The stop exceeds them by no more than the motion does up to there, or by less than 1 %;
+        a jerk is told to rounding, which in pieces below 0.1 ms is more than that.
+    lead : float
+        For so long the motion goes on as it is [s].
 
     Returns
     -------
     Trajectory
-        From the state at that time to rest, with points no further apart than 50 ms once it
-        slows down; the rest of the motion where that ends as soon.
+        From the state at that time to rest, no joint further than 1e-4 rad from the path, with
+        points no further apart than 50 ms once it slows down; the rest of the motion where that
+        ends as soon.
 
     """
     time = min(max(time, 0.0), trajectory.duration)
@@ -44,13 +49,13 @@ def emergency_stop(trajectory: Trajectory, time: float, limits: MotionLimits) ->
             velocities=still,
             accelerations=still,
         )
-    most = len(trajectory.times) + 8 + int(trajectory.duration / SPACING)
+    most = len(trajectory.times) + 8 + int(trajectory.duration / SPACINGS[-1])
     times, states = np.empty(most), np.empty((3, most, dof))
     n = quick_stop(
         curves,
         trajectory.times,
         time,
-        ON_ITS_WAY,
+        lead,
         limits.velocity,
         limits.acceleration,
         limits.jerk,

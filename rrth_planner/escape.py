@@ -11,6 +11,7 @@ from rrth_planner.leaving import box_depths, leads_out
 from rrth_planner.path import Path
 from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
 from rrth_planner.status import PlanStatus
+from rrth_planner.takeover import Lead
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import MotionLimits, part_of, Trajectory
 from rrth_planner.world import grown, World
@@ -48,6 +49,10 @@ class Escape:
         """Where the arm is out, shape (dof,) [rad]."""
         q: Array = self.trajectory.positions[-1]
         return q
+
+    def lead(self, limits: MotionLimits) -> Lead:
+        """Return it as what comes before the path."""
+        return Lead(trajectory=self.trajectory, speed=0.0, q_stop=self.q_end, allowed=limits)
 
 
 def way_out(

@@ -18,7 +18,7 @@ from rrth_planner.refusal import CANCELLED, Refusal
 from rrth_planner.scene import Scene
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import Lead, reserved
-from rrth_planner.timing import parameterize, TooFastError
+from rrth_planner.timing import excess, parameterize, TooFastError
 from rrth_planner.touch import Disagreement
 from rrth_planner.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.world import grown, World
@@ -26,6 +26,8 @@ from rrth_planner.world import grown, World
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].
 HAIR = 2e-6
+# A motion that begins in motion goes beyond what it may do by no more than this share.
+EXCESS = 1.01
 # Sizes of the first blend of an arm that moves, as shares of what is free.
 FIRST_SHARES = (0.5, 0.2, 0.0)
 
@@ -83,7 +85,14 @@ def time_path(
     if any(blend.half_length > 0.0 for blend in rounded):
         choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
     escape_time = 0.0 if escape is None else escape.trajectory.duration
-    trajectory = first_proven(path, choices, limits, world, lead, escape_time)
+    timed = in_time(path, choices, limits, lead)
+    if not timed:
+        return Refusal(
+            PlanStatus.START_MOVES,
+            'the arm moves, and from there no motion that was found holds the limits of its '
+            'joints; expected an arm at rest',
+        )
+    trajectory = first_proven(timed, world, escape_time)
     if trajectory is None:
         return Refusal(
             PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
@@ -101,16 +110,11 @@ def time_path(
     return trajectory
 
 
-def first_proven(
-    path: Path,
-    choices: Sequence[tuple[Blend, ...]],
-    limits: MotionLimits,
-    world: World,
-    lead: Lead | None = None,
-    escape_time: float = 0.0,
-) -> Trajectory | None:
+def in_time(
+    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, lead: Lead | None
+) -> list[Trajectory]:
     """
-    Return the fastest trajectory along a path that is proven free, or None.
+    Return the trajectories along a path that hold the limits, the fastest first.
 
     Parameters
     ----------
@@ -118,24 +122,33 @@ def first_proven(
     choices : sequence of tuple of Blend
         Ways to take the corners.
     limits : MotionLimits
-    world : World
-    lead : Lead, optional
+    lead : Lead or None
         What comes before the path, whose first edge is then followed from its speed on.
-    escape_time : float
-        Until then the lead is proven to lead out of the world's boxes [s].
 
     """
+    timed = []
+    for blends in choices:
+        if lead is None:
+            timed.append(parameterize(path, blends, limits))
+            continue
+        with suppress(TooFastError):
+            within = reserved(limits) if lead.speed > 0.0 else limits
+            whole = joined(lead.trajectory, parameterize(path, blends, within, lead.speed))
+            if excess(whole, lead.allowed) <= EXCESS:
+                timed.append(whole)
     # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
-    if lead is None:
-        timed = [parameterize(path, blends, limits) for blends in choices]
-    else:
-        timed = []
-        for blends in choices:
-            with suppress(TooFastError):
-                within = reserved(limits) if lead.speed > 0.0 else limits
-                rest = parameterize(path, blends, within, lead.speed)
-                timed.append(joined(lead.trajectory, rest))
-    for trajectory in sorted(timed, key=lambda trajectory: trajectory.duration):
+    return sorted(timed, key=lambda trajectory: trajectory.duration)
+
+
+def first_proven(
+    timed: Sequence[Trajectory], world: World, escape_time: float = 0.0
+) -> Trajectory | None:
+    """
+    Return the first of some trajectories that is proven free, or None.
+
+    escape_time: until then they are proven to lead out of the world's boxes [s].
+    """
+    for trajectory in timed:
         if certify(trajectory, world, escape_time).is_proven:
             return trajectory
     return None

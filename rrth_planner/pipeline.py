@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The straight line from a scene and a target to a certified trajectory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 import functools
 import time
@@ -93,7 +93,8 @@ def plan_motion(
     begin = time.perf_counter()
     q_start = within_limits(arm, q_start)
     world = _world_of(arm, scene, margin, ray_guard_length)
-    lead, escape, q_from, disagreement = None, None, q_start, None
+    escape, disagreement = None, None
+    leads: Iterable[Lead | None | Refusal] = (None,)
     refusal = start_refusal(arm, grown(world, SPARES[-1]), q_start)
     if refusal is not None and refusal.status is PlanStatus.START_IN_COLLISION:
         if moving is not None:
@@ -113,34 +114,37 @@ def plan_motion(
                 should_stop=should_stop,
             )
             if isinstance(out, Escape):
-                refusal, escape, q_from = None, out, out.q_end
-                lead = Lead(trajectory=out.trajectory, speed=0.0, q_stop=out.q_end)
+                refusal, escape = None, out
+                leads = (out.lead(limits),)
             else:
                 refusal = out
     if refusal is None:
         refusal = CANCELLED if should_stop() else target_refusal(scene, goal, margin)
-    if refusal is None and moving is not None:
-        led = _lead(arm, world, moving, limits)
-        if isinstance(led, Refusal):
-            refusal = led
-        else:
-            lead, q_from = led, led.q_stop
-    if refusal is None:
+    if moving is not None:
+        leads = _leads(arm, world, moving, limits)
+    for lead in leads if refusal is None else ():
+        if isinstance(lead, Refusal):
+            refusal = lead
+            break
+        q_from = q_start if lead is None else lead.q_stop
         found = find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
-        if isinstance(found, PlanResult) and found.path is not None:
-            timed = time_path(
-                arm, scene, goal, world, found.path, limits, margin, lead, escape, should_stop
-            )
-            if isinstance(timed, Trajectory):
-                return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
-            elif isinstance(timed, Disagreement):
-                disagreement = timed
-                refusal = Refusal(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
-            else:
-                refusal = timed
-        else:
-            assert isinstance(found, Refusal)
+        if isinstance(found, Refusal):
             refusal = found
+            break
+        assert found.path is not None
+        timed = time_path(
+            arm, scene, goal, world, found.path, limits, margin, lead, escape, should_stop
+        )
+        if isinstance(timed, Trajectory):
+            return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
+        if isinstance(timed, Disagreement):
+            disagreement = timed
+            refusal = Refusal(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
+            break
+        refusal = timed
+        if refusal.status is not PlanStatus.START_MOVES:
+            break
+    assert refusal is not None
     return MotionPlan(
         status=refusal.status,
         sentence=f'{refusal.sentence}, seed {seed}',
@@ -180,18 +184,24 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
     jit.mark_compiled()
 
 
-def _lead(arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits) -> Lead | Refusal:
-    """Return what an arm in motion does first, straight on or along its present motion."""
+def _leads(
+    arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits
+) -> Iterator[Lead | Refusal]:
+    """
+    Yield what an arm in motion may do first: go straight on, or stop along its present motion.
+
+    The last of these is why it can do neither.
+    """
     straight = lead_in(moving.state, limits)
     refusal = lead_refusal(arm, world, straight, limits)
-    lead = straight
-    if refusal is not None:
-        stop = stop_first(moving, limits)
-        if stop is None or not certify(stop.trajectory, world).is_proven:
-            return refusal
-        lead = stop
-    # Rounding may have put a joint past its limit.
-    return replace(lead, q_stop=np.clip(lead.q_stop, *arm.bounds))
+    if refusal is None:
+        # Rounding may have put a joint past its limit.
+        yield replace(straight, q_stop=np.clip(straight.q_stop, *arm.bounds))
+    stop = stop_first(moving, limits)
+    if stop is not None and certify(stop.trajectory, world).is_proven:
+        yield replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
+    elif refusal is not None:
+        yield refusal
 
 
 def _solved(

@@ -8,6 +8,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.braking import brake
 from rrth_planner.kernels.speeds import ramp_time
+from rrth_planner.timing import peaks
 from rrth_planner.trajectory import MotionLimits, near_point, sample, Trajectory
 
 # An arm that moves no faster is at rest [rad/s].
@@ -58,12 +59,15 @@ class Lead:
         Of the last point, along the line through all joints; 0: it rests there [rad/s].
     q_stop : ndarray, shape (dof,)
         Where the arm comes to rest when it goes straight on and slows down [rad].
+    allowed : MotionLimits
+        What it and the path after it may do: the limits, or what the arm does already.
 
     """
 
     trajectory: Trajectory
     speed: float
     q_stop: Array
+    allowed: MotionLimits
 
 
 def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
@@ -105,6 +109,11 @@ def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
         ),
         speed=speed,
         q_stop=positions[-1] + u * length,
+        allowed=MotionLimits(
+            velocity=np.maximum(limits.velocity, np.abs(state.velocities)),
+            acceleration=np.maximum(limits.acceleration, np.abs(state.accelerations)),
+            jerk=limits.jerk,
+        ),
     )
 
 
@@ -143,7 +152,12 @@ def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
     if moving.running is None:
         return None
     stop = brake(moving.running, moving.time, limits)
-    return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1])
+    allowed = limits
+    if len(stop.times) > 1:
+        own = zip(peaks(stop), (limits.velocity, limits.acceleration, limits.jerk), strict=True)
+        v, a, j = (np.maximum(*pair) for pair in own)
+        allowed = MotionLimits(velocity=v, acceleration=a, jerk=j)
+    return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)
 
 
 def takeover(

@@ -11,7 +11,7 @@ from rrth_planner.braking import brake, certify_braking
 from rrth_planner.certificate import certify
 from rrth_planner.oracle import quintic_states
 from rrth_planner.path import Path
-from rrth_planner.path_timing import first_proven
+from rrth_planner.path_timing import first_proven, in_time
 from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import jerks_at, piece_coefficients, sample, Trajectory
@@ -52,12 +52,15 @@ def test_a_brake_begins_at_the_running_state_and_holds_path_and_limits(seed):
     trajectory = any_motion(rng)
     time = rng.random() * trajectory.duration
     braked = brake(trajectory, time, LIMITS)
-    for got, running in zip(
+    # Beside a point of the trajectory by the piece that follows, whose jerk is another one.
+    near = np.abs(trajectory.times - time).min() < 1e-5
+    for got, running, gap in zip(
         (braked.positions, braked.velocities, braked.accelerations),
         sample(trajectory, [time]),
+        (1e-13, 1e-8, 2e-3),
         strict=True,
     ):
-        np.testing.assert_array_equal(got[0], running[0])
+        assert np.abs(got[0] - running[0]).max() <= gap * near
     assert not braked.velocities[-1].any()
     assert not braked.accelerations[-1].any()
     assert braked.duration <= trajectory.duration - time + 2e-9
@@ -100,7 +103,7 @@ def proven_motion(rng, world):
     """Return a certified motion in a world, with a rounded corner where there is room."""
     q = np.stack([free_configuration(rng, world) for _ in range(3)])
     path = Path(q)
-    return first_proven(path, (round_corners(path, world, LIMITS),), LIMITS, world)
+    return first_proven(in_time(path, (round_corners(path, world, LIMITS),), LIMITS, None), world)
 
 
 def test_braking_of_a_certified_motion_is_certified():
@@ -119,7 +122,8 @@ def test_braking_of_a_certified_motion_is_certified():
 def random_brake(rng):
     """Return a motion in an empty world, when it brakes, and how."""
     empty = arm_world(ARM, Scene(()), 0.0, 0.0)
-    trajectory = first_proven(Path(rng.uniform(*ARM.bounds, (2, 4))), ((),), LIMITS, empty)
+    path = Path(rng.uniform(*ARM.bounds, (2, 4)))
+    trajectory = first_proven(in_time(path, ((),), LIMITS, None), empty)
     time = rng.uniform(0.05, 0.6) * trajectory.duration
     return trajectory, time, brake(trajectory, time, LIMITS)
 

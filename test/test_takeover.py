@@ -5,6 +5,7 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner import path_timing
 from rrth_planner.arm import tool_pose
 from rrth_planner.braking import brake
 from rrth_planner.certificate import certify
@@ -208,3 +209,41 @@ def test_a_motion_is_taken_over_where_it_ends(before_end):
     assert found.status is PlanStatus.SOLVED, found.sentence
     assert np.array_equal(found.trajectory.positions[0], q)
     assert certify(found.trajectory, world).is_proven
+
+
+@examples(150)
+@given(seed=SEEDS)
+def test_in_its_last_milliseconds_a_motion_is_taken_over_within_the_limits(seed):
+    rng = np.random.default_rng(seed)
+    scene, world = wearer(), wearer_world()
+    before = motion(scene, free_configuration(rng, world), rng.uniform(-2.0, 2.0, 3), 1).trajectory
+    if before is None:
+        return
+    time = before.duration - rng.uniform(0.0, 0.012)
+    q, v, a = (values[0] for values in sample(before, [time]))
+    moving = Takeover(
+        state=MotionState(positions=q, velocities=v, accelerations=a), running=before, time=time
+    )
+    taken = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving).trajectory
+    if taken is None:
+        return
+    grid, q, v, a = quintic_states(
+        taken.times, taken.positions, taken.velocities, taken.accelerations, 1e-4
+    )
+    assert np.abs(v).max() <= 1.01 * limits().velocity[0]
+    assert np.abs(a).max() <= 1.01 * limits().acceleration[0]
+    assert np.abs(np.diff(a, axis=0) / np.diff(grid)[:, None]).max() <= 1.01 * limits().jerk[0]
+    assert (q >= table_1_arm().bounds[0] - 1e-6).all()
+    assert (q <= table_1_arm().bounds[1] + 1e-6).all()
+
+
+def test_a_motion_that_would_break_the_limits_is_none(monkeypatch):
+    rng = np.random.default_rng(3)
+    q = free_configuration(rng, wearer_world())
+    state = MotionState(positions=q, velocities=np.full(4, 0.3), accelerations=np.zeros(4))
+    assert motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state)).trajectory is not None
+    monkeypatch.setattr(path_timing, 'EXCESS', 0.5)
+    plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state))
+    assert plan.status is PlanStatus.START_MOVES
+    assert plan.trajectory is None
+    assert 'holds the limits of its joints' in plan.sentence

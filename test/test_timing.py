@@ -12,7 +12,7 @@ import pytest
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.oracle import quintic_states
 from rrth_planner.path import Path
-from rrth_planner.path_timing import first_proven
+from rrth_planner.path_timing import first_proven, in_time
 from rrth_planner.scene import Scene
 from rrth_planner.timing import limit_ratio, parameterize
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
@@ -199,7 +199,7 @@ def test_a_motion_with_rounded_corners_is_never_slower_than_with_stops():
         steps = rng.standard_normal((rng.integers(3, 8), 4)) * rng.choice([0.02, 0.2, 1.0])
         path = Path(rng.uniform(-1.0, 1.0, 4) + np.cumsum(steps, axis=0))
         choices = (round_corners(path, empty, limits()), blends_of(path))
-        rounded = first_proven(path, choices, limits(), empty).duration
+        rounded = first_proven(in_time(path, choices, limits(), None), empty).duration
         stops = parameterize(path, blends_of(path), limits()).duration
         if rounded > stops * 1.0005 + 1e-6:
             slower.append((round(rounded / stops, 4), seed))

@@ -10,7 +10,9 @@ from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, VEC
 from rrth_planner.kernels.stop_points import (
     CLOSEST,
     CLOSEST_FIRST,
+    is_on_path,
     is_within,
+    SPACINGS,
     stop_states,
     stop_times,
     TICK,
@@ -135,11 +137,15 @@ def quick_stop(curves, times, now, lead, velocity, acceleration, jerk, points, s
             row = soonest_stop(rows, geometry, pieces, first, n, limits, end, reserve, phases)
             if row < 0:
                 break
-            m = stop_times(rows, pieces, phases, row, points)
-            stop_states(curves, times, rows, pieces, phases, row, limits, points[:m], states)
             last, reached = row, stop_way(phases)
             while rows[last + 1, WAY] < reached:
                 last += 1
-            if is_within(points[:m], states, rows[row, TIME] - now, geometry[last, MOST]):
-                return m
+            for spacing in SPACINGS:
+                m = stop_times(rows, pieces, phases, row, spacing, points)
+                at = points[:m]
+                stop_states(curves, times, rows, pieces, phases, row, limits, at, states)
+                if not is_within(at, states, rows[row, TIME] - now, geometry[last, MOST]):
+                    break
+                if is_on_path(curves, times, rows, pieces, phases, row, limits, at, states):
+                    return m
     return rest_of_motion(curves, times, now, rest, points, states)

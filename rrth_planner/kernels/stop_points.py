@@ -10,9 +10,13 @@ from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_
 from rrth_planner.kernels.stops import A, J, LASTS, stop_way, V, X
 from rrth_planner.kernels.way_ahead import derivatives_on, TIME, time_after, WAY
 
-# Points of a stop are no further apart, and no closer [s]: the closer, the more of the jerk
-# between them is rounding, and the further from its place a jump of the jerk that gets no point.
-SPACING, CLOSEST, CLOSEST_FIRST = 0.05, 5e-5, 1e-5
+# Points of a stop are no further apart, where that keeps it on its path, and no closer [s]: the
+# closer, the more of the jerk between them is rounding, and the further from its place a jump of
+# the jerk that gets no point.
+SPACINGS, CLOSEST, CLOSEST_FIRST = (0.05, 0.0125, 0.003125), 5e-5, 1e-5
+# Instants of a piece, as shares of it, at which a stop is held against its path; how far it may be
+# away there, in one joint [rad]: so nowhere further than 1e-4 rad.
+SHARES, OFF_PATH = (0.25, 0.5, 0.75), 8e-5
 # Messages carry whole nanoseconds [s].
 TICK = 1e-9
 # Halvings of a phase to find when a stop has come so far.
@@ -43,8 +47,8 @@ def passing_time(phases, way):
     return before
 
 
-@kernel(int64(MAT, READ_INTS, MAT, int64, OUT_VEC))
-def stop_times(rows, pieces, phases, begin, points):
+@kernel(int64(MAT, READ_INTS, MAT, int64, float64, OUT_VEC))
+def stop_times(rows, pieces, phases, begin, spacing, points):
     """Write when a stop that begins with a row has its points, from the first row on [s]."""
     marks, m, now = np.empty(rows.shape[0] + 5), 1, rows[0, TIME]
     marks[0] = 0.0
@@ -70,7 +74,7 @@ def stop_times(rows, pieces, phases, begin, points):
         is_close = mark - kept < (CLOSEST_FIRST if kept == 0.0 else CLOSEST)
         if i < m and (is_close or after - mark < CLOSEST):
             continue
-        parts = 1 if mark <= start else max(1, math.ceil((mark - kept) / SPACING))
+        parts = 1 if mark <= start else max(1, math.ceil((mark - kept) / spacing))
         for part in range(1, parts + 1):
             points[n] = math.ceil((kept + (mark - kept) * part / parts) / TICK) * TICK
             n += 1
@@ -164,4 +168,36 @@ def is_within(points, states, begin, most):
                     return False
                 if not abs((60 * c5 * u + 24 * c4) * u + 6 * c3) <= snap:
                     return False
+    return True
+
+
+@kernel(boolean(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, CUBE))
+def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, states):
+    """
+    Return whether the quintics through the points of a stop, (3, n, dof), stay on its path.
+
+    At each instant that is looked at a joint is no further from where the stop leads it than
+    `OFF_PATH`.
+    """
+    n, dof = points.shape[0], states.shape[2]
+    between = np.empty(len(SHARES) * (n - 1))
+    for i in range(n - 1):
+        for k in range(len(SHARES)):
+            between[len(SHARES) * i + k] = points[i] + SHARES[k] * (points[i + 1] - points[i])
+    exact = np.empty((3, between.shape[0] + 1, dof))
+    # What is asked for last is taken for the end, where the stop rests.
+    asked = np.append(between, points[n - 1])
+    stop_states(curves, times, rows, pieces, phases, begin, limits, asked, exact)
+    for m in range(between.shape[0]):
+        i, u = m // len(SHARES), SHARES[m % len(SHARES)]
+        T = points[i + 1] - points[i]
+        for k in range(dof):
+            c1, c2 = states[1, i, k] * T, 0.5 * states[2, i, k] * T * T
+            p = states[0, i + 1, k] - states[0, i, k] - c1 - c2
+            v = states[1, i + 1, k] * T - c1 - 2.0 * c2
+            a = states[2, i + 1, k] * T * T - 2.0 * c2
+            c3, c4, c5 = 10 * p - 4 * v + 0.5 * a, -15 * p + 7 * v - a, 6 * p - 3 * v + 0.5 * a
+            q = states[0, i, k] + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
+            if not abs(q - exact[0, m, k]) <= OFF_PATH:
+                return False
     return True
