@@ -49,17 +49,19 @@ def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -
     Return whether an arm is seen to go on along a motion that it was told to stop.
 
     One that obeys is where the stop was at some time until now, however late it heard of it, and
-    wherever the motion slows down by itself.
+    wherever the motion slows down by itself; or it is not there yet: an arm may lag, or have
+    stopped before it was told to.
     """
     elapsed = reading.taken - stop.start_time
     if elapsed <= LATE:
         return False
     end = min(elapsed, stop.trajectory.duration)
     passed = sample(stop.trajectory, np.linspace(0.0, end, 2 + int(end / SPACING)))[0]
-    is_ahead = bool(np.abs(passed - reading.positions).max(axis=1).min() > ASIDE)
-    return (
-        is_ahead and phase_of(reading.positions, reading.velocities, before.trajectory) is not None
-    )
+    if np.abs(passed - reading.positions).max(axis=1).min() <= ASIDE:
+        return False
+    here = phase_of(reading.positions, reading.velocities, before.trajectory)
+    begin = phase_of(passed[0], stop.trajectory.velocities[0], before.trajectory)
+    return here is not None and (begin is None or here[0] > begin[0])
 
 
 def is_on_other(reading: JointReading, motion: RunningMotion, other: RunningMotion) -> bool:

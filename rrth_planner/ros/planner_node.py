@@ -27,6 +27,7 @@ from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.parameters import current_parameters, declare_parameters
+from rrth_planner.ros.profiles import SERVICE
 from std_srvs.srv import Trigger
 
 NAME = 'rrth_planner'
@@ -68,9 +69,12 @@ class PlannerNode(Node):
         self._listener.on_error = self.fail
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
-        self.create_service(Trigger, '~/plan', self._on_plan, callback_group=group)
-        self.create_service(GetPlan, '~/get_plan', self._on_get_plan, callback_group=group)
-        self.create_service(Trigger, '~/cancel', self._on_cancel, callback_group=group)
+        for kind, name, answer_it in (
+            (Trigger, '~/plan', self._on_plan),
+            (GetPlan, '~/get_plan', self._on_get_plan),
+            (Trigger, '~/cancel', self._on_cancel),
+        ):
+            self.create_service(kind, name, answer_it, qos_profile=SERVICE, callback_group=group)
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
     def close(self) -> None:

@@ -27,7 +27,7 @@ from rrth_planner.ros.playback_parameters import (
     initial_positions,
     playback_rules,
 )
-from rrth_planner.ros.profiles import SUPERVISED
+from rrth_planner.ros.profiles import SERVICE, SUPERVISED
 from rrth_planner.ros.subscriptions import decoded
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg, pose_to_msg
 from sensor_msgs.msg import JointState
@@ -80,7 +80,7 @@ class PlaybackNode(Node):
             ),
             raw=True,
         )
-        self.create_service(Trigger, '~/stop', self._on_stop)
+        self.create_service(Trigger, '~/stop', self._on_stop, qos_profile=SERVICE)
         self.create_timer(
             1.0 / self.get_parameter('rate').value, self._publish, clock=self._motion_clock
         )

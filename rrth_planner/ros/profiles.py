@@ -32,3 +32,7 @@ SUPERVISED = QoSProfile(
     durability=DurabilityPolicy.VOLATILE,
     **_LIVELINESS,
 )
+
+# Requests that wait for their turn, and answers that wait for who asked: the default drops those
+# beyond ten.
+SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

@@ -47,6 +47,7 @@ class Reporter:
         self.guard = ('no motion', '')
         self._recertified, self._braked = Figures(), Figures()
         self._n_incidents, self._last_incident = 0, ''
+        # Of what is counted and published: by the executor's thread, and by the worker's.
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -60,16 +61,19 @@ class Reporter:
 
     def recertified(self, elapsed: float) -> None:
         """Count that a running motion was held against a new body, and how long it took [s]."""
-        self._recertified.add(elapsed)
+        with self._lock:
+            self._recertified.add(elapsed)
 
     def braked(self, elapsed: float) -> None:
         """Count a brake, and how long after the body's arrival it was published [s]."""
-        self._braked.add(elapsed)
+        with self._lock:
+            self._braked.add(elapsed)
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
-        self._n_incidents += 1
-        self._last_incident = '' if file is None else str(file)
+        with self._lock:
+            self._n_incidents += 1
+            self._last_incident = '' if file is None else str(file)
 
     def publish_soon(self) -> None:
         """Publish the diagnostics within a tenth of a second."""
@@ -85,7 +89,6 @@ class Reporter:
             self._publish()
 
     def _publish(self) -> None:
-        # Both the executor's thread and the worker's come here.
         with self._lock:
             self._published, self._is_changed = time.monotonic(), False
             now = self._node.get_clock().now()
@@ -131,13 +134,14 @@ class Reporter:
         """Log and publish how a request ended, and return the answer to it."""
         text, sentence = answer(code, sentence), one_line(sentence)
         is_solved = code is ErrorCode.SUCCESS
-        self.report = replace(
-            figures,
-            n_requests=self.report.n_requests + 1,
-            n_solved=self.report.n_solved + is_solved,
-            code=code,
-            sentence=sentence,
-        )
+        with self._lock:
+            self.report = replace(
+                figures,
+                n_requests=self.report.n_requests + 1,
+                n_solved=self.report.n_solved + is_solved,
+                code=code,
+                sentence=sentence,
+            )
         logger = self._node.get_logger()
         if is_solved:
             logger.info(text)

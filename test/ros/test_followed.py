@@ -104,3 +104,26 @@ def test_an_arm_that_goes_on_is_found_out(seed, rate):
     # Places are looked at some milliseconds apart.
     assert due <= set(found)
     assert all(time > LATE for time in found)
+
+
+@examples(60)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.15, 0.3]))
+def test_an_arm_that_lags_or_has_stopped_by_itself_does_not_go_on(seed, lag):
+    before, phase, stop = _stopped(seed)
+
+    def lags(time):
+        # It is told late, too, since it does everything late.
+        since = time - lag
+        if since >= 0.0:
+            return _at(stop.trajectory, since)
+        return _at(before.trajectory, phase + since)
+
+    assert _seen_to_go_on(before, stop, lags, stop.trajectory.duration + lag + 0.2) == []
+    # So long before it was told to.
+    early = min(lag, phase)
+    stopped = emergency_stop(before.trajectory, phase - early, limits())
+
+    def brakes(time):
+        return _at(stopped, early + time)
+
+    assert _seen_to_go_on(before, stop, brakes, stop.trajectory.duration + 0.2) == []

@@ -1068,6 +1068,37 @@ def test_a_refused_message_is_reported_and_nothing_is_planned_until_a_good_one(
     assert stranger.answer().success
 
 
+def test_many_calls_at_once_are_all_answered(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    futures = [stranger.ask('plan') for _ in range(40)]
+    stranger.wait_until(lambda: all(future.done() for future in futures))
+    assert all(future.result().success for future in futures)
+
+
+def test_what_two_threads_report_is_all_counted(start):
+    planner, _ = start()
+    reporter, n, n_before = planner._reporter, 300, planner._reporter.report.n_requests
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+
+    def work():
+        for _ in range(n):
+            reporter.conclude(ErrorCode.SUCCESS, 'done', PlanReport())
+            reporter.braked(1e-3)
+
+    try:
+        threads = [Thread(target=work) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    finally:
+        sys.setswitchinterval(interval)
+    assert reporter.report.n_requests - n_before == reporter.report.n_solved == 2 * n
+    assert reporter._braked.n == 2 * n
+
+
 def test_a_refused_target_is_not_replaced_by_the_one_before(start):
     planner, stranger = start()
     say_all(planner, stranger)
