@@ -14,6 +14,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 BLOCK = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r'-?\d+(\.\d+)?(e[+-]?\d+)?')
+COMPILING = re.compile(r'^\w+: compiling the planner, takes .*\n', re.MULTILINE)
 # Like ./run, but with the Python of the tests.
 RUN = """\
 #!/bin/sh
@@ -70,7 +71,9 @@ def test_every_offline_command_prints_what_the_tutorial_shows(tmp_path):
             timeout=280,
         )
         assert done.returncode == 0, (text, done.stdout)
-        assert shape(done.stdout) == shape(shown), (text, done.stdout)
+        # What a command says once for each machine is not in the tutorial.
+        said = COMPILING.sub('', done.stdout)
+        assert shape(said) == shape(shown), (text, done.stdout)
         n_shown += bool(shown)
     assert n_shown >= 6
 
