@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a broken contract raises: what was given, what was expected, the unit."""
 
+import reprlib
+from typing import Any
+
 # Whatever was given may be as long as it likes; what is said of it may not [characters].
 LONGEST_SENTENCE = 1000
 
@@ -12,6 +15,20 @@ def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
     if cut.isprintable():
         return cut
     return ''.join(c if c.isprintable() else ' ' if c.isspace() else '?' for c in cut)
+
+
+def shown(value: Any) -> str:
+    """Return how a sentence quotes what was given, cut short where it is long or deep."""
+    try:
+        return _QUOTES.repr(value)
+    except ValueError:
+        # An integer of more digits than Python writes.
+        return f'a {type(value).__name__}'
+
+
+_QUOTES = reprlib.Repr()
+_QUOTES.maxstring = _QUOTES.maxother = _QUOTES.maxlong = 80
+_QUOTES.maxlist = _QUOTES.maxtuple = 16
 
 
 class RrthError(Exception):

@@ -21,6 +21,7 @@ ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', '
 OWN = {
     'fcl_shapes': {'fcl'},
     'resources': {'yaml', 'ament_index_python'},
+    'text_files': {'yaml'},
     'cluster': {'tqdm', 'distributed'},
     'store': {'pyarrow'},
     'runs': {'numba'},
