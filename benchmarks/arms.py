@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 from rrth_planner.arm import arm_from_mapping, ArmModel
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
+from rrth_planner.text_files import load_yaml
 
 QUARTER = 0.5 * np.pi
 # type, alpha [rad], a [m], offset [rad], d [m], lower, upper [rad or m] of each joint; then alpha

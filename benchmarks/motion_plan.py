@@ -17,7 +17,8 @@ from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.pipeline import plan_motion
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
+from rrth_planner.text_files import load_yaml
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import MotionLimits, Trajectory
 

@@ -14,10 +14,11 @@ from rrth_planner.arrays import Array
 from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
 from rrth_planner.options import RRTHOptions
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Box, Scene
 from rrth_planner.shortest import shortest_path
+from rrth_planner.text_files import load_yaml
 from rrth_planner.world import arm_world, World
 
 from benchmarks import judge

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import ModelError
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.entries import mapping, number, printable, sequence
+from rrth_planner.errors import ModelError, shown
 from rrth_planner.rotation import pose_matrix
 
-JOINT_KEYS = {'name', 'type', 'alpha', 'a', 'offset', 'd', 'lower', 'upper', 'radius'}
+# What the rows of an arm's file say, and their units.
+ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,7 +42,8 @@ class ArmModel:
     Raises
     ------
     ModelError
-        Rows, names and limits that do not describe one arm.
+        Rows, names and limits that do not describe one arm, or angles or an arm beyond 1e4 rad
+        or m.
 
     """
 
@@ -55,6 +58,8 @@ class ArmModel:
         """Validate and freeze."""
         names = tuple(self.joint_names)
         dof = len(names)
+        for i, name in enumerate(names):
+            printable(name, f'joint_names[{i}]', ModelError)
         if dof < 1 or len(set(names)) != dof:
             raise ModelError(f'joint_names: {list(names)}, expected at least one, all different')
         prismatic = tuple(bool(flag) for flag in self.is_prismatic)
@@ -68,7 +73,7 @@ class ArmModel:
             ('radii', (dof + 1,), 'm'),
             ('T_base_mount', (4, 4), 'm'),
         ):
-            value = frozen_array(getattr(self, field), shape, field, unit, ModelError)
+            value = frozen_array(getattr(self, field), shape, field, unit, ModelError, FARTHEST)
             object.__setattr__(self, field, value)
         if not (self.bounds[0] < self.bounds[1]).all():
             raise ModelError(f'bounds: {self.bounds.tolist()}, expected lower < upper [rad or m]')
@@ -81,6 +86,19 @@ class ArmModel:
         r = self.T_base_mount[:3, :3]
         if np.abs(r @ r.T - np.eye(3)).max() > 1e-6 or np.linalg.det(r) < 0.0:
             raise ModelError(f'mount: rotation {r.tolist()}, expected a rotation matrix [-]')
+        # Wherever the joints are, no frame of the arm is farther out.
+        slides = np.array(prismatic)
+        extent = (
+            np.linalg.norm(self.T_base_mount[:3, 3])
+            + np.abs(self.dh[:, [1, 3]]).sum()
+            + np.abs(self.bounds[:, slides]).max(axis=0).sum()
+            + self.radii.max()
+        )
+        if extent > FARTHEST:
+            raise ModelError(
+                f'arm: {extent:g}, its mount, a, d and radius added up, expected at most '
+                f'{FARTHEST:g} [m]'
+            )
 
     @property
     def dof(self) -> int:
@@ -98,54 +116,55 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         Something is missing, has another name or describes no arm.
 
     """
-    try:
-        joints = list(data['joints'])
-        _check_keys('arm', data, {'name', 'joints', 'tool', 'mount'})
-        for joint in joints:
-            _check_keys(f'joint "{joint["name"]}"', joint, JOINT_KEYS)
-        if data['tool'].get('d', 0.0) != 0.0:
-            raise ModelError(
-                f'tool: d = {data["tool"]["d"]}, expected none: the ray begins at the frame [m]'
-            )
-        _check_keys('tool', data['tool'], {'alpha', 'a', 'offset', 'd', 'radius'})
-        _check_keys('mount', data['mount'], {'position', 'quaternion_xyzw'})
-        rows = [*joints, {**data['tool'], 'd': 0.0}]
-        kinds = [str(joint['type']) for joint in joints]
-        for joint, kind in zip(joints, kinds, strict=True):
-            if kind not in ('revolute', 'prismatic'):
-                raise ModelError(
-                    f'joint "{joint["name"]}": type {kind!r}, expected revolute or prismatic'
-                )
-        mount = data['mount']
-        position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
-        quaternion = frozen_array(
-            mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError
-        )
-        if np.linalg.norm(quaternion) < 1e-6:
-            raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
-        return ArmModel(
-            joint_names=tuple(str(joint['name']) for joint in joints),
-            is_prismatic=tuple(kind == 'prismatic' for kind in kinds),
-            dh=np.array([[row[k] for k in ('alpha', 'a', 'offset', 'd')] for row in rows], float),
-            bounds=np.array([[joint[k] for joint in joints] for k in ('lower', 'upper')], float),
-            radii=np.array([row.get('radius', 0.0) for row in rows], float),
-            T_base_mount=pose_matrix(position, quaternion),
-        )
-    except KeyError as missing:
-        raise ModelError(
-            f'arm description: no {missing}, expected as in config/arm.yaml'
-        ) from None
-    except (TypeError, ValueError, AttributeError) as problem:
-        raise ModelError(
-            f'arm description: {problem}; expected numbers laid out as in config/arm.yaml'
-        ) from problem
+    given = mapping(data, 'arm', ('joints', 'tool', 'mount'), ModelError, ('name',))
+    printable(given.get('name', 'arm'), 'arm: name', ModelError)
+    joints = [
+        _joint(i, joint) for i, joint in enumerate(sequence(given['joints'], 'joints', ModelError))
+    ]
+    mount = mapping(given['mount'], 'mount', ('position', 'quaternion_xyzw'), ModelError)
+    position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
+    quaternion = frozen_array(
+        mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError, FARTHEST
+    )
+    if np.linalg.norm(quaternion) < 1e-6:
+        raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
+    rows = [*joints, _tool(given['tool'])]
+    return ArmModel(
+        joint_names=tuple(joint['name'] for joint in joints),
+        is_prismatic=tuple(joint['type'] == 'prismatic' for joint in joints),
+        dh=np.array([[row[key] for key in ROW] for row in rows]),
+        bounds=np.array([[joint[key] for joint in joints] for key in ('lower', 'upper')]),
+        radii=np.array([row['radius'] for row in rows]),
+        T_base_mount=pose_matrix(position, quaternion),
+    )
 
 
-def _check_keys(what: str, given: Mapping[str, Any], known: set[str]) -> None:
-    """Refuse a key that would otherwise be overlooked, a misspelt radius say."""
-    unknown = sorted(set(given) - known)
-    if unknown:
-        raise ModelError(f'{what}: {", ".join(unknown)}, expected only {", ".join(sorted(known))}')
+def _joint(index: int, data: Any) -> dict[str, Any]:
+    """Return what an arm's file says of a joint, its radius included."""
+    wanted = ('name', 'type', *ROW, 'lower', 'upper')
+    given = {'radius': 0.0, **mapping(data, f'joint {index}', wanted, ModelError, ('radius',))}
+    label = f'joint "{printable(given["name"], f"joint {index}: name", ModelError)}"'
+    kind = given['type']
+    if kind not in ('revolute', 'prismatic'):
+        raise ModelError(f'{label}: type {shown(kind)}, expected revolute or prismatic')
+    limit = 'm' if kind == 'prismatic' else 'rad'
+    return given | _numbers(given, label, {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'})
+
+
+def _tool(data: Any) -> dict[str, Any]:
+    """Return the row of the tool, its radius and a `d` of 0 included."""
+    wanted = ('alpha', 'a', 'offset')
+    given = mapping(data, 'tool', wanted, ModelError, ('d', 'radius'))
+    row = _numbers({'d': 0.0, 'radius': 0.0, **given}, 'tool', {**ROW, 'radius': 'm'})
+    if row['d'] != 0.0:
+        raise ModelError(f'tool: d = {row["d"]}, expected none: the ray begins at the frame [m]')
+    return row
+
+
+def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> dict[str, float]:
+    return {
+        key: number(given[key], f'{label}: {key}', unit, ModelError) for key, unit in units.items()
+    }
 
 
 def forward_kinematics(arm: ArmModel, q: Array) -> Array:

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.arm import ArmModel, ROW
 from rrth_planner.arrays import Array
 from rrth_planner.rotation import quaternion_xyzw
-import yaml
+from rrth_planner.text_files import to_yaml
 
-ROW = ('alpha', 'a', 'offset', 'd')
 LAYOUT = (
     'Modified Denavit-Hartenberg parameters (Craig), '
     'T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d).',
@@ -58,10 +57,7 @@ def arm_to_yaml(arm: ArmModel, name: str, comments: Sequence[str] = ()) -> str:
     Rows, limits and radii are read from it to the bit, the mount to 1e-14.
     """
     lines = [f'# {" ".join(line.split())}\n' for line in (*comments, *LAYOUT)]
-    text: str = yaml.safe_dump(
-        arm_to_mapping(arm, name), sort_keys=False, default_flow_style=None, width=1000
-    )
-    return ''.join(lines) + text
+    return ''.join(lines) + to_yaml(arm_to_mapping(arm, name), width=1000)
 
 
 def _plain(numbers: Array) -> list[float]:

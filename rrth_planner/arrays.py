@@ -3,16 +3,26 @@
 """Arrays that a frozen value may hold."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.errors import RrthError
+from rrth_planner.errors import RrthError, shown
 
 Array = NDArray[np.float64]
 
+# Lengths and coordinates [m], and joint positions [rad or m]: further out the slack of the
+# certificates would no longer cover rounding.
+FARTHEST = 1e4
+
 
 def frozen_array(
-    value: ArrayLike, shape: tuple[int | None, ...], name: str, unit: str, error: type[RrthError]
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+    name: str,
+    unit: str,
+    error: type[RrthError],
+    largest: float = math.inf,
 ) -> Array:
     """
     Return a read-only float64 copy in C order, of the given shape and finite.
@@ -26,22 +36,40 @@ def frozen_array(
     name, unit : str
         How the array is called in the sentence of the error.
     error : type
-        Raised when the shape differs or an element is not a finite number.
+        Raised when the shape differs, or an element is not a finite number, as true and "1" are
+        not, or too large.
+    largest : float, optional
+        Greatest magnitude of an element.
 
     """
     try:
         array = np.array(value, dtype=np.float64, order='C')
-    except (TypeError, ValueError) as problem:
+        if not are_numbers(value):
+            raise TypeError('of another type')
+    except (TypeError, ValueError, OverflowError) as problem:
         raise error(
-            f'{name}: {value!r}, expected numbers of shape {_wanted(shape)} [{unit}]'
+            f'{name}: {shown(value)}, expected numbers of shape {_wanted(shape)} [{unit}]'
         ) from problem
     if array.shape != shape and not _fits(array.shape, shape):
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
     # A sum of squares is finite where all elements are, unless it overflows.
     if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
-        raise error(f'{name}: {array.tolist()}, expected finite numbers [{unit}]')
+        raise error(f'{name}: {shown(array.tolist())}, expected finite numbers [{unit}]')
+    if largest < math.inf and np.abs(array).max(initial=0.0) > largest:
+        raise error(
+            f'{name}: {shown(array.tolist())}, expected numbers of at most {largest:g} [{unit}]'
+        )
     array.setflags(write=False)
     return array
+
+
+def are_numbers(value: Any) -> bool:
+    """Return whether an array, or nested lists of numbers, hold numbers only."""
+    if isinstance(value, list | tuple):
+        return all(map(are_numbers, value))
+    if isinstance(value, int | float):
+        return not isinstance(value, bool)
+    return np.asarray(value).dtype.kind in 'fiu'
 
 
 def _fits(given: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:

@@ -3,18 +3,21 @@
 """A wearer's body from a YAML file."""
 
 from collections.abc import Mapping
-import math
 from pathlib import Path
-import reprlib
 from typing import Any
 
-from rrth_planner.errors import SceneError
-from rrth_planner.resources import load_yaml, resource_path
+import numpy as np
+from rrth_planner.arrays import FARTHEST, frozen_array
+from rrth_planner.entries import mapping, printable
+from rrth_planner.errors import SceneError, shown
+from rrth_planner.resources import resource_path
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Box, Scene
+from rrth_planner.text_files import load_yaml
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-ENTRIES = ('name', 'center', 'size', 'quaternion_xyzw')
+# Shorter quaternions are none.
+SHORTEST = 1e-6
 
 
 def scene_from_mapping(data: Any) -> Scene:
@@ -35,8 +38,8 @@ def scene_from_mapping(data: Any) -> Scene:
     """
     boxes = data.get('boxes') if isinstance(data, Mapping) else None
     if not isinstance(boxes, list) or not boxes:
-        raise SceneError(f'body: {reprlib.repr(data)}, expected a mapping with a list of boxes')
-    return Scene(tuple(_box(k, box) for k, box in enumerate(boxes)))
+        raise SceneError(f'body: {shown(data)}, expected a mapping with a list of boxes')
+    return Scene(tuple(_box(f'box {k}', box) for k, box in enumerate(boxes)))
 
 
 def load_body(path: str | Path | None = None) -> Scene:
@@ -57,26 +60,21 @@ def load_body(path: str | Path | None = None) -> Scene:
         raise SceneError(f'file {file}: {problem}') from problem
 
 
-def _box(index: int, data: Any) -> Box:
-    label = f'box {index}'
-    if not isinstance(data, Mapping):
-        raise SceneError(f'{label}: {data!r}, expected a mapping with {", ".join(ENTRIES)}')
-    unknown = [str(key) for key in data if key not in ENTRIES]
-    missing = [key for key in ENTRIES[:3] if key not in data]
-    if unknown or missing:
+def _box(label: str, data: Any) -> Box:
+    wanted = ('name', 'center', 'size')
+    given = mapping(data, label, wanted, SceneError, ('quaternion_xyzw',))
+    quaternion = frozen_array(
+        given.get('quaternion_xyzw', UPRIGHT),
+        (4,),
+        f'{label}: quaternion_xyzw',
+        '-',
+        SceneError,
+        FARTHEST,
+    )
+    if np.linalg.norm(quaternion) < SHORTEST:
         raise SceneError(
-            f'{label}: {", ".join(unknown or missing)} {"unknown" if unknown else "missing"}, '
-            f'expected {", ".join(ENTRIES)}'
+            f'{label}: quaternion_xyzw {quaternion.tolist()}, expected four numbers x, y, z, w, '
+            'not all 0 [-]'
         )
-    quaternion = data.get('quaternion_xyzw', UPRIGHT)
-    try:
-        x, y, z, w = map(float, quaternion)
-    except (TypeError, ValueError) as problem:
-        raise SceneError(
-            f'{label}: quaternion_xyzw {quaternion!r}, expected four numbers x, y, z, w [-]'
-        ) from problem
-    if not math.hypot(x, y, z, w) > 0.0:
-        raise SceneError(
-            f'{label}: quaternion_xyzw {quaternion!r}, expected four numbers, not all 0 [-]'
-        )
-    return Box(str(data['name']), data['center'], data['size'], rotation_matrix([x, y, z, w]))
+    name = printable(given['name'], f'{label}: name', SceneError)
+    return Box(name, given['center'], given['size'], rotation_matrix(quaternion))

@@ -4,12 +4,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-import reprlib
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import SceneError
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.entries import printable
+from rrth_planner.errors import SceneError, shown
 from rrth_planner.kernels import chain, contacts, jit, map_validity
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
@@ -41,7 +41,8 @@ class BoxMap:
     Raises
     ------
     SceneError
-        A box without inside, a start or goal outside the map or inside a box.
+        A box without inside, a start or goal outside the map or inside a box, a coordinate beyond
+        1e4, a name that is not printable.
 
     """
 
@@ -53,38 +54,38 @@ class BoxMap:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        dof = np.shape(self.bounds)[-1]
+        name = f'map "{printable(self.name, "name of a map", SceneError)}"'
+        bounds = frozen_array(self.bounds, (2, None), f'{name}: bounds', 'map', SceneError)
+        dof = bounds.shape[1]
         obstacles = np.reshape(self.obstacles, (-1, 2, dof)) if len(self.obstacles) == 0 else None
         for field, value, shape in (
-            ('bounds', self.bounds, (2, dof)),
+            ('bounds', bounds, (2, dof)),
             ('obstacles', self.obstacles if obstacles is None else obstacles, (None, 2, dof)),
             ('start', self.start, (dof,)),
             ('goal', self.goal, (dof,)),
         ):
-            label = f'map "{self.name}": {field}'
-            object.__setattr__(self, field, frozen_array(value, shape, label, 'map', SceneError))
+            frozen = frozen_array(value, shape, f'{name}: {field}', 'map', SceneError, FARTHEST)
+            object.__setattr__(self, field, frozen)
         low, high = self.bounds
         if not (low < high).all():
-            raise SceneError(
-                f'map "{self.name}": bounds {self.bounds.tolist()}, expected lower < upper'
-            )
+            raise SceneError(f'{name}: bounds {self.bounds.tolist()}, expected lower < upper')
         for i, (lower, upper) in enumerate(self.obstacles):
             if not (lower < upper).all():
                 raise SceneError(
-                    f'map "{self.name}": obstacle {i} from {lower.tolist()} to {upper.tolist()}, '
+                    f'{name}: obstacle {i} from {lower.tolist()} to {upper.tolist()}, '
                     'expected a positive size along every axis'
                 )
         for field in ('start', 'goal'):
             q = getattr(self, field)
             if not ((q >= low) & (q <= high)).all():
                 raise SceneError(
-                    f'map "{self.name}": {field} {q.tolist()}, expected within '
+                    f'{name}: {field} {q.tolist()}, expected within '
                     f'{low.tolist()} to {high.tolist()}'
                 )
             inside = ((q > self.obstacles[:, 0]) & (q < self.obstacles[:, 1])).all(axis=1)
             if inside.any():
                 raise SceneError(
-                    f'map "{self.name}": {field} {q.tolist()} is inside obstacle '
+                    f'{name}: {field} {q.tolist()} is inside obstacle '
                     f'{int(np.argmax(inside))}, expected a free point'
                 )
 
@@ -102,30 +103,32 @@ def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:
         Something is missing, has another name, is there twice or describes no map.
 
     """
+    label = f'map "{printable(name, "name of a map", SceneError)}"'
     if not isinstance(data, Mapping):
-        raise SceneError(f'map "{name}": {reprlib.repr(data)}, expected a mapping with {EXPECTED}')
+        raise SceneError(f'{label}: {shown(data)}, expected a mapping with {EXPECTED}')
     # A wall under a name that nobody reads would be no wall.
     unknown = [str(key) for key in data if key not in ENTRIES]
     if unknown:
-        raise SceneError(f'map "{name}": {", ".join(unknown)} unknown, expected only {EXPECTED}')
+        raise SceneError(f'{label}: {", ".join(unknown)} unknown, expected only {EXPECTED}')
     if 'rectangles' in data and 'boxes' in data:
-        raise SceneError(f'map "{name}": rectangles and boxes, expected one of them')
-    try:
-        start = np.asarray(data['start'], dtype=float)
-        rows = data['rectangles'] if 'rectangles' in data else data['boxes']
-        return BoxMap(
-            name=str(data.get('name', name)),
-            bounds=np.asarray(data['bounds'], dtype=float).reshape(2, len(start)),
-            obstacles=np.asarray(rows, dtype=float).reshape(len(rows), 2, len(start)),
-            start=start,
-            goal=np.asarray(data['goal'], dtype=float),
-        )
-    except KeyError as missing:
-        raise SceneError(f'map "{name}": no {missing}, expected {EXPECTED}') from None
-    except (TypeError, ValueError, AttributeError) as problem:
-        raise SceneError(
-            f'map "{name}": {problem}; expected numbers laid out as in config/maps'
-        ) from problem
+        raise SceneError(f'{label}: rectangles and boxes, expected one of them')
+    rows = 'rectangles' if 'rectangles' in data else 'boxes'
+    for key in ('bounds', rows, 'start', 'goal'):
+        if key not in data:
+            raise SceneError(f'{label}: no {key!r}, expected {EXPECTED}')
+    start = frozen_array(data['start'], (None,), f'{label}: start', 'map', SceneError)
+    dof = len(start)
+    bounds = frozen_array(data['bounds'], (2 * dof,), f'{label}: bounds', 'map', SceneError)
+    obstacles = data[rows]
+    if obstacles != []:
+        obstacles = frozen_array(obstacles, (None, 2 * dof), f'{label}: {rows}', 'map', SceneError)
+    return BoxMap(
+        name=data.get('name', name),
+        bounds=bounds.reshape(2, dof),
+        obstacles=np.reshape(obstacles, (-1, 2, dof)),
+        start=start,
+        goal=data['goal'],
+    )
 
 
 def map_world(box_map: BoxMap) -> World:

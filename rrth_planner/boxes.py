@@ -4,10 +4,10 @@
 
 from collections.abc import Sequence
 
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, FARTHEST
 from rrth_planner.kernels import boxes as kernels
 from rrth_planner.kernels.layout import ROTATION, SIZE
-from rrth_planner.scene import Box, FARTHEST
+from rrth_planner.scene import Box
 
 
 def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:

@@ -4,9 +4,8 @@
 
 from dataclasses import dataclass
 
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import SceneError
-from rrth_planner.scene import FARTHEST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +21,7 @@ class PointingGoal:
     Raises
     ------
     SceneError
-        A coordinate that is no finite number, or too far.
+        A coordinate that is no finite number, or beyond 1e4 m.
 
     """
 
@@ -30,9 +29,5 @@ class PointingGoal:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        target = frozen_array(self.target, (3,), 'target', 'm', SceneError)
-        if abs(target).max() > FARTHEST:
-            raise SceneError(
-                f'target: {target.tolist()}, expected coordinates up to {FARTHEST:g} [m]'
-            )
+        target = frozen_array(self.target, (3,), 'target', 'm', SceneError, FARTHEST)
         object.__setattr__(self, 'target', target)

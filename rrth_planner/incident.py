@@ -13,15 +13,14 @@ from pathlib import Path
 import platform
 from typing import Any
 
-from rrth_planner.errors import RecordError
+from rrth_planner.entries import number, text
+from rrth_planner.errors import one_line, RecordError, shown
 from rrth_planner.question import PlanQuestion
 from rrth_planner.records import (
-    entries,
-    number,
+    fields_of,
     plain,
     question_from_mapping,
     scene_from_mapping,
-    text,
     touch_from_mapping,
     trajectory_from_mapping,
 )
@@ -51,7 +50,7 @@ class Incident:
     kind : IncidentKind
         The two judges disagree, or an error that nobody expected.
     sentence : str
-        What was said of it.
+        What was said of it, in one line.
     time : str
         When, ISO 8601.
     question : PlanQuestion
@@ -124,7 +123,7 @@ def error_incident(
     """Return the record of an error of now; where: its traceback."""
     return Incident(
         kind=IncidentKind.ERROR,
-        sentence=str(problem),
+        sentence=one_line(str(problem)),
         time=_now(),
         question=question,
         trajectory=trajectory,
@@ -149,41 +148,36 @@ def incident_from_mapping(data: Any) -> Incident:
         What is missing, unknown or out of its range.
 
     """
-    try:
-        return _incident(data)
-    except (ArithmeticError, AttributeError, TypeError, ValueError) as problem:
-        # A number that is too large, say.
-        raise RecordError(f'incident: {problem}, expected what was written') from problem
-
-
-def _incident(data: Any) -> Incident:
     if isinstance(data, Mapping) and data.get('format') != FORMAT:
-        raise RecordError(f'format: {data.get("format")!r}, expected {FORMAT}')
-    given = entries(data, Incident, 'incident', ('format',))
+        raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
+    given = fields_of(data, Incident, 'incident', ('format',))
     kinds = [kind.value for kind in IncidentKind]
     if given['kind'] not in kinds:
-        raise RecordError(f'kind: {given["kind"]!r}, expected {" or ".join(kinds)}')
+        raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
     if not isinstance(given['versions'], Mapping):
-        raise RecordError(f'versions: {given["versions"]!r}, expected a mapping')
+        raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
     trajectory, touch, present = given['trajectory'], given['touch'], given['present']
     return Incident(
         kind=IncidentKind(given['kind']),
-        sentence=text(given['sentence'], 'sentence'),
-        time=text(given['time'], 'time'),
         question=question_from_mapping(given['question']),
         trajectory=(
             None if trajectory is None else trajectory_from_mapping(trajectory, 'trajectory')
         ),
         touch=None if touch is None else touch_from_mapping(touch),
         present=None if present is None else scene_from_mapping(present, 'present'),
-        escape_time=number(given['escape_time'], 'escape_time', 's'),
-        error=text(given['error'], 'error'),
-        traceback=text(given['traceback'], 'traceback'),
+        escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
+        traceback=text(given['traceback'], 'traceback', RecordError),
         versions={
-            text(key, 'versions'): text(value, f'versions: {key}')
+            _line(key, 'versions'): _line(value, f'versions: {key}')
             for key, value in given['versions'].items()
         },
+        **{name: _line(given[name], name) for name in ('sentence', 'time', 'error')},
     )
+
+
+def _line(value: Any, name: str) -> str:
+    """Return a text as a line that may be printed, or raise RecordError."""
+    return one_line(text(value, name, RecordError))
 
 
 @functools.cache

@@ -5,7 +5,9 @@
 from pathlib import Path
 
 from rrth_planner.box_map import BoxMap, map_from_mapping
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.errors import SceneError
+from rrth_planner.resources import resource_path
+from rrth_planner.text_files import load_yaml
 
 
 def load_map(name: str | Path) -> BoxMap:
@@ -20,4 +22,8 @@ def load_map(name: str | Path) -> BoxMap:
     """
     is_file = str(name).endswith('.yaml')
     path = Path(name) if is_file else resource_path(f'config/maps/{name}.yaml')
-    return map_from_mapping(load_yaml(path), path.stem)
+    data = load_yaml(path)
+    try:
+        return map_from_mapping(data, path.stem)
+    except SceneError as problem:
+        raise SceneError(f'file {path}: {problem}') from problem

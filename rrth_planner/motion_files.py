@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.arm import ArmModel
-from rrth_planner.errors import RecordError, RrthError
-from rrth_planner.resources import load_yaml
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.entries import mapping, printable, sequence
+from rrth_planner.errors import RecordError, RrthError, shown
+from rrth_planner.text_files import MOST_VALUES, parse_yaml, read_text, to_yaml
 from rrth_planner.trajectory import sample, Trajectory
-import yaml
 
 SERIES = ('positions', 'velocities', 'accelerations')
 # Units of these, by that of the joint.
@@ -26,7 +27,6 @@ HEADER = """\
 # and acceleration at both. Times in s; positions in the units given for each joint, velocities in
 # these per second, accelerations per second squared.
 """
-_Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -44,7 +44,8 @@ class JointMotion:
     Raises
     ------
     RecordError
-        Another number of names or units than of joints, or a unit that is neither.
+        Another number of names or units than of joints, a name that is not printable, or a unit
+        that is neither.
 
     """
 
@@ -55,12 +56,14 @@ class JointMotion:
     def __post_init__(self) -> None:
         """Validate."""
         dof = self.trajectory.positions.shape[1]
+        for i, name in enumerate(self.joint_names):
+            printable(name, f'joint_names[{i}]', RecordError)
         if not len(self.joint_names) == len(set(self.joint_names)) == len(self.units) == dof:
             raise RecordError(
                 f'joints: {list(self.joint_names)} in {list(self.units)}, expected {dof} '
                 'different names and as many units'
             )
-        if not set(self.units) <= {'rad', 'm'}:
+        if not all(unit in ('rad', 'm') for unit in self.units):
             raise RecordError(f'units: {list(self.units)}, expected rad or m for each joint')
 
 
@@ -126,18 +129,15 @@ def read_motion(path: str | Path) -> JointMotion:
     """
     file = Path(path)
     check_suffix(file)
+    text = read_text(file)
+    is_table = file.suffix.lower() == '.csv'
+    data = None if is_table else parse_yaml(text, f'file {file}')
     try:
-        is_table = file.suffix.lower() == '.csv'
-        return _from_csv(file) if is_table else _from_mapping(load_yaml(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        return _from_csv(text) if is_table else _from_mapping(data)
+    except csv.Error as problem:
         raise RecordError(f'file {file}: {problem}; expected a readable file') from problem
     except RrthError as problem:
-        if str(file) in str(problem):
-            raise
         raise RecordError(f'file {file}: {problem}') from problem
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as problem:
-        said = ' '.join(str(problem).split())
-        raise RecordError(f'file {file}: {said}; expected a motion as `plan` writes it') from None
 
 
 def _to_yaml(motion: JointMotion, comments: Sequence[str]) -> str:
@@ -152,25 +152,28 @@ def _to_yaml(motion: JointMotion, comments: Sequence[str]) -> str:
         ],
     }
     said = ''.join(f'# {" ".join(line.split())}\n' for line in comments)
-    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=10**6)
-    return f'{said}{HEADER}{text}'
+    return f'{said}{HEADER}{to_yaml(data, width=10**6)}'
 
 
 def _from_mapping(data: Any) -> JointMotion:
-    points = data['points']
-    positions, velocities, accelerations = (
-        np.array([point[name] for point in points], dtype=np.float64) for name in SERIES
-    )
+    given = mapping(data, 'motion', ('joint_names', 'units', 'points'), RecordError)
+    points = [
+        mapping(point, f'points[{i}]', ('time', *SERIES), RecordError)
+        for i, point in enumerate(sequence(given['points'], 'points', RecordError))
+    ]
     return JointMotion(
-        joint_names=tuple(map(str, data['joint_names'])),
-        units=tuple(map(str, data['units'])),
+        joint_names=tuple(sequence(given['joint_names'], 'joint_names', RecordError)),
+        units=tuple(sequence(given['units'], 'units', RecordError)),
         trajectory=Trajectory(
-            times=np.array([point['time'] for point in points], dtype=np.float64),
-            positions=positions,
-            velocities=velocities,
-            accelerations=accelerations,
+            times=_column(points, 'time', (None,)),
+            **{name: _column(points, name, (None, None)) for name in SERIES},
         ),
     )
+
+
+def _column(points: list[dict[str, Any]], name: str, shape: tuple[None, ...]) -> Array:
+    unit = 's' if name == 'time' else 'units of the joints'
+    return frozen_array([point[name] for point in points], shape, name, unit, RecordError)
 
 
 def _header(names: Sequence[str], units: Sequence[str]) -> list[str]:
@@ -194,17 +197,21 @@ def _to_csv(motion: JointMotion) -> str:
     return text.getvalue()
 
 
-def _from_csv(file: Path) -> JointMotion:
-    with file.open(encoding='utf-8', newline='') as stream:
-        header, *rows = [row for row in csv.reader(stream, strict=True) if row]
-    names, units = [], []
-    for column in header[1::3]:
-        name, unit = column.rsplit(' position [', 1)
-        names.append(name)
-        units.append(unit.removesuffix(']'))
-    if header != _header(names, units):
-        raise RecordError(f'columns {header}, expected {_header(names, units)}')
-    numbers = np.array(rows, dtype=np.float64)
+def _from_csv(text: str) -> JointMotion:
+    if text.count(',') > MOST_VALUES:
+        raise RecordError(f'{text.count(",")} commas, expected at most {MOST_VALUES} values')
+    rows = [row for row in csv.reader(io.StringIO(text, newline=''), strict=True) if row]
+    header = rows[0] if rows else []
+    columns = [column.rpartition(' position [') for column in header[1::3]]
+    names, units = [name for name, _, _ in columns], [unit[:-1] for _, _, unit in columns]
+    if not header or header != _header(names, units):
+        raise RecordError(f'columns {shown(header)}, expected {shown(_header(names, units))}')
+    if any(len(row) != len(header) for row in rows):
+        raise RecordError(f'lines of other lengths, expected {len(header)} numbers in each')
+    try:
+        numbers = np.array(rows[1:], dtype=np.float64).reshape(-1, len(header))
+    except ValueError as problem:
+        raise RecordError(f'{problem}, expected numbers') from problem
     values = numbers[:, 1:].reshape(len(numbers), len(names), 3)
     return JointMotion(
         joint_names=tuple(names),

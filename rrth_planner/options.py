@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from rrth_planner.errors import OptionsError
+from rrth_planner.errors import OptionsError, shown
 
 NUMBERS = (int, float, np.integer, np.floating)
 
@@ -48,13 +48,21 @@ class TreeOptions:
         """Validate each field against its own metadata."""
         for f in fields(self):
             value, meta = getattr(self, f.name), f.metadata
-            is_count = f.type in ('int', int)
+            if f.type is bool:
+                if not isinstance(value, bool):
+                    raise OptionsError(f'{f.name}: {shown(value)}, expected true or false [-]')
+                continue
+            is_count = f.type is int
             is_number = isinstance(value, (int, np.integer) if is_count else NUMBERS)
-            if not is_number or not meta['low'] <= value <= meta['high']:
+            if (
+                isinstance(value, bool)
+                or not is_number
+                or not meta['low'] <= value <= meta['high']
+            ):
                 kind = 'a whole number from ' if is_count else ''
                 raise OptionsError(
-                    f'{f.name}: {value!r}, expected {kind}{meta["low"]:g} to {meta["high"]:g} '
-                    f'[{meta["unit"]}]'
+                    f'{f.name}: {shown(value)}, expected {kind}{meta["low"]:g} to '
+                    f'{meta["high"]:g} [{meta["unit"]}]'
                 )
 
 

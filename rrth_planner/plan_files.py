@@ -19,9 +19,10 @@ from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion, warm_up
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.status import PlanStatus
+from rrth_planner.text_files import load_yaml
 from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130

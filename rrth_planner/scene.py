@@ -5,12 +5,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.entries import printable
 from rrth_planner.errors import SceneError
 from rrth_planner.kernels.layout import NUMBERS, ORTHOGONAL, ROTATION, SIZE
-
-# Further out the slack of the certificates would no longer cover rounding.
-FARTHEST = 1e4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +35,8 @@ class Box:
     Raises
     ------
     SceneError
-        A size that is not positive, a rotation that is none, a number that is not finite.
+        A size that is not positive, a rotation that is none, a number that is not finite or
+        beyond 1e4, a name that is not printable.
 
     """
 
@@ -49,7 +48,7 @@ class Box:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        label = f'box "{self.name}"'
+        label = f'box "{printable(self.name, "name of a box", SceneError)}"'
         parts = [
             frozen_array(
                 getattr(self, name),
@@ -57,17 +56,13 @@ class Box:
                 f'{label}: {name}',
                 '-' if name == 'rotation' else 'm',
                 SceneError,
+                FARTHEST,
             ).ravel()
             for name, shape in (('center', (3,)), ('size', (3,)), ('rotation', (3, 3)))
         ]
         _fill(self, self.name, _frozen(np.concatenate(parts)))
         if not (self.size > 0.0).all():
             raise SceneError(f'{label}: size {self.size.tolist()}, expected three lengths > 0 [m]')
-        if max(np.abs(self.center).max(), self.size.max()) > FARTHEST:
-            raise SceneError(
-                f'{label}: center {self.center.tolist()}, size {self.size.tolist()}, expected '
-                f'lengths up to {FARTHEST:g} [m]'
-            )
         r = self.rotation
         if np.abs(r @ r.T - np.eye(3)).max() > ORTHOGONAL or np.linalg.det(r) < 0.0:
             raise SceneError(f'{label}: rotation {r.tolist()}, expected a rotation matrix [-]')

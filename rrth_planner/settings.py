@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.errors import OptionsError
+from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.entries import number, text, whole
+from rrth_planner.errors import OptionsError, shown
 from rrth_planner.options import ALGORITHMS, TreeOptions
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
+from rrth_planner.text_files import load_yaml
 from rrth_planner.trajectory import MotionLimits
 
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
@@ -74,7 +76,7 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
     )
 
 
-def load_settings(dof: int, path: str | Path | None = None, **changes: Any) -> PlanSettings:
+def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -> PlanSettings:
     """
     Return the settings of a parameter file of the node, for an arm of so many joints.
 
@@ -93,41 +95,55 @@ def load_settings(dof: int, path: str | Path | None = None, **changes: Any) -> P
 
     """
     packaged = _parameters(resource_path('config/planner.yaml'))
-    given = {} if path is None else _parameters(path)
-    for name in (*given, *changes):
-        if name not in packaged:
-            raise OptionsError(f'{name}: no parameter, expected one of {", ".join(packaged)}')
     # A value a joint of the packaged arm is the same for each.
-    limits = {name: packaged[name][:1] for name in LIMIT_UNITS}
-    values = {**packaged, **limits, **given, **changes}
-    for name in (*LENGTHS, 'seed'):
-        kinds = (int, float) if name in LENGTHS else (int,)
-        if not isinstance(values[name], kinds) or isinstance(values[name], bool):
-            expected = 'a length [m]' if name in LENGTHS else 'a whole number'
-            raise OptionsError(f'{name}: {values[name]!r}, expected {expected}')
-    try:
-        return settings_from_values(values, dof)
-    except TypeError as problem:
-        raise OptionsError(f'settings: {problem}; expected as in config/planner.yaml') from problem
+    values = {**packaged, **{name: packaged[name][:1] for name in LIMIT_UNITS}}
+    if path is not None:
+        given = _parameters(path)
+        try:
+            _typed_settings(values, given, dof)
+        except OptionsError as problem:
+            raise OptionsError(f'file {path}: {problem}') from problem
+        values |= given
+    return _typed_settings(values, changes, dof)
+
+
+def _typed_settings(
+    values: Mapping[str, Any], changes: Mapping[str, Any], dof: int
+) -> PlanSettings:
+    """Return the settings of values of which some are changed, whatever these are."""
+    for name in changes:
+        if name not in values:
+            raise OptionsError(f'{name}: no parameter, expected one of {", ".join(values)}')
+    changed = {**values, **changes}
+    text(changed['algorithm'], 'algorithm', OptionsError)
+    whole(changed['seed'], 'seed', OptionsError)
+    lengths = {name: number(changed[name], name, 'm', OptionsError) for name in LENGTHS}
+    return settings_from_values({**changed, **lengths}, dof)
 
 
 def _parameters(path: str | Path) -> dict[str, Any]:
     data = load_yaml(path)
-    try:
-        (node,) = data.values()
-        return dict(node['ros__parameters'])
-    except (AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise OptionsError(
-            f'file {path}: expected a parameter file, /**: {{ros__parameters: {{name: value}}}}'
-        ) from problem
+    nodes = list(data.values()) if isinstance(data, dict) else []
+    if len(nodes) == 1 and isinstance(nodes[0], dict):
+        given = nodes[0].get('ros__parameters')
+        if isinstance(given, dict):
+            return given
+    raise OptionsError(
+        f'file {path}: {shown(data)}, expected a parameter file, '
+        '/**: {ros__parameters: {name: value}}'
+    )
 
 
 def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
     """Return a limit for each joint, (dof,)."""
-    given = list(values[name])
-    if len(given) not in (1, dof) or not all(LOWEST_LIMIT <= v <= HIGHEST_LIMIT for v in given):
+    unit = LIMIT_UNITS[name]
+    given = frozen_array(values[name], (None,), name, unit, OptionsError)
+    if (
+        len(given) not in (1, dof)
+        or not ((given >= LOWEST_LIMIT) & (given <= HIGHEST_LIMIT)).all()
+    ):
         raise OptionsError(
-            f'{name}: {given}, expected {dof} values, or one for all joints, from '
-            f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{LIMIT_UNITS[name]}]'
+            f'{name}: {given.tolist()}, expected {dof} values, or one for all joints, from '
+            f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{unit}]'
         )
-    return np.array(given if len(given) == dof else given * dof)
+    return np.array(np.broadcast_to(given, (dof,)))

@@ -5,6 +5,7 @@
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
+import io
 import logging
 import math
 from pathlib import Path
@@ -12,8 +13,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.entries import printable
 from rrth_planner.errors import ModelError
+from rrth_planner.text_files import load_xml
 
 # An installation by colcon does not bring them, which is said when a file is to be read.
 with suppress(ImportError):
@@ -130,11 +133,13 @@ def read_chain(
     if ray not in RAYS:
         raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
     model = _load(Path(path))
+    for element in (model.robot, *model.robot.links, *model.robot.joints):
+        printable(element.name, 'name', ModelError)
     joints, base, tool = _between(model, base, tool)
     T, frames, moving = np.eye(4), [], []
     for joint in joints:
         if joint.origin is not None:
-            T = T @ _squared(joint.origin, joint.name)
+            T = T @ _squared(joint.origin)
         if joint.type != 'fixed':
             moving.append(joint)
             frames.append(T)
@@ -164,24 +169,37 @@ def read_chain(
 
 def _load(path: Path) -> Any:
     logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
+    # Strictly, where yourdfpy would make something of any file.
+    root = load_xml(path)
+    if any('xacro' in element.tag for element in root.iter()):
+        raise ModelError(
+            f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
+        )
+    for origin in root.iter('origin'):
+        _check_origin(origin, f'file {path}: origin')
     try:
-        # Strictly, where yourdfpy would make something of any file.
-        root = ElementTree.parse(path).getroot()
-        if any('xacro' in element.tag for element in root.iter()):
-            raise ModelError(
-                f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
-            )
-        return yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False)
-    except OSError as problem:
-        raise ModelError(f'file {path}: {problem.strerror}; expected a URDF file') from problem
+        text = io.BytesIO(ElementTree.tostring(root))
+        return yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False)
     except NO_URDF as problem:
         said = ' '.join(f'{type(problem).__name__}: {problem}'.split())
         raise ModelError(f'file {path}: no URDF ({said}), expected one') from problem
 
 
+def _check_origin(origin: ElementTree.Element, label: str) -> None:
+    """Refuse other than three numbers: of more, of one or of infinite ones others are made."""
+    for name in ('xyz', 'rpy'):
+        given = origin.get(name, '0 0 0')
+        try:
+            numbers = [float(word) for word in given.split()]
+        except ValueError as problem:
+            raise ModelError(f'{label}: {name}="{given}", expected three numbers') from problem
+        unit = 'm' if name == 'xyz' else 'rad'
+        frozen_array(numbers, (3,), f'{label}: {name}', unit, ModelError, FARTHEST)
+
+
 def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any], str, str]:
     """Return the joints that lead from one link to another, and the two links."""
-    links = [link.name for link in model.robot.links]
+    links = {link.name: link for link in model.robot.links}
     above = {joint.child: joint for joint in model.robot.joints}
     parents = {joint.parent for joint in model.robot.joints}
     for joint in model.robot.joints:
@@ -189,7 +207,7 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
             if link not in links:
                 raise ModelError(
                     f'joint "{joint.name}": its {which} link "{link}" is not declared, expected '
-                    f'one of {links}'
+                    f'one of {list(links)}'
                 )
     if len(above) < len(model.robot.joints):
         raise ModelError('URDF: two joints lead to the same link, expected a tree of links')
@@ -199,7 +217,9 @@ def _between(model: Any, base: str | None, tool: str | None) -> tuple[list[Any],
         tool = _only([link for link in links if link not in parents], 'tool')
     for option, link in (('base', base), ('tool', tool)):
         if link not in links:
-            raise ModelError(f'--{option} {link}: no link of the URDF, expected one of {links}')
+            raise ModelError(
+                f'--{option} {link}: no link of the URDF, expected one of {list(links)}'
+            )
     joints: list[Any] = []
     link = tool
     while link != base:
@@ -228,12 +248,11 @@ def _only(links: list[str], option: str) -> str:
 
 
 def _axis(joint: Any) -> Array:
-    axis = np.asarray(joint.axis, dtype=np.float64)
-    length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
-    if not 1e-9 < length < math.inf:
-        raise ModelError(
-            f'joint "{joint.name}": axis {axis.tolist()}, expected three numbers, not all 0 [-]'
-        )
+    label = f'joint "{joint.name}": axis'
+    axis = frozen_array(joint.axis, (3,), label, '-', ModelError, FARTHEST)
+    length = float(np.linalg.norm(axis))
+    if not length > 1e-9:
+        raise ModelError(f'{label} {axis.tolist()}, expected three numbers, not all 0 [-]')
     return np.asarray(axis / length)
 
 
@@ -251,10 +270,8 @@ def _limits(joint: Any) -> tuple[float, float]:
     return limit.lower, limit.upper
 
 
-def _squared(T: Array, name: str) -> Array:
+def _squared(T: Array) -> Array:
     """Return the origin of a joint with angles that were meant to be right angles made right."""
-    if not np.isfinite(T).all():
-        raise ModelError(f'joint "{name}": origin with {T.tolist()}, expected finite numbers')
     angles = np.array(transformations.euler_from_matrix(T))
     right = 0.5 * np.pi * np.round(angles / (0.5 * np.pi))
     squared = np.array(transformations.euler_matrix(*_nearer(angles, right)))

@@ -2,15 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wearer from a file: a body, or an example message read as plain YAML, without ROS."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.body_file import load_body, scene_from_mapping
-from rrth_planner.errors import SceneError
-from rrth_planner.resources import load_yaml
+from rrth_planner.arrays import FARTHEST, frozen_array
+from rrth_planner.body_file import load_body, scene_from_mapping, SHORTEST
+from rrth_planner.entries import mapping, sequence, text, whole
+from rrth_planner.errors import one_line, SceneError, shown
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Scene
+from rrth_planner.text_files import load_yaml
 
 WEARER_HELP = 'the wearer, laid out as config/body.yaml, the default, or as msg_examples/body.yaml'
 # The frame of the example messages; there is no TF that knows another one.
@@ -18,6 +21,8 @@ BASE_FRAME = 'torso'
 # Of visualization_msgs/msg/Marker: the types that are boxes, and what may be done with them.
 CUBE, CUBE_LIST = 1, 6
 ADD, DELETE, DELETEALL = 0, 2, 3
+# A text that names a box is cut short beyond this [characters].
+LONGEST_TEXT = 100
 
 
 def load_wearer(path: str | Path | None = None) -> Scene:
@@ -43,63 +48,76 @@ def load_wearer(path: str | Path | None = None) -> Scene:
         return scene_from_mapping({'boxes': _boxes_after(data['markers'])})
     except SceneError as problem:
         raise SceneError(f'file {path}: {problem}') from problem
-    except (AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise SceneError(
-            f'file {path}: {problem!r}; expected markers as in msg_examples/body.yaml'
-        ) from problem
 
 
 def _boxes_after(markers: Any) -> list[dict[str, Any]]:
     """Return the boxes that all markers leave, one after the other, as the nodes take them."""
     parts: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for index, marker in enumerate(markers):
-        ns, action = marker.get('ns', ''), marker.get('action', ADD)
-        key = (ns, marker.get('id', 0))
+    for index, marker in enumerate(sequence(markers, 'markers', SceneError)):
+        label = f'marker {index}'
+        if not isinstance(marker, dict):
+            raise SceneError(
+                f'{label}: {shown(marker)}, expected markers as in msg_examples/body.yaml'
+            )
+        ns = text(marker.get('ns', ''), f'{label}: ns', SceneError)
+        action = whole(marker.get('action', ADD), f'{label}: action', SceneError)
+        key = (ns, whole(marker.get('id', 0), f'{label}: id', SceneError))
         if action == DELETEALL:
             parts = {k: boxes for k, boxes in parts.items() if ns not in ('', k[0])}
         elif action == DELETE:
             parts.pop(key, None)
         elif action == ADD:
-            parts[key] = _boxes(index, marker)
+            parts[key] = _boxes(label, marker)
         else:
             raise SceneError(
-                f'marker {index}: action {action}, expected 0 (ADD), 2 (DELETE) or 3 (DELETEALL)'
+                f'{label}: action {action}, expected 0 (ADD), 2 (DELETE) or 3 (DELETEALL)'
             )
     return [box for boxes in parts.values() for box in boxes]
 
 
-def _boxes(index: int, marker: Any) -> list[dict[str, Any]]:
+def _boxes(label: str, marker: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the box of a CUBE, or those of a CUBE_LIST, laid out as in `config/body.yaml`."""
-    name, kind = marker.get('text') or marker['ns'], marker.get('type')
+    name = text(marker.get('text', ''), f'{label}: text', SceneError) or marker.get('ns', '')
+    # As it is shown in RViz, a text may have lines.
+    name = one_line(name, LONGEST_TEXT)
+    label = f'{label} ("{name}")'
+    kind = whole(marker.get('type'), f'{label}: type', SceneError)
     if kind not in (CUBE, CUBE_LIST):
         raise SceneError(
-            f'marker {index} ("{name}"): type {kind}, expected {CUBE} (CUBE) or {CUBE_LIST} '
-            '(CUBE_LIST)'
+            f'{label}: type {kind}, expected {CUBE} (CUBE) or {CUBE_LIST} (CUBE_LIST)'
         )
-    frame = marker.get('header', {}).get('frame_id', '')
+    header = marker.get('header', {})
+    given = header.get('frame_id', '') if isinstance(header, dict) else header
+    frame = text(given, f'{label}: frame', SceneError)
     if frame not in ('', BASE_FRAME):
-        raise SceneError(
-            f'marker {index} ("{name}"): frame "{frame}", expected "{BASE_FRAME}" or an empty '
-            'frame'
-        )
-    pose = marker['pose']
-    box = {
-        'name': name,
-        'center': [pose['position'][axis] for axis in 'xyz'],
-        'size': [marker['scale'][axis] for axis in 'xyz'],
-        'quaternion_xyzw': [pose['orientation'][axis] for axis in 'xyzw'],
-    }
+        raise SceneError(f'{label}: frame "{frame}", expected "{BASE_FRAME}" or an empty frame')
+    pose = mapping(marker.get('pose'), f'{label}: pose', ('position', 'orientation'), SceneError)
+    center = _vector(pose['position'], 'xyz', f'{label}: position', 'm')
+    orientation = _vector(pose['orientation'], 'xyzw', f'{label}: orientation', '-')
+    size = _vector(marker.get('scale'), 'xyz', f'{label}: scale', 'm')
+    box = {'name': name, 'center': center, 'size': size, 'quaternion_xyzw': orientation}
     if kind == CUBE:
         return [box]
-    points = np.array([[point[axis] for axis in 'xyz'] for point in marker['points']], np.float64)
-    if len(points) == 0 or not any(box['quaternion_xyzw']):
+    points = [
+        _vector(point, 'xyz', f'{label}: points[{k}]', 'm')
+        for k, point in enumerate(sequence(marker.get('points'), f'{label}: points', SceneError))
+    ]
+    if not points or np.linalg.norm(orientation) < SHORTEST:
         raise SceneError(
-            f'marker {index} ("{name}"): {len(points)} points, orientation '
-            f'{box["quaternion_xyzw"]}, expected at least one [m], and not all 0 [-]'
+            f'{label}: {len(points)} points, orientation {orientation}, expected at least one '
+            '[m], and not all 0 [-]'
         )
     # The points are centres in the marker's own pose.
-    centers = box['center'] + points @ rotation_matrix(box['quaternion_xyzw']).T
+    centers = center + np.array(points) @ rotation_matrix(orientation).T
     return [
         {**box, 'name': f'{name}[{k}]', 'center': center}
         for k, center in enumerate(centers.tolist())
     ]
+
+
+def _vector(data: Any, axes: str, label: str, unit: str) -> list[float]:
+    """Return the components of a point, vector or quaternion of a message."""
+    given = mapping(data, label, axes, SceneError)
+    return frozen_array(
+        [given[axis] for axis in axes], (len(axes),), label, unit, SceneError, FARTHEST
+    ).tolist()

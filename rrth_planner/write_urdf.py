@@ -8,8 +8,9 @@ from pathlib import Path
 import sys
 
 from rrth_planner.errors import ModelError, RrthError
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.settings import load_settings
+from rrth_planner.text_files import load_yaml
 from rrth_planner.urdf import arm_to_urdf
 
 DESCRIPTION = """\
@@ -59,9 +60,9 @@ def urdf_of_file(
 
     """
     arm = load_arm(arm_file)
-    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name') or 'arm'
+    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
     speeds = load_settings(arm.dof, settings_file).limits.velocity
-    return arm_to_urdf(arm, speeds, radius, base_frame, str(name))
+    return arm_to_urdf(arm, speeds, radius, base_frame, name)
 
 
 def _write(path: Path, text: str) -> None:

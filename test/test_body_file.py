@@ -7,9 +7,10 @@ import pytest
 from rrth_planner.body_file import load_body, scene_from_mapping
 from rrth_planner.errors import OptionsError, RrthError, SceneError
 from rrth_planner.options import RRTOptions
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.settings import load_settings
+from rrth_planner.text_files import load_yaml
 
 GOOD = {'name': 'torso', 'center': [0.0, 0.0, 0.1], 'size': [0.3, 0.4, 0.6]}
 
@@ -33,11 +34,11 @@ def test_the_packaged_body_is_that_of_the_example_message():
         (None, 'expected a mapping with a list of boxes'),
         ({'boxes': []}, 'expected a mapping with a list of boxes'),
         ({'boxes': [5]}, 'box 0: 5, expected a mapping'),
-        ({'boxes': [GOOD, {'name': 'head'}]}, 'box 1: center, size missing'),
-        ({'boxes': [{**GOOD, 'colour': 'red'}]}, 'colour unknown'),
+        ({'boxes': [GOOD, {'name': 'head'}]}, 'box 1: no center, size, expected'),
+        ({'boxes': [{**GOOD, 'colour': 'red'}]}, 'box 0: colour, expected only'),
         ({'boxes': [{**GOOD, 'size': [0.1, 0.0, 0.1]}]}, 'lengths > 0'),
-        ({'boxes': [{**GOOD, 'quaternion_xyzw': 'up'}]}, 'expected four numbers'),
-        ({'boxes': [{**GOOD, 'quaternion_xyzw': [0, 0, 0]}]}, 'expected four numbers'),
+        ({'boxes': [{**GOOD, 'quaternion_xyzw': 'up'}]}, r'expected numbers of shape \(4\)'),
+        ({'boxes': [{**GOOD, 'quaternion_xyzw': [0, 0, 0]}]}, r'shape \(3,\), expected \(4\)'),
         ({'boxes': [{**GOOD, 'quaternion_xyzw': [0, 0, 0, 0]}]}, 'expected four numbers'),
     ],
 )

@@ -8,8 +8,8 @@ from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
 from rrth_planner.errors import RrthError, SceneError
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
-from rrth_planner.resources import load_yaml
 from rrth_planner.shortest import shortest_path
+from rrth_planner.text_files import load_yaml
 
 GATE = """
 name: gate
@@ -60,18 +60,23 @@ def test_a_map_without_walls_is_a_map(tmp_path):
         ('goal: [55, 20]', 'goal: [55, 20]\nwalls: []', 'walls unknown, expected only'),
         ('rectangles:', 'boxes: []\nrectangles:', 'rectangles and boxes, expected one of them'),
         ('rectangles:', 'rectangles: []\nboxes:', 'rectangles and boxes, expected one of them'),
-        ('25]', '25, 30]\n  - [1, 1, 2]', 'expected numbers laid out as in config/maps'),
-        ('[28, 0, 32, 25]', '[0, 0, 1, 1, 2, 2]\n  - [3, 3, 4, 4, 5, 5]', 'laid out as'),
+        ('25]', '25, 30]\n  - [1, 1, 2]', 'expected numbers of shape (n, 4) [map]'),
+        (
+            '[28, 0, 32, 25]',
+            '[0, 0, 1, 1, 2, 2]\n  - [3, 3, 4, 4, 5, 5]',
+            'shape (2, 6), expected (n, 4) [map]',
+        ),
         ('goal: [55, 20]\n', '', "no 'goal', expected bounds, rectangles or boxes"),
         ('bounds: [0, 0, 60, 40]\n', '', "no 'bounds', expected bounds, rectangles or boxes"),
         ('start: [5, 20]', 'start: [.nan, 20]', 'start: [nan, 20.0], expected finite numbers'),
         ('[28, 0, 32, 25]', '[28, .nan, 32, 25]', 'expected finite numbers'),
         ('[28, 0, 32, 25]', '[28, 0, .inf, 25]', 'expected finite numbers'),
-        ('[28, 0, 32, 25]', '[28, 0, 32]', 'expected numbers laid out as in config/maps'),
-        ('[28, 0, 32, 25]', '[28, 0, wide, 25]', 'expected numbers laid out as in config/maps'),
+        ('[28, 0, 32, 25]', '[28, 0, 32]', 'shape (1, 3), expected (n, 4) [map]'),
+        ('[28, 0, 32, 25]', '[28, 0, wide, 25]', 'expected numbers of shape (n, 4) [map]'),
         ('[0, 0, 60, 40]', '[60, 0, 0, 40]', 'expected lower < upper'),
-        ('[0, 0, 60, 40]', '[0, 0, 60]', 'expected numbers laid out as in config/maps'),
-        ('start: [5, 20]', 'start: here', 'expected numbers laid out as in config/maps'),
+        ('[0, 0, 60, 40]', '[0, 0, 60]', 'bounds: shape (3,), expected (4) [map]'),
+        ('0, 60, 40]', '0, 60, 1.1e4]', '[60.0, 11000.0]], expected numbers of at most 10000'),
+        ('start: [5, 20]', 'start: here', "start: 'here', expected numbers of shape (n) [map]"),
     ],
 )
 def test_a_bad_map_is_refused_in_one_sentence(tmp_path, old, new, told):

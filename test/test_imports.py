@@ -20,14 +20,11 @@ ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', '
 # What a module of the core may import beyond numpy and the standard library.
 OWN = {
     'fcl_shapes': {'fcl'},
-    'resources': {'yaml', 'ament_index_python'},
+    'resources': {'ament_index_python'},
     'text_files': {'yaml'},
     'cluster': {'tqdm', 'distributed'},
     'store': {'pyarrow'},
     'runs': {'numba'},
-    'incident_files': {'yaml'},
-    'arm_file': {'yaml'},
-    'motion_files': {'yaml'},
     'urdf_chain': {'yourdfpy', 'trimesh'},
     'quick_decoding': {'rosbags'},
     # Tools to look at motions, in the layers of ROS and of the viewers.
@@ -89,7 +86,7 @@ def allowed(module, name):
         return True
     return root in {
         'kernels': {'numba'},
-        'ros': {*ROS, 'yaml', 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
+        'ros': {*ROS, 'tqdm', root if root.endswith('_msgs') else 'rclpy'},
         'viewers': {'matplotlib', 'mpl_toolkits', 'viser'},
         'core': set(),
     }[layer] | OWN.get(module.split('.')[-1], set())

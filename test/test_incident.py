@@ -29,6 +29,7 @@ from rrth_planner.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOp
 from rrth_planner.question import PlanQuestion
 from rrth_planner.scene import Box, Scene
 from rrth_planner.takeover import MotionState, Takeover
+from rrth_planner.text_files import parse_yaml
 from rrth_planner.touch import Disagreement, Touch
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
@@ -37,6 +38,9 @@ import yaml
 ANY = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(min_value=5e-324, max_value=1e300)
 NEAR = st.floats(min_value=-1e4, max_value=1e4)
+# What may be printed: names, and sentences of one line.
+LINES = st.text(st.characters().filter(str.isprintable))
+NAMES = st.text(st.characters().filter(str.isprintable), min_size=1)
 
 
 def rows(n, element=ANY):
@@ -51,7 +55,7 @@ def trajectories(draw):
     steps = draw(st.lists(st.floats(1e-9, 1e3), min_size=n - 1, max_size=n - 1))
     return Trajectory(
         times=np.concatenate([[0.0], np.cumsum(steps)]),
-        positions=draw(rows(n)),
+        positions=draw(rows(n, NEAR)),
         velocities=draw(rows(n)),
         accelerations=draw(rows(n)),
     )
@@ -60,7 +64,7 @@ def trajectories(draw):
 @st.composite
 def boxes(draw):
     return Box(
-        draw(st.text()),
+        draw(NAMES),
         draw(st.tuples(NEAR, NEAR, NEAR)),
         draw(st.tuples(*[st.floats(5e-324, 1e4)] * 3)),
         np.eye(3)[list(draw(st.sampled_from([(0, 1, 2), (1, 2, 0), (2, 0, 1)])))],
@@ -89,26 +93,26 @@ def incidents(draw):
         options=draw(
             st.sampled_from([RRTHOptions(goal_bias=0.1 + 0.2), RRTStarSmartOptions(max_samples=7)])
         ),
-        margin=draw(st.floats(0.0, 1e300)),
-        ray_guard_length=draw(st.floats(0.0, 1e300)),
+        margin=draw(st.floats(0.0, 1e4)),
+        ray_guard_length=draw(st.floats(0.0, 1e4)),
         seed=draw(st.integers(0, 2**63)),
         moving=draw(st.sampled_from([None, moving])),
         escape_depth=draw(st.floats(0.0, 1.0)),
     )
     is_disagreement = draw(st.booleans())
-    touch = Touch(draw(ANY), draw(ANY), draw(st.text()), draw(st.text()))
+    touch = Touch(draw(ANY), draw(ANY), draw(NAMES), draw(NAMES))
     return Incident(
         kind=IncidentKind.DISAGREEMENT if is_disagreement else IncidentKind.ERROR,
-        sentence=draw(st.text()),
-        time=draw(st.text()),
+        sentence=draw(LINES),
+        time=draw(LINES),
         question=question,
         trajectory=draw(trajectories()) if is_disagreement else None,
         touch=touch if is_disagreement else None,
         present=draw(st.none() | scenes),
         escape_time=draw(st.floats(0.0, 9.0)),
-        error=draw(st.text()),
+        error=draw(LINES),
         traceback=draw(st.text()),
-        versions=draw(st.dictionaries(st.text(), st.text(), max_size=3)),
+        versions=draw(st.dictionaries(LINES, LINES, max_size=3)),
     )
 
 
@@ -125,7 +129,7 @@ def flat(value):
 @given(incidents())
 def test_an_incident_survives_its_file_to_the_bit(incident):
     mapping = incident_to_mapping(incident)
-    again = incident_from_mapping(yaml.safe_load(incident_to_yaml(incident)))
+    again = incident_from_mapping(parse_yaml(incident_to_yaml(incident), 'incident'))
     assert flat(incident_to_mapping(again)) == flat(mapping)
     for name in ('arm', 'limits', 'options'):
         assert type(getattr(again.question, name)) is type(getattr(incident.question, name))
@@ -199,7 +203,7 @@ def test_a_new_file_stays_when_the_clock_has_jumped_backwards(tmp_path):
 
 def changed(path, value):
     """Return the mapping of an incident with one entry replaced; `del`: left out."""
-    data = yaml.safe_load(incident_to_yaml(disagreement()))
+    data = parse_yaml(incident_to_yaml(disagreement()), 'incident')
     inner = data
     for key in path[:-1]:
         inner = inner[key]
@@ -224,7 +228,7 @@ del_ = object()
         (('question', 'seed'), -1, 'seed: -1, expected a whole number >= 0'),
         (('question', 'seed'), 'one', "seed: 'one', expected a whole number"),
         (('question', 'sed'), 1, 'question: sed, expected only arm'),
-        (('question', 'margin'), float('nan'), 'margin: nan, expected a length >= 0 [m]'),
+        (('question', 'margin'), float('nan'), 'margin: nan, expected a number [m]'),
         (('question', 'margin'), '2 cm', "margin: '2 cm', expected a number [m]"),
         (('question', 'q_start'), [0.0], 'q_start: shape (1,), expected (4) [rad]'),
         (('question', 'options', 'algorithm'), 'prm', "options: algorithm 'prm', expected one of"),
@@ -232,7 +236,7 @@ del_ = object()
         (('question', 'options', 'goal_bias'), 2.0, 'goal_bias: 2.0, expected 0 to 1'),
         (('question', 'arm', 'joint_names'), 'abcd', "arm: joint_names 'abcd', expected a list"),
         (('question', 'limits', 'jerk'), [1.0] * 3, 'max_jerk: shape (3,), expected (4)'),
-        (('question', 'scene', 'boxes'), 7, 'scene: boxes 7, expected a list'),
+        (('question', 'scene', 'boxes'), 7, 'scene: boxes: 7, expected a list'),
         (('question', 'scene', 'boxes'), [7], 'scene: box 0: 7, expected a mapping'),
         (('question', 'moving'), {}, 'moving: no state, running, time, expected'),
         (('trajectory',), None, 'incident: a disagreement without trajectory and touch'),

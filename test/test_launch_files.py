@@ -10,7 +10,8 @@ from types import ModuleType
 from xml.etree import ElementTree
 
 import pytest
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
+from rrth_planner.text_files import load_yaml
 import yaml
 
 ROOT = Path(__file__).parent.parent

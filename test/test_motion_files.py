@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rrth_planner.errors import RecordError, RrthError
 from rrth_planner.motion_files import JointMotion, motion_of, read_motion, sampled, write_motion
-from rrth_planner.resources import load_yaml
+from rrth_planner.text_files import load_yaml
 from rrth_planner.trajectory import positions_at, Trajectory
 import worlds
 
@@ -85,8 +85,8 @@ def test_an_arm_names_its_joints_and_units():
 
 BAD = {
     'a.txt': ('', 'ends in .yaml or .csv'),
-    'a.yaml': ('joint_names: [a]\n', 'expected a motion'),
-    'b.yaml': ('5', 'expected a motion'),
+    'a.yaml': ('joint_names: [a]\n', 'motion: no units, points, expected joint_names'),
+    'b.yaml': ('5', 'motion: 5, expected a mapping'),
     'c.yaml': ('{joint_names: [a], units: [rad], points: []}', 'expected'),
     'd.yaml': (
         '{joint_names: [a], units: [rad], points: '
@@ -94,15 +94,15 @@ BAD = {
         'from 0',
     ),
     'e.yaml': ('a: [', 'readable YAML'),
-    'a.csv': ('', 'expected a motion'),
+    'a.csv': ('', 'columns'),
     'b.csv': ('time [s],a position [rad],a acceleration [x],a speed\n0,1,2,3\n', 'columns'),
     'c.csv': (
         'time [s],a position [rad],a velocity [rad/s],a acceleration [rad/s^2]\n0,1,x,3\n',
-        'expected a motion',
+        'expected numbers',
     ),
     'd.csv': (
         'time [s],a position [rad],a velocity [rad/s],a acceleration [rad/s^2]\n0,1,2\n',
-        'expected a motion',
+        'expected 4 numbers in each',
     ),
 }
 

@@ -17,7 +17,7 @@ from rrth_planner.inspection import inspect_motion  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
 from rrth_planner.oracle import first_contact  # noqa: E402
 from rrth_planner.pipeline import plan_motion  # noqa: E402
-from rrth_planner.resources import load_arm, load_yaml, resource_path  # noqa: E402
+from rrth_planner.resources import load_arm, resource_path  # noqa: E402
 from rrth_planner.ros.message_files import message_from_file  # noqa: E402
 from rrth_planner.ros.messages import (  # noqa: E402
     configuration_from_msg,
@@ -25,6 +25,7 @@ from rrth_planner.ros.messages import (  # noqa: E402
     scene_of,
     WearerBody,
 )
+from rrth_planner.text_files import load_yaml
 from rrth_planner.trajectory import MotionLimits  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
@@ -152,7 +153,19 @@ def test_every_target_can_be_pointed_at_from_the_folded_state(body, target):
 
 @pytest.mark.parametrize(
     'text',
-    ['point: {x: far}', 'point: 3.0', 'ponit: {x: 1.0}', '[1, 2]', 'point: {x: [1.0]}', ': {'],
+    [
+        *(
+            'point: {x: far}',
+            'point: 3.0',
+            'ponit: {x: 1.0}',
+            '[1, 2]',
+            'point: {x: [1.0]}',
+            ': {',
+        ),
+        *('point: {x: true}', 'point: {x: "1"}', 'point: {x: 2001-01-01}', 'point: &a {x: 1.0}'),
+        *('header: {stamp: {sec: 1.5}}', 'header: {stamp: {sec: 2147483648}}', '', 'header: 7'),
+        *('header: {stamp: {nanosec: -1}}', 'header: {frame_id: 7}', 'header: {frame_id: [a]}'),
+    ],
 )
 def test_a_file_that_does_not_fit_its_message_is_named(tmp_path, text):
     path = tmp_path / 'odd.yaml'

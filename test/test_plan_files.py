@@ -14,7 +14,8 @@ from rrth_planner.arm import pointing_error
 from rrth_planner.body_file import load_body
 from rrth_planner.motion_files import read_motion
 from rrth_planner.oracle import first_contact
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.text_files import load_yaml
 from rrth_planner.trajectory import positions_at
 
 TARGET = ['--target', '1.5', '0.8', '0.6']

@@ -20,9 +20,10 @@ from rrth_planner.options import (
 )
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
 from rrth_planner.shortest import shortest_path
 from rrth_planner.status import PlanStatus
+from rrth_planner.text_files import load_yaml
 from rrth_planner.world import arm_world
 import worlds
 

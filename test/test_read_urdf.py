@@ -208,9 +208,9 @@ CHAINS = {
 TEXTS = {
     'a xacro file': '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro/></robot>',
     'no URDF': '<sdf version="1.9"/>',
-    'no URDF (.*': 'joints: [1, 2]\n',
+    'readable XML (.*': 'joints: [1, 2]\n',
     'no URDF [(].*': '<robot name="a"><link name="b"/><joint name="c" type="revolute"/></robot>',
-    'no URDF [(].*[)]': '',
+    'readable XML [(].*[)]': '',
     'expected one: give --base': '<robot name="a"/>',
     **{words: urdf(joints) for words, joints in CHAINS.items()},
 }

@@ -230,7 +230,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         ('', 'incident: None, expected a mapping'),
         ('format: 9', 'format: 9, expected 1'),
         ('\x00', 'expected a readable YAML file'),
-        ('[' * 5000, 'nested too deeply'),
+        ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],
 )
 def test_a_bad_file_is_refused_in_one_sentence(capsys, tmp_path, content, sentence):

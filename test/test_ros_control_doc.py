@@ -7,7 +7,8 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.text_files import load_yaml
 import yaml
 
 TEXT = (Path(__file__).parent.parent / 'docs' / 'ros_control.md').read_text(encoding='utf-8')

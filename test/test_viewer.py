@@ -143,8 +143,12 @@ def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
         (['--ros-args', '-r', '__ns:=/a'], 'expected only with --live'),
         (['--set', 'speed=3'], 'speed: no parameter'),
         (['--set', 'speed'], 'expected NAME=VALUE'),
+        (['--set', 'dof=4'], 'dof: no parameter'),
+        (['--set', 'margin=[0.1]'], 'margin: [0.1], expected a number [m]'),
+        (['--set', 'margin="1"'], "margin: '1', expected a number [m]"),
+        (['--set', 'margin=*a'], '--set margin: line 1: '),
         (['--target', 'nan', '0', '0'], 'target'),
-        (['--body', str(file)], 'expected markers'),
+        (['--body', str(file)], 'markers: 5, expected a list'),
     ):
         assert main([*arguments, '--no-open']) == 1
         said = capsys.readouterr().err

@@ -84,7 +84,7 @@ def test_a_file_that_is_neither_is_named(tmp_path):
         load_wearer(resource_path('msg_examples/body_bad.yaml'))
     file = tmp_path / 'body.yaml'
     file.write_text('markers: 5\n')
-    with pytest.raises(SceneError, match='expected markers'):
+    with pytest.raises(SceneError, match='markers: 5, expected a list'):
         load_wearer(file)
     file.write_text('head: ' + 'long ' * 500)
     with pytest.raises(SceneError, match='expected a mapping with a list of boxes') as refusal:

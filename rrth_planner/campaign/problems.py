@@ -17,10 +17,11 @@ from rrth_planner.goal import PointingGoal
 from rrth_planner.map_file import load_map
 from rrth_planner.oracle import first_contact
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.rotation import rotation_matrix
 from rrth_planner.scene import Box, Scene
 from rrth_planner.shortest import enters, extended_obstacles
+from rrth_planner.text_files import load_yaml
 from rrth_planner.world import arm_world, World
 
 CERTIFIED = 'certified'

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rrth_planner.body_file import scene_from_mapping
 from rrth_planner.errors import MessageError, SceneError
-from rrth_planner.resources import load_yaml
-from rrth_planner.ros.message_files import message_from_file
+from rrth_planner.ros.message_files import message_from_mapping
 from rrth_planner.rotation import quaternion_xyzw
 from rrth_planner.scene import Scene
+from rrth_planner.text_files import load_yaml
 from visualization_msgs.msg import Marker, MarkerArray
 
 COLOR = (0.85, 0.65, 0.55, 0.8)
@@ -50,14 +50,15 @@ def body_from_file(path: str | Path, frame: str) -> MarkerArray:
 
     """
     data = load_yaml(path)
-    if isinstance(data, Mapping) and 'markers' in data:
-        return message_from_file(path, MarkerArray)
-    if not isinstance(data, Mapping) or 'boxes' not in data:
+    is_message = isinstance(data, Mapping) and 'markers' in data
+    if not is_message and not (isinstance(data, Mapping) and 'boxes' in data):
         raise MessageError(
             f'file {path}: no body, expected a list of boxes (as config/body.yaml) or of markers '
             '(as msg_examples/body.yaml)'
         )
     try:
+        if is_message:
+            return message_from_mapping(data, MarkerArray)
         return body_to_msg(scene_from_mapping(data), frame)
-    except SceneError as problem:
-        raise SceneError(f'file {path}: {problem}') from problem
+    except (MessageError, SceneError) as problem:
+        raise type(problem)(f'file {path}: {problem}') from problem

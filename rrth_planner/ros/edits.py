@@ -15,12 +15,13 @@ from rrth_planner.kernels.layout import NUMBERS
 from rrth_planner.ros.fields import seconds_of, triple_of, unit_quaternion_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
 from rrth_planner.scene import Box
+from rrth_planner.wearer_file import LONGEST_TEXT
 from visualization_msgs.msg import Marker, MarkerArray
 
 # More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.
 MOST_BOXES = 10000
-# A body is kept, and so are its names [characters]; longer texts are cut short.
-LONGEST_NAMESPACE, LONGEST_NAME = 256, 100
+# A body is kept, and so are its names [characters].
+LONGEST_NAMESPACE = 256
 
 Key = tuple[str, int]
 
@@ -108,7 +109,7 @@ def read_edits(
 def marker_name(marker: Any) -> str:
     """Return what sentences call a marker: its text, or `ns/id` where it has none."""
     name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
-    return one_line(name, LONGEST_NAME)
+    return one_line(name, LONGEST_TEXT)
 
 
 class _Reading:

@@ -8,13 +8,21 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rosidl_parser.definition import (  # type: ignore[import-untyped]
+    AbstractGenericString,
     AbstractNestedType,
     NamespacedType,
 )
-from rrth_planner.errors import MessageError
-from rrth_planner.resources import load_yaml
+from rrth_planner.entries import sequence, text, whole
+from rrth_planner.errors import MessageError, shown
+from rrth_planner.text_files import load_yaml
 
 Message = TypeVar('Message')
+# Of the integers of messages; rclpy itself takes any, and fails when it sends them.
+BITS = (8, 16, 32, 64)
+RANGES = {
+    **{f'int{n}': (-(2 ** (n - 1)), 2 ** (n - 1) - 1) for n in BITS},
+    **{f'uint{n}': (0, 2**n - 1) for n in BITS},
+}
 
 
 def message_from_file(path: str | Path, message_type: type[Message]) -> Message:
@@ -27,32 +35,56 @@ def message_from_file(path: str | Path, message_type: type[Message]) -> Message:
         The file cannot be read, or does not fit the message.
 
     """
-    message = message_type()
+    data = load_yaml(path)
     try:
-        _fill(message, load_yaml(path))
-    except (AssertionError, AttributeError, KeyError, TypeError, ValueError) as problem:
-        raise MessageError(
-            f'file {path}: {problem}; expected fields of {message_type.__name__}'
-        ) from problem
+        return message_from_mapping(data, message_type)
+    except MessageError as problem:
+        raise MessageError(f'file {path}: {problem}') from problem
+
+
+def message_from_mapping(data: Any, message_type: type[Message]) -> Message:
+    """Return the message whose fields a mapping holds, or raise MessageError."""
+    message = message_type()
+    _fill(message, data, '')
     return message
 
 
-def _fill(message: Any, values: Mapping[str, Any]) -> None:
+def _fill(message: Any, values: Any, name: str) -> None:
     types = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
-    for name, value in values.items():
-        kind, present = types[name], getattr(message, name)
-        if isinstance(kind, NamespacedType):
-            _fill(present, value)
-        elif isinstance(kind, AbstractNestedType):
-            setattr(message, name, [_element(kind.value_type, item) for item in value])
-        else:
-            setattr(message, name, type(present)(value))
+    kind = type(message).__name__
+    if not isinstance(values, Mapping):
+        raise MessageError(f'{name or kind}: {shown(values)}, expected fields of {kind}')
+    for key, value in values.items():
+        if key not in types:
+            raise MessageError(
+                f'{name or kind}: {key}, expected fields of {kind}: {", ".join(types)}'
+            )
+        setattr(message, key, _value(types[key], value, f'{name}.{key}' if name else key))
 
 
-def _element(kind: Any, value: Any) -> Any:
-    """Return an element of an array: a message, or a value as it is."""
-    if not isinstance(kind, NamespacedType):
+def _value(kind: Any, value: Any, name: str) -> Any:
+    """Return the value of a field or an element of one: of its type, or raise MessageError."""
+    if isinstance(kind, NamespacedType):
+        message = getattr(import_module('.'.join(kind.namespaces)), kind.name)()
+        _fill(message, value, name)
+        return message
+    if isinstance(kind, AbstractNestedType):
+        return [
+            _value(kind.value_type, item, f'{name}[{i}]')
+            for i, item in enumerate(sequence(value, name, MessageError))
+        ]
+    if isinstance(kind, AbstractGenericString):
+        return text(value, name, MessageError)
+    if kind.typename == 'boolean':
+        if not isinstance(value, bool):
+            raise MessageError(f'{name}: {shown(value)}, expected true or false')
         return value
-    message = getattr(import_module('.'.join(kind.namespaces)), kind.name)()
-    _fill(message, value)
-    return message
+    if kind.typename in ('float', 'double'):
+        # What is no number at all may be sent too, to see it refused.
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise MessageError(f'{name}: {shown(value)}, expected a number')
+        return float(value)
+    low, high = RANGES[kind.typename]
+    if not low <= whole(value, name, MessageError) <= high:
+        raise MessageError(f'{name}: {value}, expected a {kind.typename} from {low} to {high}')
+    return value

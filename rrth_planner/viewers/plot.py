@@ -16,8 +16,9 @@ from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.pipeline import plan_motion, warm_up
 from rrth_planner.recording import section
-from rrth_planner.resources import load_arm, load_yaml, resource_path
+from rrth_planner.resources import load_arm, resource_path
 from rrth_planner.settings import load_settings, PlanSettings
+from rrth_planner.text_files import load_yaml
 from rrth_planner.viewers.plots import Motion, motion_figure
 from rrth_planner.viewers.recording_figure import recording_figure
 from rrth_planner.wearer_file import load_wearer, WEARER_HELP
@@ -105,7 +106,8 @@ def _draw_recording(options: argparse.Namespace) -> Figure:
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
     for topic, sentence in reader.refused.items():
-        print(f'plot: {topic}: bad messages are left out: {sentence}', file=sys.stderr)
+        said = one_line(f'plot: {topic}: bad messages are left out: {sentence}')
+        print(said, file=sys.stderr)
     if options.begin is not None or options.end is not None:
         last = float(recording.times[-1])
         begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)

@@ -3,7 +3,6 @@
 """The viewer in the browser: plan by dragging the target, or follow the nodes that run."""
 
 import argparse
-from ast import literal_eval
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
@@ -24,6 +23,7 @@ from rrth_planner.pipeline import warm_up
 from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import load_arm
 from rrth_planner.settings import load_settings
+from rrth_planner.text_files import parse_yaml
 from rrth_planner.viewers.viewer_examples import example_target, start_of
 from rrth_planner.viewers.viewer_picture import save_picture
 from rrth_planner.wearer_file import load_wearer, WEARER_HELP
@@ -150,13 +150,7 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
 
 def _question(options: argparse.Namespace) -> PlanQuestion:
     arm = load_arm(options.arm)
-    try:
-        settings = load_settings(arm.dof, options.settings, **_changes(options.set))
-    except (TypeError, ValueError) as problem:
-        raise OptionsError(
-            f'--settings {options.settings}, --set {options.set}: {problem}; expected values as '
-            'in config/planner.yaml'
-        ) from problem
+    settings = load_settings(arm.dof, options.settings, **_changes(options.set))
     target = example_target('front') if options.target is None else options.target
     return PlanQuestion(
         arm=arm,
@@ -179,11 +173,7 @@ def _changes(given: Sequence[str]) -> dict[str, Any]:
         name, sign, value = text.partition('=')
         if not sign:
             raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
-        try:
-            changes[name] = literal_eval(value)
-        except (SyntaxError, ValueError):
-            # Words are names, of an algorithm say.
-            changes[name] = value
+        changes[name] = parse_yaml(value, f'--set {name}')
     return changes
 
 

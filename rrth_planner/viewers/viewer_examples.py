@@ -7,8 +7,9 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import RrthError, SceneError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.resources import load_yaml, resource_path
+from rrth_planner.resources import resource_path
 from rrth_planner.scene import Scene
+from rrth_planner.text_files import load_yaml
 from rrth_planner.wearer_file import load_wearer
 
 BODIES = ('body', 'body_arm_raised')

@@ -16,11 +16,11 @@ from worlds import examples, random_boxes, random_rotation
 SEEDS = st.integers(0, 2**32 - 1)
 WRONG = [
     ('center', 0, np.nan, 'finite'),
-    ('center', 2, 1e5, 'lengths up to 10000'),
+    ('center', 2, 1e5, 'numbers of at most 10000'),
     ('size', 1, 0.0, 'lengths > 0'),
     ('size', 2, -1.0, 'lengths > 0'),
     ('size', 0, np.inf, 'finite'),
-    ('size', 0, 2e4, 'lengths up to 10000'),
+    ('size', 0, 2e4, 'numbers of at most 10000'),
     ('rotation', (0, 0), 0.5, 'rotation matrix'),
     ('rotation', (1, 1), np.nan, 'finite'),
     ('rotation', slice(None), -np.eye(3), 'rotation matrix'),

@@ -141,8 +141,8 @@ BAD_MARKERS = [
     (change('scale.x', NAN), r'scale: .*expected finite numbers \[m\]'),
     (change('scale.x', 0.0), r'scale: \[0.0, .*expected three lengths > 0 \[m\]'),
     (change('scale.z', -0.1), r'expected three lengths > 0 \[m\]'),
-    (change('scale.y', 1e5), r'expected lengths up to 10000 \[m\]'),
-    (change('pose.position.y', 1e5), r'expected lengths up to 10000 \[m\]'),
+    (change('scale.y', 1e5), r'expected numbers of at most 10000 \[m\]'),
+    (change('pose.position.y', 1e5), r'expected numbers of at most 10000 \[m\]'),
     (change('pose.orientation.w', 0.0), r'of length 0, expected a quaternion'),
     (change('pose.orientation.w', 1.1), r'of length 1.1, expected a quaternion'),
     (change('pose.orientation.w', NAN), r'pose.orientation: .*expected finite numbers'),
@@ -226,7 +226,7 @@ def test_any_markers_leave_what_a_dictionary_would(arrays):
     ('msg', 'sentence'),
     [
         (target(NAN), r'point: \[nan, 0.1, 0.3\], expected finite numbers \[m\]'),
-        (target(1e6), r'expected coordinates up to 10000 \[m\]'),
+        (target(1e6), r'expected numbers of at most 10000 \[m\]'),
     ],
 )
 def test_a_bad_target_is_refused(msg, sentence):

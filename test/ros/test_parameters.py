@@ -12,13 +12,14 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.errors import ModelError, OptionsError  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
-from rrth_planner.resources import load_arm, load_yaml, resource_path  # noqa: E402
+from rrth_planner.resources import load_arm, resource_path  # noqa: E402
 from rrth_planner.ros.declaring import ARM  # noqa: E402
 from rrth_planner.ros.parameters import (  # noqa: E402
     current_parameters,
     declare_parameters,
     declared,
 )
+from rrth_planner.text_files import load_yaml
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NAN = float('nan')
@@ -91,7 +92,7 @@ def test_a_change_is_there_for_the_next_plan(started):
         ('seed', -2, 'seed out of range'),
         ('step_size', 0.0, 'step_size out of range'),
         ('max_velocity', [1.0, 2.0], 'max_velocity: [1.0, 2.0], expected 4 values, or one'),
-        ('max_velocity', [NAN], 'max_velocity: [nan], expected 4 values'),
+        ('max_velocity', [NAN], 'max_velocity: [nan], expected finite numbers [rad/s]'),
         ('max_acceleration', [0.0] * 4, '1e+06 [rad/s^2]'),
         ('max_jerk', [-1.0], '[rad/s^3]'),
         ('algorithm', 'prm', 'algorithm: "prm", expected one that is available: rrt_h, rrt,'),

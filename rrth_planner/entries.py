@@ -1,0 +1,88 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Entries of what a file says: each of the one type that it is of, or refused in a sentence."""
+
+from collections.abc import Collection, Mapping
+import sys
+from typing import Any
+
+from rrth_planner.errors import RrthError, shown
+
+# Of what messages and pictures call things [characters].
+LONGEST_NAME = 256
+
+
+def mapping(
+    value: Any,
+    name: str,
+    wanted: Collection[str],
+    error: type[RrthError],
+    optional: Collection[str] = (),
+) -> dict[str, Any]:
+    """
+    Return a mapping that has all entries that are wanted, maybe optional ones, and no others.
+
+    Parameters
+    ----------
+    value : Any
+        What was given.
+    name : str
+        How sentences call it, as of the functions below.
+    wanted, optional : collection of str
+    error : type
+        Raised for anything else.
+
+    """
+    if not isinstance(value, Mapping):
+        raise error(f'{name}: {shown(value)}, expected a mapping with {", ".join(wanted)}')
+    missing = [key for key in wanted if key not in value]
+    if missing:
+        raise error(f'{name}: no {", ".join(missing)}, expected {", ".join(wanted)}')
+    known = [*wanted, *optional]
+    # One under a name that nobody reads, a misspelt radius say, would be overlooked.
+    unknown = [str(key) for key in value if key not in known]
+    if unknown:
+        raise error(f'{name}: {", ".join(unknown)}, expected only {", ".join(known)}')
+    return dict(value)
+
+
+def sequence(value: Any, name: str, error: type[RrthError]) -> list[Any]:
+    """Return a list, or raise."""
+    if not isinstance(value, list):
+        raise error(f'{name}: {shown(value)}, expected a list')
+    return value
+
+
+def number(value: Any, name: str, unit: str, error: type[RrthError]) -> float:
+    """Return a finite number, or raise: true, and "1", are none."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not abs(value) <= sys.float_info.max:
+        raise error(f'{name}: {shown(value)}, expected a number [{unit}]')
+    return float(value)
+
+
+def whole(value: Any, name: str, error: type[RrthError]) -> int:
+    """Return a whole number, or raise."""
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise error(f'{name}: {shown(value)}, expected a whole number')
+    return value
+
+
+def text(value: Any, name: str, error: type[RrthError]) -> str:
+    """Return a text, or raise."""
+    if not isinstance(value, str):
+        raise error(f'{name}: {shown(value)}, expected a text')
+    return value
+
+
+def printable(value: Any, name: str, error: type[RrthError]) -> str:
+    """
+    Return a name, which sentences may quote, or raise.
+
+    Line ends, escape sequences of terminals and marks that turn the direction of writing round
+    are not printable.
+    """
+    given = text(value, name, error)
+    if not 0 < len(given) <= LONGEST_NAME or not given.isprintable():
+        raise error(f'{name}: {shown(given)}, expected 1 to {LONGEST_NAME} printable characters')
+    return given
