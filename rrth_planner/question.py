@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import OptionsError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import TreeOptions
@@ -30,12 +30,12 @@ class PlanQuestion:
     limits : MotionLimits
     options : TreeOptions
     margin, ray_guard_length : float
-        >= 0 [m].
+        From 0 to 1e4 [m].
     seed : int
         >= 0.
     moving : Takeover or None
     escape_depth : float
-        >= 0 [m].
+        From 0 to 1e4 [m].
 
     Raises
     ------
@@ -71,8 +71,10 @@ class PlanQuestion:
                 raise OptionsError(f'{name}: of {width} joints, expected those of the arm, {dof}')
         for name in ('margin', 'ray_guard_length', 'escape_depth'):
             value = getattr(self, name)
-            if not 0.0 <= value < float('inf'):
-                raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
+            if not 0.0 <= value <= FARTHEST:
+                raise OptionsError(
+                    f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]'
+                )
         if self.seed < 0:
             raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
 

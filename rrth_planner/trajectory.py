@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
 
 # A point so near to a cut gives way to it [s]: in a shorter piece the last digit of a position is
@@ -46,13 +46,14 @@ class MotionLimits:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        dof = np.size(self.velocity)
+        dof: int | None = None
         for name, unit in (
             ('velocity', 'rad/s'),
             ('acceleration', 'rad/s^2'),
             ('jerk', 'rad/s^3'),
         ):
             value = frozen_array(getattr(self, name), (dof,), f'max_{name}', unit, OptionsError)
+            dof = len(value)
             if not (value > 0.0).all():
                 raise OptionsError(
                     f'max_{name}: {value.tolist()}, expected a value > 0 for every joint [{unit}]'
@@ -75,7 +76,8 @@ class Trajectory:
     Raises
     ------
     RrthError
-        Shapes that differ, numbers that are not finite, times that do not increase.
+        Shapes that differ, numbers that are not finite, positions beyond 1e4, times that do not
+        increase.
 
     """
 
@@ -92,19 +94,23 @@ class Trajectory:
 
     def _sound(self) -> list[Array] | None:
         """Return copies of all fields where nothing is wrong with them: a brake waits for it."""
-        try:
-            fields = [
-                np.array(getattr(self, name), dtype=np.float64, order='C') for name in _FIELDS
-            ]
-        except (TypeError, ValueError):
+        given = [getattr(self, name) for name in _FIELDS]
+        # Of what else may be given, true and "1" would become numbers.
+        if not all(type(value) is np.ndarray and value.dtype == np.float64 for value in given):
             return None
+        fields = [np.array(value, order='C') for value in given]
         times, *rows = fields
         shape = rows[0].shape
         fits = len(shape) == 2 and times.shape == shape[:1] and shape[0] > 0
         if not fits or any(row.shape != shape for row in rows) or times[0] != 0.0:
             return None
-        is_sound = all(map(_are_all, (*map(np.isfinite, fields), times[:-1] < times[1:])))
-        return fields if is_sound else None
+        positions, *others = rows
+        is_sound = (
+            times[:-1] < times[1:],
+            np.abs(positions) <= FARTHEST,
+            *map(np.isfinite, (times, *others)),
+        )
+        return fields if all(map(_are_all, is_sound)) else None
 
     def _checked(self) -> list[Array]:
         """Return copies of all fields, or raise RrthError for the first that is wrong."""
@@ -113,9 +119,13 @@ class Trajectory:
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
         fields: list[Array] = [times]
         dof: int | None = None
-        for name, unit in zip(_FIELDS[1:], ('rad', 'rad/s', 'rad/s^2'), strict=True):
+        for name, unit, largest in (
+            ('positions', 'rad', FARTHEST),
+            ('velocities', 'rad/s', np.inf),
+            ('accelerations', 'rad/s^2', np.inf),
+        ):
             shape = (len(times), dof)
-            value = frozen_array(getattr(self, name), shape, name, unit, RrthError)
+            value = frozen_array(getattr(self, name), shape, name, unit, RrthError, largest)
             fields.append(value)
             dof = value.shape[1]
         return fields

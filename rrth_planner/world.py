@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, FARTHEST
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
 from rrth_planner.kernels import arm_clearance, arm_validity, chain, contacts, jit
@@ -140,12 +140,12 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     Raises
     ------
     OptionsError
-        A margin or a guard length that is negative or no number.
+        A margin or a guard length that is negative, no number or beyond 1e4 m.
 
     """
     for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):
-        if not 0.0 <= value < np.inf:
-            raise OptionsError(f'{name}: {value}, expected a length >= 0 [m]')
+        if not 0.0 <= value <= FARTHEST:
+            raise OptionsError(f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]')
     robot, compiled_chain = arm_rows(arm, ray_guard_length)
     obstacles, lanes = pack_boxes(_box_rows(arm, scene, margin))
     return World(

@@ -3,14 +3,16 @@
 """Values refuse what describes nothing, in one sentence, and cannot be changed."""
 
 from dataclasses import FrozenInstanceError
+import warnings
 
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.arm import arm_from_mapping
-from rrth_planner.arrays import frozen_array
+from rrth_planner.arm import arm_from_mapping, ArmModel, forward_kinematics
+from rrth_planner.arrays import FARTHEST, frozen_array
 from rrth_planner.errors import ModelError, OptionsError, RrthError, SceneError
 from rrth_planner.goal import PointingGoal
+from rrth_planner.kernels import arm_validity
 from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -54,8 +56,8 @@ def changed(*path, value):
         (('joints', 0), 'joint_1', []),
         (('joints', 1, 'name'), 'joint_1', ['joint_1']),
         (('joints', 1, 'type'), 'spherical', ['joint_2', 'spherical', 'revolute or prismatic']),
-        (('joints', 1, 'alpha'), float('nan'), ['dh', 'nan']),
-        (('joints', 1, 'd'), float('inf'), ['dh', 'inf']),
+        (('joints', 1, 'alpha'), float('nan'), ['joint_2', 'alpha', 'nan', '[rad]']),
+        (('joints', 1, 'd'), float('inf'), ['joint_2', 'd', 'inf', '[m]']),
         (('joints', 1, 'a'), 'long', []),
         (('joints', 1, 'lower'), 0.5, ['bounds', '0.5', 'lower < upper']),
         (('joints', 1, 'upper'), -np.pi, ['bounds']),
@@ -73,6 +75,121 @@ def changed(*path, value):
 )
 def test_a_bad_arm_is_refused(path, value, words):
     refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
+
+
+@pytest.mark.parametrize(
+    ('path', 'value', 'words'),
+    [
+        (('joints', 1, 'alpha'), 1.1e4, ['dh', '11000', 'at most 10000', '[rad and m]']),
+        (('joints', 1, 'offset'), -1e300, ['dh', 'at most 10000']),
+        (('joints', 1, 'a'), -1.1e4, ['dh', '-11000', 'at most 10000']),
+        (('joints', 1, 'd'), 1e308, ['dh', 'at most 10000']),
+        (('joints', 1, 'lower'), -1.1e4, ['bounds', 'at most 10000', '[rad or m]']),
+        (('joints', 1, 'upper'), 1e300, ['bounds', 'at most 10000']),
+        (('joints', 1, 'radius'), 1e5, ['radii', 'at most 10000', '[m]']),
+        (('mount', 'position'), [0.0, 0.0, 1e5], ['T_base_mount', 'at most 10000']),
+        (('mount', 'quaternion_xyzw'), [0.0, 0.0, 0.0, 1e200], ['quaternion', 'at most 10000']),
+        (('mount', 'position'), [0.0, 0.0, 9999.7], ['arm: 10000.2', 'at most 10000 [m]']),
+        (('joints', 2, 'a'), 9999.5, ['arm: 10000.5', 'at most 10000 [m]']),
+        (('joints', 2, 'radius'), 9999.5, ['arm: 10000.5', 'at most 10000 [m]']),
+    ],
+)
+def test_an_arm_of_which_rounding_cannot_be_bounded_is_refused(path, value, words):
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
+
+
+@examples(200)
+@given(st.data())
+def test_no_point_of_an_arm_is_farther_than_proofs_allow_for(data):
+    length = st.floats(-4e3, 4e3)
+    dof = data.draw(st.integers(1, 4))
+    angles = data.draw(st.lists(st.floats(-9.0, 9.0), min_size=2 * dof, max_size=2 * dof))
+    lengths = data.draw(st.lists(length, min_size=2 * dof + 3, max_size=2 * dof + 3))
+    slides = data.draw(st.lists(st.booleans(), min_size=dof, max_size=dof))
+    ends = data.draw(st.lists(st.floats(0.1, 4e3), min_size=dof, max_size=dof))
+    mount = np.eye(4)
+    mount[:3, 3] = lengths[:3]
+    dh = np.zeros((dof + 1, 4))
+    dh[:-1, [0, 2]], dh[:-1, [1, 3]] = (
+        np.reshape(angles, (-1, 2)),
+        np.reshape(lengths[3:], (-1, 2)),
+    )
+    try:
+        arm = ArmModel(
+            joint_names=tuple('abcd'[:dof]),
+            is_prismatic=tuple(slides),
+            dh=dh,
+            bounds=np.array([np.negative(ends), ends]),
+            radii=np.zeros(dof + 1),
+            T_base_mount=mount,
+        )
+    except ModelError as problem:
+        assert 'expected at most 10000 [m]' in str(problem)
+        return
+    share = data.draw(st.lists(st.floats(-1.0, 1.0), min_size=dof, max_size=dof))
+    poses = forward_kinematics(arm, np.multiply(share, ends))
+    assert np.abs(poses[:, :3, 3]).max() <= FARTHEST * (1.0 + 1e-9)
+
+
+def test_what_is_refused_is_what_the_proofs_do_not_cover():
+    assert arm_validity.LARGEST == FARTHEST
+
+
+@pytest.mark.parametrize('value', [1.1e4, 1e103, 1e300, -0.1, float('nan')])
+def test_a_margin_or_ray_that_no_box_has_room_for_is_refused(value):
+    # Round many boxes a margin beyond 1e102 would overflow, and its boxes be passed over.
+    for margin, ray in ((value, 1.0), (0.02, value)):
+        refuses(
+            OptionsError,
+            lambda m=margin, r=ray: arm_world(table_1_arm(), wearer(), m, r),
+            unit='m',
+        )
+
+
+@pytest.mark.parametrize(
+    'name', ['', 'a\nb', '\x1b[2J', '\x9b1m', '\u202e', 'x' * 257, None, 7, True]
+)
+def test_names_are_texts_that_may_be_printed(name):
+    refuses(SceneError, lambda: Box(name, [0, 0, 0], [1, 1, 1], EYE), 'name of a box')
+    path = ('joints', 1, 'name')
+    refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=name)), 'joint 1: name')
+    assert Box('Ω 🦾', [0, 0, 0], [1, 1, 1], EYE).name == 'Ω 🦾'
+
+
+@pytest.mark.parametrize(
+    'value',
+    [[True, 1, 1], [1, 1, '1'], ['1', '1', '1'], True, [None] * 3, [10**400] * 3, [[1]] * 3],
+)
+def test_what_only_looks_like_numbers_is_none(value):
+    refuses(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
+    refuses(SceneError, lambda: Box('a', value, [1, 1, 1], EYE), 'center', unit='m')
+
+
+@pytest.mark.parametrize(
+    'value', [np.ones(3, bool), np.array(['1', '1', '1']), [np.True_, 1.0, 1.0]]
+)
+def test_arrays_of_other_types_are_no_numbers(value):
+    refuses(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
+    for same in (np.ones(3, np.float32), np.ones(3, np.uint8), [np.float32(1), np.int64(1), 1]):
+        assert frozen_array(same, (3,), 'x', 'm', RrthError).tolist() == [1.0, 1.0, 1.0]
+
+
+def test_an_option_that_is_true_is_no_number_and_one_that_is_1_not_true():
+    for name in ('step_size', 'goal_bias', 'max_samples', 'club_count', 'time_limit'):
+        refuses(OptionsError, lambda name=name: RRTHOptions(**{name: True}), name)
+    for value in (0, 1, 0.5, 'true', None):
+        refuses(OptionsError, lambda value=value: RRTHOptions(is_bidirectional=value), 'true or')
+
+
+def test_a_trajectory_beyond_what_is_proven_is_refused():
+    still = {'times': [0.0], 'velocities': np.zeros((1, 2)), 'accelerations': np.zeros((1, 2))}
+    Trajectory(positions=[[FARTHEST, -FARTHEST]], **still)
+    for q in ([[0.0, 1.1e4]], np.array([[0.0, 1.1e4]]), np.array([[-1e300, 0.0]])):
+        refuses(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
+    for q in ([[True, 0.0]], [['1', 0.0]], np.array([['1', '0']])):
+        refuses(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
 
 
 @pytest.mark.parametrize('key', ['joints', 'tool', 'mount'])
@@ -155,8 +272,9 @@ def test_bad_limits_are_refused():
 @pytest.mark.parametrize('name', list(RRTHOptions.__dataclass_fields__))
 def test_bad_options_are_refused(name):
     meta = RRTHOptions.__dataclass_fields__[name].metadata
-    RRTHOptions(**{name: meta['low']})
-    RRTHOptions(**{name: meta['high']})
+    kind = bool if name == 'is_bidirectional' else lambda value: value
+    RRTHOptions(**{name: kind(meta['low'])})
+    RRTHOptions(**{name: kind(meta['high'])})
     for bad in (meta['low'] - 1, meta['high'] * 1.01 + 1, float('nan'), float('inf'), -1e9):
         refuses(OptionsError, lambda bad=bad: RRTHOptions(**{name: bad}), name, unit=meta['unit'])
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array, frozen_array
+from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import MessageError
 from rrth_planner.ros.fields import seconds_of
 from sensor_msgs.msg import JointState
@@ -29,7 +29,8 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
     Raises
     ------
     MessageError
-        A joint that is missing or there twice, a position that is missing or not finite.
+        A joint that is missing or there twice, a position that is missing, not finite or beyond
+        1e4.
 
     """
     names = list(msg.name)
@@ -45,7 +46,8 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
             '[rad]'
         )
     q = [msg.position[names.index(name)] for name in joint_names]
-    return frozen_array(q, (len(q),), f'position of {list(joint_names)}', 'rad', MessageError)
+    label = f'position of {list(joint_names)}'
+    return frozen_array(q, (len(q),), label, 'rad', MessageError, FARTHEST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from nav_msgs.msg import Path
 import numpy as np
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError
+from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.ros.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
 from rrth_planner.rotation import quaternion_xyzw
 from rrth_planner.trajectory import sample, Trajectory
@@ -113,7 +113,10 @@ def joint_trajectory_from_msg(
         raise MessageError(
             f'velocity of the last point: {values["velocities"][-1].tolist()}, expected 0 [rad/s]'
         )
-    return Trajectory(times=np.array(times) / NANOSECONDS, **values)
+    try:
+        return Trajectory(times=np.array(times) / NANOSECONDS, **values)
+    except RrthError as problem:
+        raise MessageError(str(problem)) from problem
 
 
 def tool_path_to_msg(arm: ArmModel, trajectory: Trajectory, frame: str, n_poses: int) -> Path:
