@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 import re
 
-from rrth_planner.errors import MessageError
+from rrth_planner.errors import MessageError, one_line, shown
 from rrth_planner.ros.error_codes import ErrorCode
 
-ANSWER = re.compile(r'([A-Z_]+) \((-?\d+)\): (.*)', re.DOTALL)
+ANSWER = re.compile(r'([A-Z_]+) \((-?\d+)\): (.*)')
 NUMBER = r'(-?[0-9.]+(?:e[-+]?\d+)?)'
 # The figures of a motion by name, with their units where these are not SI.
 FIGURES = {
@@ -52,9 +52,11 @@ def answer_from_text(text: str) -> Answer:
         It is none.
 
     """
+    # Whoever answers may send anything; what is read of it may be printed.
+    text = one_line(text)
     found = ANSWER.fullmatch(text)
     if found is None or int(found[2]) not in set(ErrorCode):
-        raise MessageError(f'answer "{text}", expected NAME (number): sentence')
+        raise MessageError(f'answer {shown(text)}, expected NAME (number): sentence')
     sentence, figures = found[3], {}
     for name, pattern in FIGURES.items():
         figure = re.search(pattern, sentence)

@@ -167,7 +167,7 @@ class ViewerFeed(Node):
     def _on_answer(self, future: Future) -> None:
         problem = future.exception()
         if problem is None:
-            self._conclude(str(future.result().message))
+            self._conclude(one_line(str(future.result().message)))
         else:
             self._conclude(f'no answer of the planner: {one_line(str(problem))}')
 

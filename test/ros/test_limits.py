@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of everything is taken: more is refused in one sentence, at once and whole."""
 
+import bisect
+from pathlib import Path
 import time
 
 from geometry_msgs.msg import Point
@@ -11,18 +13,20 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.arrays import FARTHEST  # noqa: E402
 from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.resources import load_arm, resource_path  # noqa: E402
+from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import (  # noqa: E402
-    LONGEST_NAME,
     LONGEST_NAMESPACE,
     MOST_BOXES,
     read_edits,
 )
 from rrth_planner.ros.error_codes import answer, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Input, PlanInputs, RequestError  # noqa: E402
+from rrth_planner.ros.message_files import message_from_file  # noqa: E402
 from rrth_planner.ros.messages import (  # noqa: E402
     goal_from_msg,
     joint_reading,
@@ -32,10 +36,18 @@ from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  #
 from rrth_planner.ros.subscriptions import decoded, MOST_BYTES  # noqa: E402
 from rrth_planner.ros.trajectories import MOST_POINTS  # noqa: E402
 from rrth_planner.scene import Scene  # noqa: E402
+from rrth_planner.text_files import (  # noqa: E402
+    DEEPEST,
+    MOST_BYTES as FILE_BYTES,
+    MOST_VALUES,
+)
+from rrth_planner.wearer_file import LONGEST_TEXT  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+SECURITY = Path(__file__).parents[2] / 'docs' / 'security.md'
 
 
 def refusal(call, *arguments):
@@ -91,7 +103,7 @@ def test_a_long_namespace_is_refused_and_a_long_text_cut_short():
     hat = box('n' * LONGEST_NAMESPACE, text='hat\n' * 10**5)
     (edit,) = read_edits(array(hat), 0.0, 'torso')
     name = edit.part.boxes[0].name
-    assert len(name) == LONGEST_NAME
+    assert len(name) == LONGEST_TEXT
     assert name.isprintable()
 
 
@@ -169,6 +181,51 @@ def test_a_box_of_next_to_no_size_is_an_obstacle_and_huge_numbers_are_refused():
     assert scene_of(tiny).boxes[0].size[0] == 5e-324
     assert 'expected' in refusal(read_edits, array(box(center=(1.7e308,) * 3)), 0.0, 'torso')
     assert 'expected' in refusal(goal_from_msg, target(1.7e308, 1.7e308), 'torso')
+
+
+def test_joints_and_motions_beyond_what_is_proven_are_refused():
+    for bad in (1.1e4, -1e300):
+        sentence = refusal(joint_reading, joints([bad, *FOLDED[1:]]), JOINTS, 1.0, None)
+        assert 'expected numbers of at most 10000 [rad]' in sentence
+        msg = _motion(2)
+        msg.points[1].positions[0] = bad
+        sentence = refusal(joint_trajectory_from_msg, msg, JOINTS)
+        assert sentence.startswith('positions: ')
+        assert 'expected numbers of at most 10000 [rad]' in sentence
+
+
+@pytest.mark.skipif(not SECURITY.is_file(), reason='the documents are not installed')
+def test_the_documents_say_how_much_is_taken():
+    def most(*markers):
+        """Return how many of some markers, taken in turn, an array may have."""
+
+        def is_longer(n):
+            taken = (markers * (n // len(markers) + 1))[:n]
+            return len(serialize_message(array(*taken))) > MOST_BYTES
+
+        return bisect.bisect_left(range(5000), True, key=is_longer) - 1
+
+    body = message_from_file(resource_path('msg_examples/body.yaml'), MarkerArray)
+    typical = [marker for marker in body.markers if marker.action == Marker.ADD]
+    short, long = most(box('torso')), most(*typical)
+    said = (
+        f'{MOST_BYTES // 1024} KiB (`MOST_BYTES`): some {round(short, -1):,} CUBEs with a short '
+        f'name, {round(long, -1):,} like those of `msg_examples/body.yaml`'
+    )
+    table = SECURITY.read_text(encoding='utf-8')
+    assert said in table
+    assert f'| {MOST_BOXES:,} (`MOST_BOXES`) |' in table
+    assert f'{MOST_BYTES_OF_MOTION // 1024**2} MiB and {MOST_POINTS:,} points' in table
+    files = f'{FILE_BYTES // 2**20} MiB, {MOST_VALUES:,} values, {DEEPEST} in one another'
+    assert files in table
+    assert f'angles, lengths and coordinates | {FARTHEST:.0f} rad or m' in table
+
+
+def test_an_answer_of_somebody_else_is_one_line():
+    answered = answer_from_text('SUCCESS (1): a\nb \x1b[31m, seed 7')
+    assert answered.sentence == 'a b ?[31m, seed 7'
+    assert answered.figures == {'seed': 7}
+    assert 'expected NAME' in refusal(answer_from_text, f'SUCCESS ({"1" * 5000}): a')
 
 
 def test_answers_are_one_line_whatever_they_quote():
