@@ -34,6 +34,7 @@ from rrth_planner.ros.messages import (  # noqa: E402
     WearerBody,
 )
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient  # noqa: E402
+from rrth_planner.ros.subscriptions import Arrival  # noqa: E402
 from rrth_planner.trajectory import Trajectory  # noqa: E402
 from samples import FOLDED, joints  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -43,7 +44,7 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Cold, the planner is compiled first [s].
 LONGEST_RUN = 280.0
-START = 250.0
+START, ARRIVAL = 250.0, Arrival((1, 1), 1)
 BOXES = resource_path('config/body.yaml')
 MARKERS = resource_path('msg_examples/body.yaml')
 COMMAND = [sys.executable, '-m', 'rrth_planner.ros.point_at']
@@ -302,8 +303,8 @@ def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
         time.sleep(0.02)
         client.told += next(came, [])
         ours = [msg for msg in client.told if msg.points][-1]
-        client._on_state(joints(ours.points[-1].positions))
-        client._on_state(joints(FOLDED[:2]))
+        client._on_state(joints(ours.points[-1].positions), ARRIVAL)
+        client._on_state(joints(FOLDED[:2]), ARRIVAL)
 
     client.take_messages = take_messages
     follow(client, arm, first, None, 1e-3)
@@ -312,9 +313,9 @@ def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
 
 def test_joint_positions_that_are_none_do_not_count(client):
     client._joint_names = load_arm().joint_names
-    client._on_state(joints(FOLDED))
+    client._on_state(joints(FOLDED), ARRIVAL)
     for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
-        client._on_state(bad)
+        client._on_state(bad, ARRIVAL)
     assert client.positions(client._joint_names).tolist() == FOLDED
     assert len(client.seen) == 1
 

@@ -168,8 +168,11 @@ class Wire:
         data = msg if isinstance(msg, bytes) else serialize_message(msg)
         n = next(self.sent)
         subscription = self.subscriptions[name]
-        hear = subscription._on_reliable if is_reliable else subscription._on_live
-        hear(data, {'source_timestamp': n, 'publication_sequence_number': n})
+        info = {'source_timestamp': n, 'publication_sequence_number': n}
+        if is_reliable:
+            subscription._on_copy(data, info, 'reliable')
+        else:
+            subscription._on_live(data, info)
         assert not self.complaints.errors
         if heard.n_refused > before[0]:
             assert heard.n_refused == before[0] + 1
