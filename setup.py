@@ -32,7 +32,7 @@ setup(
         'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'trimesh', 'tqdm', 'matplotlib'],
         'test': ['pytest', 'hypothesis'],
     },
-    # The kernels' compiled cache is kept by source file, so these must be real files.
+    # The sources of the kernels name the folder of their code, so these must be real files.
     zip_safe=False,
     maintainer='The rrth_planner authors',
     maintainer_email='rrth_planner@example.org',

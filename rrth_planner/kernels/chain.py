@@ -3,21 +3,17 @@
 """Forward kinematics written out for one arm: its constants are known to the compiler."""
 
 import hashlib
-import importlib.util
 import math
-import os
-from pathlib import Path
 import sys
+from types import ModuleType
 from typing import Any
 
 from numba.core.types import float64, int64
 from rrth_planner.kernels.jit import (
     A,
-    cache_folder,
     COS_ALPHA,
     D,
     first_class,
-    forgo_cache,
     kernel,
     KIND,
     NO_BAR,
@@ -198,46 +194,14 @@ def chain_of(rows: Any) -> Any:
     """
     Return the compiled `chain` of an arm, kept from process to process.
 
-    rows: as in `chain_source`.
+    rows: as in `chain_source`. The text is never read from a file: it would be run as it is.
     """
     text = chain_source(rows)
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     if digest not in _COMPILED:
-        name = f'chain_{digest}'
-        space: dict[str, Any] = {'__name__': f'rrth_planner.kernels.{name}'}
-        file = _kept(name, text)
-        if file is None:
-            exec(compile(text, f'<{name}>', 'exec'), space)  # noqa: S102
-        else:
-            space = vars(_module(file))
-        _COMPILED[digest] = first_class(space['chain'])
+        # What is kept of a kernel looks its module up by name.
+        module = ModuleType(f'rrth_planner.kernels.chain_{digest}')
+        sys.modules[module.__name__] = module
+        exec(compile(text, f'<chain_{digest}>', 'exec'), vars(module))  # noqa: S102
+        _COMPILED[digest] = first_class(module.chain)
     return _COMPILED[digest]
-
-
-def _kept(name: str, text: str) -> Path | None:
-    """Return the file of a module, written if it is not there; None where it cannot be."""
-    folder = cache_folder()
-    if folder is None:
-        return None
-    file, draft = folder / f'{name}.py', folder / f'{name}.{os.getpid()}'
-    # numba keeps compiled code by the file's path and time, so it is written once.
-    if not file.exists():
-        try:
-            draft.write_text(text, encoding='utf-8')
-            draft.replace(file)
-        except OSError as problem:
-            forgo_cache(problem)
-            draft.unlink(missing_ok=True)
-            return None
-    return file
-
-
-def _module(file: Path) -> Any:
-    """Return the module of a file."""
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    # What numba kept of its kernels looks their module up by name.
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module

@@ -7,16 +7,18 @@ import contextlib
 import hashlib
 import os
 from pathlib import Path
-from pickle import UnpicklingError
+import sys
 from typing import Any
 import warnings
 
+import numba
 from numba import config, njit, types
 from numba.core import cgutils
 from numba.core.types import float64, int32, int64
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 import numpy as np
+from rrth_planner.kernels.kept_code import KeptCode, private_folder
 from rrth_planner.kernels.slim_library import use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler refuses to write through them:
@@ -93,11 +95,14 @@ NO_BAR = -1.0
 LANES = 8
 BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
 
+# The file that says that all kernels of the planner are there.
+COMPLETE = 'complete'
+
 
 def _cache_folder() -> Path | None:
-    """Return the folder of the compiled code, or None where none can be written."""
-    # numba does not see that a kernel of another file has changed, so all sources name the folder.
-    digest = hashlib.sha256()
+    """Return the folder of the compiled code, or None where none can be kept."""
+    # A kernel of another file may be part of what is kept, so all sources name the folder.
+    digest = hashlib.sha256(f'{numba.__version__} {sys.implementation.cache_tag}'.encode())
     for source in sorted(Path(__file__).parent.glob('*.py')):
         digest.update(source.read_bytes())
     root = os.environ.get('RRTH_CACHE_DIR') or os.path.join(
@@ -106,13 +111,10 @@ def _cache_folder() -> Path | None:
     )
     folder = Path(root) / f'kernels-{digest.hexdigest()[:16]}'
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(folder, os.W_OK):
-            raise PermissionError('not writable')
+        return private_folder(folder)
     except OSError as problem:
         _warn_once(folder, problem)
         return None
-    return folder
 
 
 def _warn_once(folder: Path | None, problem: Exception) -> None:
@@ -120,8 +122,9 @@ def _warn_once(folder: Path | None, problem: Exception) -> None:
     if not _has_warned:
         _has_warned = True
         warnings.warn(
-            f'compiled kernels are not kept: {folder}: {problem}; expected a writable folder with '
-            'room for them (environment variable RRTH_CACHE_DIR)',
+            f'compiled kernels are not kept: {folder}: {problem}; expected a folder of your own '
+            'with room for them, to which nobody else can write (chmod go-w, or another one: '
+            'environment variable RRTH_CACHE_DIR)',
             RuntimeWarning,
             stacklevel=3,
         )
@@ -133,35 +136,27 @@ use_slim_libraries()
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of the compiled code, or None where none can be written."""
+    """Return the folder of the compiled code, or None where none can be kept."""
     return _folder
 
 
-def forgo_cache(problem: OSError) -> None:
+def _give_up(problem: OSError) -> None:
     """Keep no more code, since the folder turned out not to take any: warned about once."""
     global _folder
     _warn_once(_folder, problem)
     _folder = None
 
 
-def _stamp() -> Path | None:
-    # numba files what it keeps by the path of the source, so another checkout compiles anew.
-    path = hashlib.sha256(os.path.realpath(__file__).encode()).hexdigest()[:16]
-    return None if _folder is None else _folder / f'complete-{path}'
-
-
 def is_compiled() -> bool:
     """Return whether the planner's kernels have all been compiled, and kept, before."""
-    stamp = _stamp()
-    return stamp is not None and stamp.exists()
+    return _folder is not None and (_folder / COMPLETE).exists()
 
 
 def mark_compiled() -> None:
     """Keep in mind that the planner's kernels are all compiled."""
-    stamp = _stamp()
-    if stamp is not None:
+    if _folder is not None:
         with contextlib.suppress(OSError):
-            stamp.touch()
+            (_folder / COMPLETE).touch(mode=0o600)
 
 
 def kernel(
@@ -183,23 +178,13 @@ def kernel(
     }
 
     def decorate(function: Callable[..., Any]) -> Any:
-        if _folder is not None:
-            try:
-                return kept(function)
-            except OSError as problem:
-                # A full disk, for one: what is compiled from here on stays in memory.
-                forgo_cache(problem)
-            except (EOFError, UnpicklingError, ValueError) as problem:
-                # What is kept of this kernel was cut short.
-                _warn_once(_folder, problem)
-        return njit(signature, **options)(function)
-
-    def kept(function: Callable[..., Any]) -> Any:
-        given, config.CACHE_DIR = config.CACHE_DIR, str(_folder)
-        try:
-            return njit(signature, cache=True, **options)(function)
-        finally:
-            config.CACHE_DIR = given
+        compiled = njit(**options)(function)
+        if not config.DISABLE_JIT:
+            if _folder is not None:
+                compiled._cache = KeptCode(function, _folder, _give_up)
+            compiled.compile(signature)
+            compiled.disable_compile()
+        return compiled
 
     return decorate
 

@@ -1,12 +1,13 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where compiled kernels cannot be kept they stay in memory, with one warning."""
+"""Compiled kernels are code: kept where nobody else can write, taken back only if whole."""
 
 import os
 import subprocess
 import sys
 
 import pytest
+from rrth_planner.kernels.kept_code import private_folder, read_whole, write_whole
 
 COMPILE = """
 import numpy as np
@@ -23,13 +24,33 @@ assert (twice(2.0), thrice(2.0)) == (4.0, 6.0)
 # As on a full disk: files can be made, but hold nothing.
 FULL_DISK = """
 import errno, os
-import numba.core.caching as caching
-from contextlib import contextmanager
-@contextmanager
-def full(self, path):
+def full(*args):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    yield
-caching.IndexDataCacheFile._open_for_write = full
+os.replace = full
+"""
+
+
+# The kinematics of an arm, of one link or of a longer one.
+CHAIN = """
+import sys
+import numpy as np
+from rrth_planner.arm import ArmModel
+from rrth_planner.kernels.kept_code import KeptCode
+from rrth_planner.world import arm_rows
+compiled = []
+save = KeptCode.save_overload
+def note(self, signature, result):
+    compiled.append(self._function.__name__)
+    save(self, signature, result)
+KeptCode.save_overload = note
+dh = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, LENGTH, 0.0, 0.0]])
+arm = ArmModel(
+    joint_names=('j',), is_prismatic=(False,), dh=dh, bounds=[[-1.0], [1.0]], radii=[0.0, 0.0],
+    T_base_mount=np.eye(4),
+)
+points = np.zeros(12)
+arm_rows(arm, 0.0)[1](np.zeros(1), 0.0, points, 0)
+print(points[4], *compiled, file=sys.stderr)
 """
 
 
@@ -59,12 +80,22 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def test_a_writable_folder_is_used_without_a_word(tmp_path):
-    folder = tmp_path / 'cache'
+def code_in(folder):
+    """Return the files of compiled kernels in a folder."""
+    return sorted(folder.rglob('*.code'))
+
+
+def test_a_folder_of_ones_own_is_used_without_a_word(tmp_path):
+    folder = tmp_path / 'new' / 'cache'
     assert not warnings_in(run(COMPILE, folder, tmp_path))
-    kept = [file.name for file in folder.rglob('*.nb*')]
-    assert any('twice' in name for name in kept)
-    assert any('thrice' in name for name in kept)
+    first, second = code_in(folder)
+    assert (first.name.split('-')[0], second.name.split('-')[0]) == (
+        '__main__.thrice',
+        '__main__.twice',
+    )
+    for made in (folder.parent, folder, first.parent):
+        assert made.stat().st_mode & 0o777 == 0o700
+    assert first.stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.parametrize('where', ['below a file', '/proc'])
@@ -78,37 +109,173 @@ def test_a_folder_that_cannot_be_made_is_warned_of_once(tmp_path, where):
     (line,) = warnings_in(run(COMPILE, folder, tmp_path))
     assert 'compiled kernels are not kept: ' in line
     assert str(folder) in line
-    assert '(environment variable RRTH_CACHE_DIR)' in line
+    assert 'environment variable RRTH_CACHE_DIR' in line
 
 
 def test_a_full_disk_is_warned_of_once(tmp_path):
-    (line,) = warnings_in(run(FULL_DISK + COMPILE, tmp_path / 'cache', tmp_path))
+    folder = tmp_path / 'cache'
+    (line,) = warnings_in(run(FULL_DISK + COMPILE, folder, tmp_path))
     assert 'compiled kernels are not kept: ' in line
     assert 'No space left on device' in line
+    # Nor is anything left behind.
+    assert not [file for file in folder.rglob('*') if file.is_file()]
 
 
-def test_files_of_the_cache_that_were_cut_short_are_compiled_again(tmp_path):
+@pytest.mark.parametrize('open_place', ['cache', 'above'])
+def test_a_folder_that_others_can_write_to_is_warned_of_and_not_used(tmp_path, open_place):
+    above = tmp_path / 'above'
+    folder = above / 'cache'
+    run(COMPILE, folder, tmp_path)
+    (kernels,) = folder.iterdir()
+    (kernels if open_place == 'cache' else above).chmod(0o770)
+    before = {file: file.stat().st_mtime_ns for file in code_in(folder)}
+    for file in before:
+        file.unlink()
+    (line,) = warnings_in(run(COMPILE, folder, tmp_path))
+    place = kernels if open_place == 'cache' else above
+    assert f'others can write to {place} (mode 0770)' in line
+    assert 'chmod go-w' in line
+    assert not code_in(folder)
+
+
+def test_a_folder_is_private_if_nobody_else_can_write_to_it_or_exchange_it(tmp_path):
+    assert private_folder(tmp_path / 'a' / 'b') == (tmp_path / 'a' / 'b').resolve()
+    # Others cannot rename what is not theirs where they may only add to a folder, as in /tmp.
+    (tmp_path / 'a').chmod(0o1777)
+    private_folder(tmp_path / 'a' / 'b')
+    (tmp_path / 'a').chmod(0o777)
+    with pytest.raises(OSError, match='others can write to .*/a '):
+        private_folder(tmp_path / 'a' / 'b')
+    (tmp_path / 'a').chmod(0o755)
+    for mode in (0o720, 0o702, 0o1777):
+        (tmp_path / 'a' / 'b').chmod(mode)
+        with pytest.raises(OSError, match='others can write to .*/b '):
+            private_folder(tmp_path / 'a' / 'b')
+
+
+def test_a_folder_is_judged_by_where_links_lead_to(tmp_path):
+    (tmp_path / 'open').mkdir()
+    (tmp_path / 'open').chmod(0o777)
+    (tmp_path / 'open' / 'mine').mkdir(mode=0o700)
+    (tmp_path / 'link').symlink_to(tmp_path / 'open' / 'mine')
+    with pytest.raises(OSError, match='others can write to .*/open '):
+        private_folder(tmp_path / 'link')
+    (tmp_path / 'open').chmod(0o755)
+    assert private_folder(tmp_path / 'link').name == 'mine'
+    (tmp_path / 'nowhere').symlink_to(tmp_path / 'missing' / 'cache')
+    with pytest.raises(OSError):
+        private_folder(tmp_path / 'nowhere')
+
+
+def test_what_belongs_to_another_user_is_not_used(tmp_path, monkeypatch):
+    folder = private_folder(tmp_path / 'kernels')
+    write_whole(folder / 'kernel', b'code')
+    me = os.geteuid()
+    monkeypatch.setattr(os, 'geteuid', lambda: me + 1)
+    assert read_whole(folder / 'kernel') is None
+    with pytest.raises(OSError, match=f'{folder} belongs to user {me}'):
+        private_folder(folder)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason='only root can give a folder to another user')
+def test_the_folders_above_may_belong_to_root_but_to_no_third_user(tmp_path, monkeypatch):
+    folder = private_folder(tmp_path / 'above' / 'kernels')
+    os.chown(folder, 12345, -1)
+    monkeypatch.setattr(os, 'geteuid', lambda: 12345)
+    assert private_folder(folder) == folder
+    os.chown(folder.parent, 12346, -1)
+    with pytest.raises(OSError, match=f'{folder.parent} belongs to user 12346'):
+        private_folder(folder)
+
+
+def test_a_file_is_taken_back_only_if_it_is_whole_and_written_by_nobody_else(tmp_path):
+    file, data = tmp_path / 'kernel', bytes(range(256)) * 40
+    write_whole(file, data)
+    assert read_whole(file) == data
+    whole = file.read_bytes()
+    for n in (0, 1, 31, 32, 33, len(whole) // 2, len(whole) - 1):
+        file.write_bytes(whole[:n])
+        assert read_whole(file) is None
+        flipped = bytearray(whole)
+        flipped[n] ^= 1
+        file.write_bytes(flipped)
+        assert read_whole(file) is None
+    file.write_bytes(whole + b'0')
+    assert read_whole(file) is None
+    file.write_bytes(whole)
+    assert read_whole(file) == data
+    for mode in (0o620, 0o602):
+        file.chmod(mode)
+        assert read_whole(file) is None
+    file.unlink()
+    assert read_whole(file) is None
+    write_whole(tmp_path / 'other', data)
+    file.symlink_to(tmp_path / 'other')
+    assert read_whole(file) is None
+    write_whole(file, data)
+    assert read_whole(file) == data
+    assert not file.is_symlink()
+
+
+DAMAGES = {
+    'cut': lambda content: content[: len(content) // 2],
+    'empty': lambda content: b'',
+    'rotten': lambda content: content[:5000] + bytes([content[5000] ^ 4]) + content[5001:],
+    'another file': lambda content: b'all of it is something else',
+}
+
+
+@pytest.mark.parametrize('damage', DAMAGES)
+def test_damaged_code_is_made_anew_without_a_word(tmp_path, damage):
     folder = tmp_path / 'cache'
     run(COMPILE, folder, tmp_path)
-    for file in folder.rglob('*.nb*'):
-        file.write_bytes(file.read_bytes()[:20])
-    assert len(warnings_in(run(COMPILE, folder, tmp_path))) <= 1
+    before = {file: file.read_bytes() for file in code_in(folder)}
+    for file, content in before.items():
+        file.write_bytes(DAMAGES[damage](content))
+    assert not run(COMPILE, folder, tmp_path)
+    assert list(before) == code_in(folder)
+    for file in before:
+        assert read_whole(file) is not None
+
+
+def test_code_of_other_versions_of_what_it_is_made_of_is_made_anew(tmp_path):
+    folder = tmp_path / 'cache'
+    run(COMPILE, folder, tmp_path)
+    for file in code_in(folder):
+        write_whole(file, b'cno_such_module\nname\n.')
+    assert not run(COMPILE, folder, tmp_path)
+    assert all(b'no_such_module' not in file.read_bytes() for file in code_in(folder))
+
+
+def test_an_edited_kernel_is_compiled_anew(tmp_path):
+    folder = tmp_path / 'cache'
+    run(COMPILE, folder, tmp_path)
+    edited = COMPILE.replace('2.0 * x', '2.0 + x').replace('3.0 * x', 'x - 3.0')
+    run(edited.replace('(4.0, 6.0)', '(4.0, -1.0)'), folder, tmp_path)
+    assert len(code_in(folder)) == 4
+
+
+def test_code_that_checks_bounds_is_other_code(tmp_path):
+    folder = tmp_path / 'cache'
+    run(COMPILE, folder, tmp_path)
+    run(f"import os; os.environ['NUMBA_BOUNDSCHECK'] = '1'{COMPILE}", folder, tmp_path)
+    assert len(code_in(folder)) == 4
+
+
+def test_the_kinematics_of_an_arm_are_kept_as_code_and_never_read_as_text(tmp_path):
+    folder = tmp_path / 'cache'
+    short, long = CHAIN.replace('LENGTH', '0.25'), CHAIN.replace('LENGTH', '0.75')
+    assert run(short, folder, tmp_path)[-1].split()[0] == '0.25'
+    (line,) = run(short, folder, tmp_path)
+    assert line == '0.25', 'compiled again'
+    assert run(long, folder, tmp_path) == ['0.75 chain']
+    assert not list(folder.rglob('*.py'))
 
 
 def test_the_kinematics_of_an_arm_need_no_folder_either(tmp_path):
-    code = """
-import errno, os, pathlib
-def full(self, *args, **kwargs):
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-pathlib.Path.write_text = full
-from rrth_planner.kernels import chain, jit
-file = chain._kept('chain_of_a_test', 'text')
-assert file is None and jit.cache_folder() is None
-"""
-    folder = tmp_path / 'cache'
-    (line,) = warnings_in(run(code, folder, tmp_path))
-    assert 'No space left on device' in line
-    assert not list(folder.rglob('chain_of_a_test*'))
+    (tmp_path / 'file').touch()
+    line = run(CHAIN.replace('LENGTH', '0.25'), tmp_path / 'file' / 'cache', tmp_path)[-1]
+    assert line.split() == ['0.25']
 
 
 def test_what_was_loaded_has_no_module_until_other_code_is_compiled_against_it(tmp_path):

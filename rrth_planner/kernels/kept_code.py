@@ -1,0 +1,165 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled kernels as files: code, which is run as it is found, so nobody else may write it."""
+
+from collections.abc import Callable
+import contextlib
+import functools
+import hashlib
+import os
+from pathlib import Path
+import pickle
+import stat
+import tempfile
+from typing import Any
+
+from numba import config
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+DIGEST_SIZE = hashlib.sha256().digest_size
+
+
+def private_folder(path: Path) -> Path:
+    """
+    Return a folder, made if it is not there, to which nobody but this user can write.
+
+    Nor can anybody put another one in its place: the folders above it belong to this user or to
+    root, and others cannot write to them, or, as in /tmp, only move what is their own.
+
+    Raises
+    ------
+    OSError
+        There is no such folder, and none can be made.
+
+    """
+    _make(path)
+    # What a link leads to may be changed later; where it leads to now is known.
+    folder = path.resolve(strict=True)
+    for place in (folder, *folder.parents):
+        info = place.stat()
+        if info.st_uid != os.geteuid() and (place == folder or info.st_uid != 0):
+            raise PermissionError(f'{place} belongs to user {info.st_uid}')
+        is_sticky = place != folder and info.st_mode & stat.S_ISVTX
+        if info.st_mode & OTHERS_WRITE and not is_sticky:
+            mode = stat.S_IMODE(info.st_mode)
+            raise PermissionError(f'others can write to {place} (mode {mode:04o})')
+    if not os.access(folder, os.W_OK):
+        raise PermissionError('not writable')
+    return folder
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, and those above it that are not there, for this user only."""
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def read_whole(file: Path) -> bytes | None:
+    """Return what `write_whole` wrote; None where that is not there, damaged or another user's."""
+    try:
+        with open(file, 'rb', opener=_open_file) as stream:
+            info, content = os.fstat(stream.fileno()), stream.read()
+    except OSError:
+        return None
+    digest, data = content[:DIGEST_SIZE], content[DIGEST_SIZE:]
+    # What others left there before the folder was this user's alone.
+    is_own = info.st_uid == os.geteuid() and not info.st_mode & OTHERS_WRITE
+    return data if is_own and hashlib.sha256(data).digest() == digest else None
+
+
+def _open_file(file: str, flags: int) -> int:
+    return os.open(file, flags | os.O_NOFOLLOW)
+
+
+def write_whole(file: Path, data: bytes) -> None:
+    """Write a file that only this user can read, at once or not at all, with its digest."""
+    descriptor, draft = tempfile.mkstemp(prefix=f'{file.name}.', dir=file.parent)
+    try:
+        with open(descriptor, 'wb') as stream:
+            stream.write(hashlib.sha256(data).digest())
+            stream.write(data)
+        os.replace(draft, file)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(draft)
+        raise
+
+
+class KeptCode(NullCache):
+    """
+    The file with the code of one kernel, by numba's protocol of a cache.
+
+    numba's own cache takes whatever lies there for code: a cut file ends the program, a changed
+    one changes what it does.
+
+    Parameters
+    ----------
+    function : function
+        The kernel, not compiled.
+    folder : Path
+        Private, and another one for each state of the sources of all kernels: that a kernel of
+        another file has changed is not seen here.
+    give_up : callable
+        Told of an OSError that kept the code from being written.
+
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        folder: Path,
+        give_up: Callable[[OSError], None],
+    ) -> None:
+        self._function, self._folder, self._give_up = function, folder, give_up
+
+    def _file(self, signature: Any, codegen: Any) -> Path:
+        """Return the file of the code for one signature and processor."""
+        function = self._function
+        closure = dumps(tuple(cell.cell_contents for cell in function.__closure__ or ()))
+        # Code that checks bounds is other code.
+        key = (signature, codegen.magic_tuple(), config.BOUNDSCHECK, _source(function), closure)
+        digest = hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+        name = f'{function.__module__}.{function.__qualname__}'.replace('<', '').replace('>', '')
+        return self._folder / f'{name}-{digest}.code'
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Return the code for a signature; None where it is to be compiled."""
+        context.refresh()
+        data = read_whole(self._file(signature, context.codegen()))
+        if data is None:
+            return None
+        try:
+            return CompileResult._rebuild(context, *pickle.loads(data))
+        except Exception:
+            # Whole, but of other versions of what it is made of.
+            return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep the code for a signature."""
+        if result.library.has_dynamic_globals:
+            return
+        file = self._file(signature, result.codegen)
+        try:
+            write_whole(file, dumps(result._reduce()))
+        except OSError as problem:
+            self._give_up(problem)
+
+
+def _source(function: Callable[..., Any]) -> tuple[Any, ...]:
+    """Return what tells a function from others, and from what it was before it was edited."""
+    code = function.__code__
+    generated = (code.co_code, code.co_consts, code.co_names)
+    return code.co_firstlineno, _digest(code.co_filename) or generated
+
+
+@functools.cache
+def _digest(file: str) -> str:
+    """Return the digest of a file, '' where there is none: the source was generated."""
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+    except OSError:
+        return ''
