@@ -72,6 +72,12 @@ def are_numbers(value: Any) -> bool:
     return np.asarray(value).dtype.kind in 'fiu'
 
 
+def check_dof(q: Array, dof: int, name: str) -> None:
+    """Raise RrthError unless an array, shape (..., dof), has a value for each joint."""
+    if q.shape[-1:] != (dof,):
+        raise RrthError(f'{name}: shape {q.shape}, expected a value for each of {dof} joints')
+
+
 def _fits(given: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
     return len(given) == len(shape) and all(map(_is_length, given, shape))
 

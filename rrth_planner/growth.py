@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, check_dof
 from rrth_planner.deadline import Deadline
 from rrth_planner.kernels import rrt, rrt_h, tree
 from rrth_planner.kernels.random import random_state
@@ -185,6 +185,7 @@ def plant(
     reuse = import_module('rrth_planner.kernels.reuse')
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
     for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
+        check_dof(old.nodes, len(problem.q_start), 'previous')
         sizes[side] = reuse.transplant(
             *seam, old.nodes, old.parents, sizes[side], tree_q[side], parents[side]
         )

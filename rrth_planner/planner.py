@@ -66,6 +66,8 @@ def plan(
     ------
     OptionsError
         Options of no known algorithm.
+    RrthError
+        An earlier plan of another number of joints.
 
     """
     home = _SEARCH.get(type(options))

@@ -56,3 +56,5 @@ class PlanningProblem:
             object.__setattr__(self, name, value)
         if len(self.q_goals) == 0:
             raise RrthError('q_goals: none, expected at least one configuration [rad]')
+        if not 0 <= self.n_bent <= len(self.q_goals):
+            raise RrthError(f'n_bent: {self.n_bent}, expected 0 to {len(self.q_goals)}')

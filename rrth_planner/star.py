@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, check_dof
 from rrth_planner.deadline import Deadline
 from rrth_planner.kernels import informed_rrt_star, reuse, rrt_star, rrt_star_smart
 from rrth_planner.kernels.random import random_state
@@ -53,6 +53,7 @@ class _Trees:
 
     def _take_over(self, problem: PlanningProblem, side: int, old: Tree) -> None:
         """Begin with what is still free of an earlier tree."""
+        check_dof(old.nodes, len(problem.q_start), 'previous')
         world, n_roots = problem.world, int(self.sizes[side])
         parents = np.full(self.tree_q.shape[1], -1, dtype=np.int64)
         n = reuse.transplant(
@@ -94,12 +95,12 @@ class _Trees:
             self.sizes[2] = 1
             rrt_star.find_best(self.tree_q, self.costs, self.sizes, self.meetings, self.best)
 
-    def path(self) -> Array:
-        """Return the waypoints of the best path of the trees, shape (n, dof)."""
+    def path(self) -> Array | None:
+        """Return the waypoints of the best path of the trees, (n, dof); None: no room for it."""
         a, b = self.meetings[int(self.best[1])]
         path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
         n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)
-        return path[:n].copy()
+        return path[:n].copy() if n else None
 
     def grown(self) -> GrownTrees:
         """Return the trees."""

@@ -77,11 +77,11 @@ def keep_best(paths, n, pair, state, history):
             paths[BEST, m, k] = paths[WORK, i, k]
         m += 1
     state[N_BEST], state[BEST_PAIR] = m, pair
-    row = state[N_HISTORY]
-    if row < history.shape[0]:
-        history[row, COST] = path_length(paths[BEST], m)
-        history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
-        state[N_HISTORY] += 1
+    # The last row is that of the best path, also where there is no room for another one.
+    row = min(state[N_HISTORY], history.shape[0] - 1)
+    history[row, COST] = path_length(paths[BEST], m)
+    history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
+    state[N_HISTORY] = row + 1
 
 
 @kernel(
@@ -305,6 +305,7 @@ def advance(
                 state[GROWING] = 0
                 n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
                 remember(paths, n, club, state)
+            if n > 0:
                 n = pull(
                     is_edge_free,
                     find,
