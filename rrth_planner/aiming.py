@@ -9,7 +9,7 @@ from importlib import import_module
 
 import numpy as np
 from rrth_planner.arm import ArmModel, forward_kinematics
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, check_dof
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit, pointing
@@ -85,12 +85,14 @@ def pointing_kernels(arm: ArmModel) -> PointingKernels:
     """
     Return how an arm aims: in closed form if its last two joints are a pan and tilt unit.
 
-    That is revolute joints, square to each other and to the ray, without `a` offset.
+    That is revolute joints, square to each other and to the ray, without `a` offset. With more
+    than a few other joints the search along the manifold of the closed form would take too long.
     """
     tail = arm.dh[-2:]
     is_square = np.abs(np.cos(tail[:, 0])).max() < 1e-9 and np.abs(tail[:, 1]).max() < 1e-12
     is_unit = arm.dof >= 2 and not any(arm.is_prismatic[-2:]) and is_square
-    return CLOSED_FORM if is_unit else numerical()
+    is_closed = is_unit and arm.dof <= pointing.MAX_CLOSED_DOF
+    return CLOSED_FORM if is_closed else numerical()
 
 
 @functools.cache
@@ -153,6 +155,8 @@ def goal_configurations(
 
     """
     kernels, dof = pointing_kernels(arm), arm.dof
+    check_dof(q_near, dof, 'q_near')
+    check_dof(world.bounds, dof, 'world')
     goals, reaches = np.empty((MOST, dof)), np.empty(MOST)
     blocked, blocked_reaches = np.empty((MOST_BLOCKED, dof)), np.empty(MOST_BLOCKED)
     counts = np.empty(3, dtype=np.int64)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.entries import mapping, number, printable, sequence
 from rrth_planner.errors import ModelError, shown
+from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF
 from rrth_planner.rotation import pose_matrix
 
 # What the rows of an arm's file say, and their units.
@@ -62,6 +63,8 @@ class ArmModel:
             printable(name, f'joint_names[{i}]', ModelError)
         if dof < 1 or len(set(names)) != dof:
             raise ModelError(f'joint_names: {list(names)}, expected at least one, all different')
+        if dof > MAX_DOF:
+            raise ModelError(f'joint_names: {dof} joints, expected at most {MAX_DOF}')
         prismatic = tuple(bool(flag) for flag in self.is_prismatic)
         if len(prismatic) != dof:
             raise ModelError(f'is_prismatic: {len(prismatic)} values, expected {dof}')
@@ -81,6 +84,12 @@ class ArmModel:
             raise ModelError(f'radii: {self.radii.tolist()}, expected lengths >= 0 [m]')
         if self.dh[-1, 3] != 0.0:
             raise ModelError(f'dh: d = {self.dh[-1, 3]} in the row of the tool, expected 0 [m]')
+        n_bars = len(bars_of(self.dh, prismatic))
+        if n_bars > MAX_BARS:
+            raise ModelError(
+                f'dh: {n_bars} bars, expected at most {MAX_BARS}: each a and d behind the first '
+                'joint that is not 0, each joint that slides, and the pointing ray [-]'
+            )
         if not np.array_equal(self.T_base_mount[3], [0.0, 0.0, 0.0, 1.0]):
             raise ModelError(f'mount: last row {self.T_base_mount[3].tolist()}, expected 0 0 0 1')
         r = self.T_base_mount[:3, :3]
@@ -104,6 +113,25 @@ class ArmModel:
     def dof(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+
+def bars_of(dh: Array, is_prismatic: tuple[bool, ...]) -> tuple[tuple[int, str], ...]:
+    """
+    Return the offsets of a chain that are bars, (row, 'a' or 'd'), from the mount outwards.
+
+    Offsets of length zero are no bars. Those that no joint moves belong to the mount, which is
+    worn on the body and so cannot keep clear of it.
+    """
+    bars = []
+    dof = len(is_prismatic)
+    for row in range(dof + 1):
+        is_moved, is_joint = row > 0, row < dof
+        if is_moved and dh[row, 1] != 0.0:
+            bars.append((row, 'a'))
+        slides = is_joint and is_prismatic[row]
+        if slides or not is_joint or (is_moved and dh[row, 3] != 0.0):
+            bars.append((row, 'd'))
+    return tuple(bars)
 
 
 def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:

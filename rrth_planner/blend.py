@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, check_dof
 from rrth_planner.kernels import arm_validity
 from rrth_planner.path import Path
 from rrth_planner.trajectory import MotionLimits
@@ -89,6 +89,7 @@ def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend
 
     """
     q = path.waypoints
+    check_dof(q, world.bounds.shape[1], 'path')
     lengths = np.linalg.norm(np.diff(q, axis=0), axis=1)
     # An arm that stays where it is goes in no direction.
     directions = np.diff(q, axis=0) / np.maximum(lengths, TINY)[:, None]

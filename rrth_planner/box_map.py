@@ -11,6 +11,7 @@ from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.entries import printable
 from rrth_planner.errors import SceneError, shown
 from rrth_planner.kernels import chain, contacts, jit, map_validity
+from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
@@ -32,8 +33,8 @@ class BoxMap:
     ----------
     name : str
     bounds : array_like, shape (2, dof)
-        Lower and upper corner of the map. A box that touches it goes on beyond: the border is
-        no way round.
+        Lower and upper corner of the map, in 1 to 64 dimensions. A box that touches it goes on
+        beyond: the border is no way round.
     obstacles : array_like, shape (m, 2, dof)
         Lower and upper corner of each box.
     start, goal : array_like, shape (dof,)
@@ -41,8 +42,8 @@ class BoxMap:
     Raises
     ------
     SceneError
-        A box without inside, a start or goal outside the map or inside a box, a coordinate beyond
-        1e4, a name that is not printable.
+        Too many dimensions, a box without inside, a start or goal outside the map or inside a box,
+        a coordinate beyond 1e4, a name that is not printable.
 
     """
 
@@ -57,6 +58,8 @@ class BoxMap:
         name = f'map "{printable(self.name, "name of a map", SceneError)}"'
         bounds = frozen_array(self.bounds, (2, None), f'{name}: bounds', 'map', SceneError)
         dof = bounds.shape[1]
+        if not 1 <= dof <= MAX_DOF:
+            raise SceneError(f'{name}: bounds of {dof} dimensions, expected 1 to {MAX_DOF}')
         obstacles = np.reshape(self.obstacles, (-1, 2, dof)) if len(self.obstacles) == 0 else None
         for field, value, shape in (
             ('bounds', bounds, (2, dof)),

@@ -7,7 +7,7 @@ import functools
 import math
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.arrays import Array, check_dof
 from rrth_planner.bernstein import to_bernstein
 from rrth_planner.kernels.arm_clearance import least_along
 from rrth_planner.kernels.pieces import prove_pieces
@@ -82,6 +82,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
         What comes before this time is over [s].
 
     """
+    check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         is_free = world.is_valid(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
@@ -116,6 +117,7 @@ def bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
 
 def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) -> float:
     """Return the least distance from the world's boxes from a time on, every 10 ms [m]."""
+    check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         return float(world.clearances(trajectory.positions[-1]).min(initial=np.inf))
     n = math.ceil((trajectory.duration - begin) / CLEARANCE_PERIOD) + 1

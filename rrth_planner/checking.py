@@ -5,7 +5,6 @@
 from dataclasses import replace
 
 from rrth_planner.box_map import EDGE_CHECK as MAP_CHECK, SAMPLED_CHECK as SAMPLED_MAP_CHECK
-from rrth_planner.errors import OptionsError
 from rrth_planner.kernels import arm_sampling, jit
 from rrth_planner.world import World
 
@@ -28,7 +27,7 @@ def sampled(world: World, resolution: float) -> World:
 
     """
     check = SAMPLED_MAP_CHECK if world.edge_check is MAP_CHECK else SAMPLED_ARM_CHECK
-    return replace(world, edge_check=check, resolution=_spacing(resolution))
+    return replace(world, edge_check=check, resolution=resolution)
 
 
 def by_check_points(world: World, resolution: float) -> World:
@@ -45,10 +44,4 @@ def by_check_points(world: World, resolution: float) -> World:
 
     """
     check = SAMPLED_MAP_CHECK if world.edge_check is MAP_CHECK else POINTS_ARM_CHECK
-    return replace(world, edge_check=check, resolution=_spacing(resolution))
-
-
-def _spacing(resolution: float) -> float:
-    if not resolution > 0.0:
-        raise OptionsError(f'resolution: {resolution}, expected a spacing > 0 [rad]')
-    return resolution
+    return replace(world, edge_check=check, resolution=resolution)

@@ -6,7 +6,7 @@ import functools
 import math
 
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.arm import ArmModel, bars_of
 from rrth_planner.arrays import Array
 
 # A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
@@ -101,23 +101,8 @@ def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
 
 @functools.lru_cache(maxsize=16)
 def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
-    """
-    Return the offsets of the chain that are bars of the arm, from the mount outwards.
-
-    Offsets of length zero are no bars. Those that no joint moves belong to the mount, which is
-    worn on the body and so cannot keep clear of it.
-    """
-    bars = []
-    is_moved = False
-    for row in range(arm.dof + 1):
-        is_joint = row < arm.dof
-        if is_moved and arm.dh[row, 1] != 0.0:
-            bars.append((row, 'a'))
-        slides = is_joint and arm.is_prismatic[row]
-        if slides or not is_joint or (is_moved and arm.dh[row, 3] != 0.0):
-            bars.append((row, 'd'))
-        is_moved = True
-    return tuple(bars)
+    """Return the bars of an arm as `arm.bars_of` does."""
+    return bars_of(arm.dh, arm.is_prismatic)
 
 
 @functools.lru_cache(maxsize=16)

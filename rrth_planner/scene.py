@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.entries import printable
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels.layout import NUMBERS, ORTHOGONAL, ROTATION, SIZE
+from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ def _fill(box: Box, name: str, row: Array) -> None:
 @dataclass(frozen=True, slots=True)
 class Scene:
     """
-    The wearer: any number of boxes in the base frame.
+    The wearer: boxes in the base frame.
 
     Parameters
     ----------
@@ -104,14 +104,21 @@ class Scene:
     numbers : ndarray, shape (n, 15)
         Those of the boxes.
 
+    Raises
+    ------
+    SceneError
+        More boxes than kernels have room for.
+
     """
 
     boxes: tuple[Box, ...]
     numbers: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Freeze the collection."""
+        """Validate and freeze the collection."""
         boxes = tuple(self.boxes)
+        if len(boxes) > MAX_BOXES:
+            raise SceneError(f'boxes: {len(boxes)}, expected at most {MAX_BOXES}')
         object.__setattr__(self, 'boxes', boxes)
         numbers = np.array([box.numbers for box in boxes]).reshape(len(boxes), NUMBERS)
         object.__setattr__(self, 'numbers', _frozen(numbers))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, FARTHEST
+from rrth_planner.arrays import Array, check_dof, FARTHEST
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
 from rrth_planner.kernels import arm_clearance, arm_validity, chain, contacts, jit
@@ -25,6 +25,8 @@ CONTACTS = jit.first_class(contacts.edge_contacts)
 FREE_RADIUS = jit.first_class(arm_clearance.free_radius)
 # Shortest interval that the proof of an edge looks at before it gives up [rad].
 RESOLUTION = 2e-5
+# Between finer ones the parts of a bar, and the checks along an edge, would be too many to count.
+FINEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -50,11 +52,16 @@ class World:
     contacts : compiled function
         The seam `kernels.jit.CONTACTS`.
     resolution : float
-        Third argument of the edge check [rad].
+        Third argument of the edge check [rad], at least `FINEST`.
     bar_names, box_names : tuple of str
         What messages call the arm's bars and the boxes.
     lanes : ndarray, shape (m,)
         Which lane of the last level of groups holds box i.
+
+    Raises
+    ------
+    OptionsError
+        A resolution that is too fine.
 
     """
 
@@ -73,7 +80,11 @@ class World:
     functions: Any = field(init=False)
 
     def __post_init__(self) -> None:
-        """Look up the addresses of the seams, entries as in `kernels.jit`."""
+        """Validate, and look up the addresses of the seams, entries as in `kernels.jit`."""
+        if not FINEST <= self.resolution < np.inf:
+            raise OptionsError(
+                f'resolution: {self.resolution}, expected a spacing from {FINEST:g} on [rad]'
+            )
         found = jit.addresses(self.edge_check, self.chain, self.free_radius, self.contacts)
         object.__setattr__(self, 'functions', found)
 
@@ -84,6 +95,7 @@ class World:
 
     def is_in_bounds(self, q: Array) -> bool:
         """Return whether a configuration, shape (dof,), respects the joints' limits."""
+        check_dof(q, self.bounds.shape[1], 'q')
         return bool(((q >= self.bounds[0]) & (q <= self.bounds[1])).all())
 
     def is_valid(self, q: Array, ray_length: float | None = None) -> bool:
@@ -116,6 +128,7 @@ class World:
         Contact is < 0: the depth by which a bar enters a box. q has the shape (dof,), or (n, dof)
         for the least over n configurations.
         """
+        check_dof(q, self.bounds.shape[1], 'q')
         ray = self.ray_length if ray_length is None else ray_length
         distances = np.empty((len(self.bar_names), jit.LANES * len(self.obstacles)))
         arm_clearance.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem
 from rrth_planner.errors import RrthError, SceneError
-from rrth_planner.options import RRTHOptions
+from rrth_planner.kernels.layout import MAX_DOF
+from rrth_planner.options import RRTHOptions, RRTOptions, RRTStarOptions
 from rrth_planner.planner import plan
-from rrth_planner.shortest import shortest_path
+from rrth_planner.shortest import enters, extended_obstacles, shortest_path
 from rrth_planner.text_files import load_yaml
 
 GATE = """
@@ -119,3 +120,30 @@ def test_touching_a_wall_is_no_entering():
         goal=[6, 4],
     )
     assert shortest_path(box_map)[0] == pytest.approx(5.0)
+
+
+def walled(n):
+    """Return a map of n dimensions with a wall between start and goal, open at the top."""
+    return BoxMap(
+        name='wall',
+        bounds=[[0.0] * n, [10.0] * n],
+        obstacles=[[[4.5] + [0.0] * (n - 1), [5.5] + [6.0] * (n - 1)]],
+        start=[1.0] * n,
+        goal=[9.0] + [1.0] * (n - 1),
+    )
+
+
+@pytest.mark.parametrize('kind', [RRTHOptions, RRTOptions, RRTStarOptions])
+def test_a_map_of_as_many_dimensions_as_there_may_be_is_planned_on(kind):
+    box_map = walled(MAX_DOF)
+    options = kind(step_size=20.0, max_samples=200, time_limit=1000.0)
+    q = plan(map_problem(box_map), options, np.random.default_rng(1)).path.waypoints
+    assert len(q) > 2
+    assert not enters(q[:-1], q[1:], extended_obstacles(box_map)).any()
+
+
+def test_a_map_of_no_dimensions_or_of_too_many_is_refused():
+    with pytest.raises(SceneError, match='bounds of 65 dimensions, expected 1 to 64'):
+        walled(MAX_DOF + 1)
+    with pytest.raises(SceneError, match='bounds of 0 dimensions, expected 1 to 64'):
+        BoxMap(name='none', bounds=[[], []], obstacles=[], start=[], goal=[])

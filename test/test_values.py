@@ -8,8 +8,11 @@ import warnings
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.aiming import FEW, goal_configurations
 from rrth_planner.arm import arm_from_mapping, ArmModel, forward_kinematics
 from rrth_planner.arrays import FARTHEST, frozen_array
+from rrth_planner.blend import round_corners
+from rrth_planner.certificate import certify, least_clearance
 from rrth_planner.errors import ModelError, OptionsError, RrthError, SceneError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import arm_validity
@@ -20,7 +23,16 @@ from rrth_planner.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
 from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown
-from worlds import examples, random_rotation, table_1_arm, table_1_mapping, wearer, wearer_world
+from worlds import (
+    examples,
+    FOLDED,
+    limits,
+    random_rotation,
+    table_1_arm,
+    table_1_mapping,
+    wearer,
+    wearer_world,
+)
 
 EYE = np.eye(3)
 
@@ -338,6 +350,28 @@ def test_bad_margins_are_refused():
         refuses(OptionsError, lambda bad=bad: arm_world(arm, wearer(), bad, 1.0), 'margin')
         refuses(OptionsError, lambda bad=bad: arm_world(arm, wearer(), 0.0, bad), 'ray_guard')
     refuses(SceneError, lambda: grown(wearer_world(), -1.0), 'growth')
+
+
+@pytest.mark.parametrize('n', [1, 3, 5])
+def test_values_of_another_number_of_joints_do_not_reach_a_kernel(n):
+    world, q, zeros = wearer_world(), np.zeros(n), np.zeros((2, n))
+    still = Trajectory(times=[0.0, 1.0], positions=zeros, velocities=zeros, accelerations=zeros)
+    joints = [{**table_1_mapping()['joints'][1], 'name': f'joint_{i}'} for i in range(n)]
+    other = arm_from_mapping(changed('joints', value=joints))
+    goal = PointingGoal([1.0, 1.0, 1.0])
+    for ask in (
+        lambda: world.is_valid(q),
+        lambda: world.is_edge_valid(FOLDED, q),
+        lambda: world.is_edge_valid(q, FOLDED),
+        lambda: world.clearances(q),
+        lambda: certify(still, world),
+        lambda: least_clearance(still, world),
+        lambda: round_corners(Path([q, q, q]), world, limits()),
+        lambda: goal_configurations(table_1_arm(), goal, world, q, FEW),
+        lambda: goal_configurations(other, goal, world, q, FEW),
+        lambda: goal_configurations(other, goal, world, FOLDED, FEW),
+    ):
+        refuses(RrthError, ask, 'shape', 'a value for each of')
 
 
 def test_a_frozen_array_is_a_finite_read_only_copy():

@@ -23,6 +23,7 @@ from rrth_planner.kernels.jit import (
     REACH,
     VEC,
 )
+from rrth_planner.kernels.layout import MAX_DOF
 
 ENDS_ROOM = 4 * MAX_ENDS
 # Configurations that a proof may visit, and numbers for their points, before it gives up.
@@ -215,7 +216,7 @@ def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
     if not (length < 0.5 * FIRST_INTERVAL * MAX_NODES and extent < LARGEST):
         return -1
     points, u = scratch.floats(POINTS_ROOM), scratch.floats(MAX_NODES)
-    q, bows = scratch.floats(MAX_ENDS), scratch.floats(MAX_ENDS)
+    q, bows = scratch.floats(MAX_DOF), scratch.floats(MAX_ENDS)
     # Queue of intervals: node at either end, then the run of `pool` that holds what is open.
     queue, pool = scratch.ints(QUEUE_ROOM), scratch.ints(POOL_ROOM)
     ray_length = robot[robot.shape[0] - 1, D]

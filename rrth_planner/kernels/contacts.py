@@ -7,8 +7,8 @@ import math
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.arm_validity import ENDS_ROOM, MAX_GROUPS
-from rrth_planner.kernels.geometry import MAX_ENDS
 from rrth_planner.kernels.jit import CHAIN, D, kernel, LANES, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
+from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.kernels.tree import distance
 
 # Passing closer than this counts as leaning on the box [m].
@@ -23,7 +23,8 @@ SHARE, GAP, PRESSED, SLOPES = range(4)
 # The golden section, and how often it narrows a place down: to 0.5 % of the spacing.
 GOLDEN, N_GOLDEN = 0.6180339887498949, 10
 # Pairs of a bar and a box that an edge may lean on.
-PAIRS_ROOM = 4 * MAX_ENDS
+MAX_PAIRS = 64
+PAIRS_ROOM = 4 * MAX_PAIRS
 
 
 @kernel(void(OUT_VEC, int64, MAT, int64, OUT_VEC))
@@ -81,7 +82,7 @@ def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, co
     """
     if n >= contacts.shape[0]:
         return n
-    q, points = scratch.floats(MAX_ENDS), scratch.floats(ENDS_ROOM)
+    q, points = scratch.floats(MAX_DOF), scratch.floats(ENDS_ROOM)
     bar, g, j = int64(pair[0]), int64(pair[1]), int64(pair[2])
     low, high = max(0.0, share - spacing), min(1.0, share + spacing)
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
@@ -123,11 +124,11 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     are closer than on either side of it, the gap there [m], its slope by each joint [m/rad].
     """
     dof, n, n_pairs = q_from.shape[0], 0, 0
-    points, q = scratch.floats(ENDS_ROOM), scratch.floats(MAX_ENDS)
+    points, q = scratch.floats(ENDS_ROOM), scratch.floats(MAX_DOF)
     # Bar, group, lane and last look of each pair that came close; its gap then; is it falling?
-    pairs, gaps = scratch.ints(PAIRS_ROOM), scratch.floats(MAX_ENDS)
+    pairs, gaps = scratch.ints(PAIRS_ROOM), scratch.floats(MAX_PAIRS)
     now = scratch.floats(LANES)
-    falling, waiting = scratch.ints(MAX_ENDS), scratch.ints(MAX_GROUPS)
+    falling, waiting = scratch.ints(MAX_PAIRS), scratch.ints(MAX_GROUPS)
     ray_length = robot[robot.shape[0] - 1, D]
     n_looks = int64(distance(q_from, q_to) / SPACING) + 2
     spacing = 1.0 / (n_looks - 1)
@@ -157,7 +158,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                         and pairs[4 * row + 2] == j
                     ):
                         row += 1
-                    if row == MAX_ENDS:
+                    if row == MAX_PAIRS:
                         continue
                     if row == n_pairs:
                         n_pairs += 1

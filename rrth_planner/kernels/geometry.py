@@ -8,13 +8,14 @@ from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, LANES, MAT, OUT_VEC
+from rrth_planner.kernels.layout import MAX_BARS
 
 # Bars nearer than this are in contact [m].
 CONTACT = 1e-12
 # Up to four points in the axes of LANES boxes.
 LOCAL_ROOM = 12 * LANES
-# Ends of bars that an arm may have: two a DH row, and the start of the first bar.
-MAX_ENDS = 64
+# Ends of all bars of an arm, and the start of the first one.
+MAX_ENDS = MAX_BARS + 1
 
 
 @kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')

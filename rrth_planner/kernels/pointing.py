@@ -28,10 +28,13 @@ from rrth_planner.kernels.kinematics import sine_cosine
 from rrth_planner.kernels.tree import copy, distance
 
 TURN = 2.0 * math.pi
-# Joints of an arm at most; steps of the search for the nearest goal, and halvings of each; the
-# step of its differences [rad or m], and the least relative gain that another step follows.
-MAX_DOF, MAX_NEWTON, MAX_HALVINGS, DIFFERENCE, FINE = 32, 12, 6, 1e-6, 1e-5
-SLOPES_ROOM = SQUARE_ROOM = MAX_DOF * MAX_DOF
+# Joints of an arm that aims in closed form, at most: the search for a nearer goal looks at all
+# neighbours on a grid, three times as many with every joint.
+MAX_CLOSED_DOF = 8
+SLOPES_ROOM = SQUARE_ROOM = MAX_CLOSED_DOF * MAX_CLOSED_DOF
+# Steps of the search for the nearest goal, and halvings of each; the step of its differences [rad
+# or m], and the least relative gain that another step follows.
+MAX_NEWTON, MAX_HALVINGS, DIFFERENCE, FINE = 12, 6, 1e-6, 1e-5
 
 
 @kernel(void(MAT, int64, OUT_VEC))
@@ -179,7 +182,7 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
     """
     dof, n_free = q.shape[0], q.shape[0] - 2
     slopes, square = scratch.floats(SLOPES_ROOM), scratch.floats(SQUARE_ROOM)
-    step, q_try = scratch.floats(MAX_DOF), scratch.floats(MAX_DOF)
+    step, q_try = scratch.floats(MAX_CLOSED_DOF), scratch.floats(MAX_CLOSED_DOF)
     # Views of the length of q, as the kernels expect them.
     trial = q_try[:dof]
     reach = aim(robot, bounds, target, q, branch, q)
@@ -193,27 +196,27 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
             if aim(robot, bounds, target, q, branch, trial) < 0.0:
                 return reach
             for k in range(dof):
-                slopes[MAX_DOF * i + k] = (trial[k] - q[k]) / h
+                slopes[MAX_CLOSED_DOF * i + k] = (trial[k] - q[k]) / h
         for i in range(n_free):
             step[i] = 0.0
             for k in range(dof):
-                step[i] -= slopes[MAX_DOF * i + k] * (q[k] - q_from[k])
+                step[i] -= slopes[MAX_CLOSED_DOF * i + k] * (q[k] - q_from[k])
             for j in range(n_free):
                 total = 1e-9 if i == j else 0.0
                 for k in range(dof):
-                    total += slopes[MAX_DOF * i + k] * slopes[MAX_DOF * j + k]
-                square[MAX_DOF * i + j] = total
+                    total += slopes[MAX_CLOSED_DOF * i + k] * slopes[MAX_CLOSED_DOF * j + k]
+                square[MAX_CLOSED_DOF * i + j] = total
         # Gauss: the matrix is positive.
         for i in range(n_free):
             for j in range(i + 1, n_free):
-                factor = square[MAX_DOF * j + i] / square[MAX_DOF * i + i]
+                factor = square[MAX_CLOSED_DOF * j + i] / square[MAX_CLOSED_DOF * i + i]
                 step[j] -= factor * step[i]
                 for k in range(i, n_free):
-                    square[MAX_DOF * j + k] -= factor * square[MAX_DOF * i + k]
+                    square[MAX_CLOSED_DOF * j + k] -= factor * square[MAX_CLOSED_DOF * i + k]
         for i in range(n_free - 1, -1, -1):
             for j in range(i + 1, n_free):
-                step[i] -= square[MAX_DOF * i + j] * step[j]
-            step[i] /= square[MAX_DOF * i + i]
+                step[i] -= square[MAX_CLOSED_DOF * i + j] * step[j]
+            step[i] /= square[MAX_CLOSED_DOF * i + i]
         share, best, is_nearer = 1.0, distance(q, q_from), False
         for _ in range(MAX_HALVINGS):
             for i in range(n_free):
