@@ -30,26 +30,25 @@ os.replace = full
 """
 
 
-# The kinematics of an arm, of one link or of a longer one.
+# The kinematics of an arm of one joint and one link, of that length.
 CHAIN = """
 import sys
 import numpy as np
-from rrth_planner.arm import ArmModel
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.chain import chain_of
 from rrth_planner.kernels.kept_code import KeptCode
-from rrth_planner.world import arm_rows
 compiled = []
 save = KeptCode.save_overload
 def note(self, signature, result):
     compiled.append(self._function.__name__)
     save(self, signature, result)
 KeptCode.save_overload = note
-dh = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, LENGTH, 0.0, 0.0]])
-arm = ArmModel(
-    joint_names=('j',), is_prismatic=(False,), dh=dh, bounds=[[-1.0], [1.0]], radii=[0.0, 0.0],
-    T_base_mount=np.eye(4),
-)
+rows = np.zeros((2, jit.REACH))
+rows[:, jit.COS_ALPHA] = 1.0
+rows[:, [jit.RADIUS_A, jit.RADIUS_D]] = jit.NO_BAR
+rows[1, [jit.A, jit.RADIUS_A]] = LENGTH, 0.0
 points = np.zeros(12)
-arm_rows(arm, 0.0)[1](np.zeros(1), 0.0, points, 0)
+chain_of(rows)(np.zeros(1), 0.0, points, 0)
 print(points[4], *compiled, file=sys.stderr)
 """
 
