@@ -110,7 +110,7 @@ NUMBERS = {
     'quick_stop': {'3': 'limits; phases', '4': 'derivatives; columns', '5': 'columns'},
     'rrt': {'2': 'ends of a path'},
     'speeds': {'2': 'columns', '3': 'derivatives'},
-    'stop_points': {'4': 'derivatives'},
+    'stop_points': {'3': 'derivatives', '4': 'derivatives'},
     'stop_search': {'3': 'phases', '5': 'columns'},
     'taut': {'2': 'sides of a corner'},
     'way_ahead': {'3': 'derivatives', '4': 'derivatives'},
@@ -203,7 +203,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
     scene = boxes_round(rng)
     world = arm_world(arm, scene, MARGIN, 0.5)
     n_free = 0
-    for q in rng.uniform(*arm.bounds, (200, n_joints)):
+    for q in rng.uniform(*arm.bounds, (100, n_joints)):
         ends = oracle_bars(arm, q, 0.5)
         assert np.abs(kernel_bars(arm, world, q, 0.5) - ends[0]).max() < 1e-12
         touched = [
@@ -212,10 +212,10 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         ]
         assert world.is_valid(q) == (not any(touched))
         n_free += not any(touched)
-    assert 20 < n_free < 180
+    assert 10 < n_free < 90
     proofs = {1: 0, 0: 0, -1: 0}
     rows = np.empty((50, contacts.SLOPES + n_joints))
-    for _ in range(60):
+    for _ in range(20):
         q = free_configuration(rng, world)
         step = rng.standard_normal(n_joints)
         q_to = q + 0.2 * step / np.linalg.norm(step)
@@ -232,7 +232,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         assert not (proof == 1 and edge_touches(arm, scene, MARGIN, 0.5, q, q_to))
         proofs[proof] += 1
         contacts.edge_contacts(q, q_to, world.chain, world.robot, world.obstacles, rows)
-    assert proofs[1] > 10
+    assert proofs[1] > 5
 
 
 def test_an_arm_as_large_as_there_is_room_for_plans():
@@ -338,7 +338,7 @@ def test_an_edge_that_leans_on_more_than_there_is_room_for_finds_as_many_as_ther
     rows[:, 2] += 0.55
     world = arm_world(arm, Scene(tuple(Box.of_row('box', row) for row in rows)), 0.0, 1.0)
     n_most = 0
-    for _ in range(200):
+    for _ in range(40):
         q_from, q_to = rng.uniform(*arm.bounds, (2, 4))
         for capacity in (0, 1, 7, lean.MAX_CONTACTS):
             rows = np.full((capacity + 2, contacts.SLOPES + 4), 7.0)
