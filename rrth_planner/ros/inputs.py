@@ -139,10 +139,9 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
         known = None
-        if running is not None and joints.taken < running.start_time <= time:
-            # The arm was not on it yet: a stop, for one, may just have been told.
-            known = joints.taken - running.start_time, 1.0
-        elif running is not None and not self.is_moving(joints.taken):
+        if running is not None and (
+            joints.taken < running.start_time <= time or not self.is_moving(joints.taken)
+        ):
             known = self._followed(running)
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
@@ -165,6 +164,9 @@ class PlanInputs:
         """Return the time within a motion where an arm hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities
+        if joints.taken < running.start_time:
+            # The arm was not on it yet: it may just have been told, a stop for one.
+            return joints.taken - running.start_time, 1.0
         # An arm that follows its motion slowly hardly moves for long: it only seems on time.
         with np.errstate(all='ignore'):
             found = sharp_phase_of(q, v, running.trajectory)
