@@ -34,6 +34,10 @@ class RequestError(RrthError):
         self.code = code
 
 
+class ArmHasMoved(RequestError):
+    """The arm is not where a motion needs it."""
+
+
 class Input(Generic[T]):
     """
     The last good value of one topic; a refused message changes nothing but the counts.
@@ -112,9 +116,9 @@ class PlanInputs:
         )
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
-        """Raise RequestError where the arm moves at a time [s]."""
+        """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise RequestError(
+            raise ArmHasMoved(
                 ErrorCode.START_STATE_INVALID,
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
@@ -139,9 +143,10 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected a velocity for every joint',
             )
         known = None
-        if running is not None and (
-            joints.taken < running.start_time <= time or not self.is_moving(joints.taken)
-        ):
+        if running is not None and joints.taken < running.start_time <= time:
+            # The arm was not on it yet: a stop, for one, may just have been told.
+            known = joints.taken - running.start_time, 1.0
+        elif running is not None and not self.is_moving(joints.taken):
             known = self._followed(running)
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
@@ -164,9 +169,6 @@ class PlanInputs:
         """Return the time within a motion where an arm hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities
-        if joints.taken < running.start_time:
-            # The arm was not on it yet: it may just have been told, a stop for one.
-            return joints.taken - running.start_time, 1.0
         # An arm that follows its motion slowly hardly moves for long: it only seems on time.
         with np.errstate(all='ignore'):
             found = sharp_phase_of(q, v, running.trajectory)

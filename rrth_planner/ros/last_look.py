@@ -12,7 +12,7 @@ from rrth_planner.leaving import box_depths
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
-from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
+from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import Start
@@ -132,7 +132,7 @@ class LastLook:
         return not self.is_late()
 
     def _require_arm(self, present: PlanInputs, now: float) -> None:
-        """Raise RequestError where the arm is not where the motion needs it."""
+        """Raise ArmHasMoved where the arm is not where the motion needs it."""
         inputs, start, arm = self.inputs, self.start, self.parameters.arm
         expected = inputs.q_start
         if start is None:
@@ -142,7 +142,7 @@ class LastLook:
         moved = float(np.abs(present.q_start - expected).max())
         if not moved <= START_TOLERANCE:
             what = 'moved by' if start is None else 'is off its course by'
-            raise RequestError(
+            raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
                 f'{START_TOLERANCE:g} rad',

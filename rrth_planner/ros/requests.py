@@ -14,7 +14,7 @@ from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
-from rrth_planner.ros.inputs import Inputs, PlanInputs, RequestError
+from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
 from rrth_planner.ros.last_look import LastLook, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import LEADS, Start
@@ -135,7 +135,13 @@ def plan_request(
                 start.wait(clock, should_stop, clock() - begin)
             outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
             look = LastLook(heard, clock, parameters, inputs, plan, start, should_stop)
-            told = _told(outcome, look, tell)
+            try:
+                told = _told(outcome, look, tell)
+            except ArmHasMoved:
+                if start is not None or running is None or lead == LEADS[-1]:
+                    raise
+                # It seemed at rest, and has just begun the motion that it was told.
+                continue
             if told is not None:
                 return told
         raise RequestError(

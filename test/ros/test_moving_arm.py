@@ -234,13 +234,10 @@ def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
     assert np.abs(found.state.positions - (q + 0.005 * v)).max() < 1e-12
 
 
-def test_an_arm_that_has_just_been_told_to_move_is_not_taken_to_rest():
-    motion = _swings()
-    q, v, _ = (row[0] for row in sample(motion, [0.0]))
-    reading = JointReading(q, v, BEGIN - 0.01, BEGIN - 0.01, float('inf'))
-    inputs = PlanInputs(worlds.wearer(), TARGET, reading)
-    running = RunningMotion(trajectory=motion, start_time=BEGIN)
-    assert not inputs.is_moving(BEGIN + 0.02)
-    assert inputs.pauses(running, BEGIN + 0.02, LEADS[1])
-    found = inputs.ahead(running, BEGIN + 0.27, worlds.table_1_arm())
-    assert found.time == pytest.approx(0.27)
+def test_an_arm_that_begins_to_move_while_a_plan_is_made_is_planned_for_as_it_moves(ask):
+    outcome, _ = ask(_swings(), since=-1e-3, reading=0.05)
+    assert outcome.code is ErrorCode.SUCCESS
+    assert outcome.start is not None
+    # By somebody else it is not known how it goes on.
+    outcome, _ = ask(_swings(), since=-1e-3, reading=0.05, is_known=False)
+    assert outcome.code is ErrorCode.START_STATE_INVALID
