@@ -5,6 +5,7 @@
 from collections.abc import Callable, Sequence
 import time
 from typing import Any
+import warnings
 
 from geometry_msgs.msg import PointStamped
 import numpy as np
@@ -81,7 +82,12 @@ class PlannerClient(Node):
 
     def take_messages(self, longest: float = 0.05) -> None:
         """Take a message, if one comes within a time [s]."""
-        self._spinner.spin_once(timeout_sec=longest)
+        try:
+            self._spinner.spin_once(timeout_sec=longest)
+        except KeyboardInterrupt:
+            # What is cut off in mid-step would warn of that when Python ends.
+            warnings.simplefilter('ignore', RuntimeWarning)
+            raise
         self._check()
 
     def wait_for_planner(self) -> None:

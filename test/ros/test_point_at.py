@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -273,6 +274,17 @@ def client(ros_context):
     client = PlannerClient('point_at', 0.5)
     yield client
     client.destroy_node()
+
+
+def test_an_interrupt_in_mid_step_leaves_no_other_words(client, monkeypatch):
+    def interrupted(**_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(client._spinner, 'spin_once', interrupted)
+    with warnings.catch_warnings():
+        with pytest.raises(KeyboardInterrupt):
+            client.take_messages()
+        assert warnings.filters[0][:3:2] == ('ignore', RuntimeWarning)
 
 
 def turn(to, duration):
