@@ -9,9 +9,9 @@ from functools import cache
 
 import numpy as np
 from rrth_planner.arm import ArmModel
+from rrth_planner.arm_file import load_arm
 from rrth_planner.arrays import Array
 from rrth_planner.oracle import first_contact
-from rrth_planner.resources import load_arm
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 
@@ -119,7 +119,7 @@ def judge_bytes(task: tuple[bytes, tuple, bool]) -> tuple[str, bool]:
 
     """
     from rclpy.serialization import deserialize_message
-    from rrth_planner.ros.messages import joint_trajectory_from_msg
+    from rrth_planner.ros.trajectories import joint_trajectory_from_msg
     from trajectory_msgs.msg import JointTrajectory
 
     from benchmarks.soak_body import scene_of_body

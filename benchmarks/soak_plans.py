@@ -10,8 +10,8 @@ import sys
 import time
 
 import numpy as np
+from rrth_planner.arm_file import load_arm
 from rrth_planner.arrays import Array
-from rrth_planner.resources import load_arm
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.world import arm_world
 from tqdm import tqdm

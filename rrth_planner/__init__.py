@@ -12,13 +12,13 @@ from typing import Any
 
 _HOME = {
     'ArmModel': 'arm',
-    'arm_from_mapping': 'arm',
+    'arm_from_mapping': 'arm_file',
     'forward_kinematics': 'arm',
     'tool_pose': 'arm',
     'Box': 'scene',
     'Scene': 'scene',
     'PointingGoal': 'goal',
-    'load_body': 'body_file',
+    'load_body': 'wearer_file',
     'RRTHOptions': 'options',
     'RRTOptions': 'options',
     'RRTStarOptions': 'options',
@@ -30,7 +30,7 @@ _HOME = {
     'goal_configurations': 'aiming',
     'pointing_problem': 'aiming',
     'BoxMap': 'box_map',
-    'map_from_mapping': 'box_map',
+    'map_from_mapping': 'map_file',
     'map_problem': 'box_map',
     'map_world': 'box_map',
     'load_map': 'map_file',
@@ -46,7 +46,7 @@ _HOME = {
     'certify': 'certificate',
     'brake': 'braking',
     'certify_braking': 'braking',
-    'load_arm': 'resources',
+    'load_arm': 'arm_file',
     'RrthError': 'errors',
 }
 

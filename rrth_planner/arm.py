@@ -2,18 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The arm: a chain of modified Denavit-Hartenberg rows that ends in a pointing ray."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.entries import mapping, number, printable, sequence
-from rrth_planner.errors import ModelError, shown
+from rrth_planner.errors import ModelError, printable
 from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF
-from rrth_planner.rotation import pose_matrix
 
 # What the rows of an arm's file say, and their units.
 ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}
@@ -132,67 +128,6 @@ def bars_of(dh: Array, is_prismatic: tuple[bool, ...]) -> tuple[tuple[int, str],
         if slides or not is_joint or (is_moved and dh[row, 3] != 0.0):
             bars.append((row, 'd'))
     return tuple(bars)
-
-
-def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
-    """
-    Return the arm that a mapping describes, laid out as in `config/arm.yaml`.
-
-    Raises
-    ------
-    ModelError
-        Something is missing, has another name or describes no arm.
-
-    """
-    given = mapping(data, 'arm', ('joints', 'tool', 'mount'), ModelError, ('name',))
-    printable(given.get('name', 'arm'), 'arm: name', ModelError)
-    joints = [
-        _joint(i, joint) for i, joint in enumerate(sequence(given['joints'], 'joints', ModelError))
-    ]
-    mount = mapping(given['mount'], 'mount', ('position', 'quaternion_xyzw'), ModelError)
-    position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
-    quaternion = frozen_array(
-        mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError, FARTHEST
-    )
-    if np.linalg.norm(quaternion) < 1e-6:
-        raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
-    rows = [*joints, _tool(given['tool'])]
-    return ArmModel(
-        joint_names=tuple(joint['name'] for joint in joints),
-        is_prismatic=tuple(joint['type'] == 'prismatic' for joint in joints),
-        dh=np.array([[row[key] for key in ROW] for row in rows]),
-        bounds=np.array([[joint[key] for joint in joints] for key in ('lower', 'upper')]),
-        radii=np.array([row['radius'] for row in rows]),
-        T_base_mount=pose_matrix(position, quaternion),
-    )
-
-
-def _joint(index: int, data: Any) -> dict[str, Any]:
-    """Return what an arm's file says of a joint, its radius included."""
-    wanted = ('name', 'type', *ROW, 'lower', 'upper')
-    given = {'radius': 0.0, **mapping(data, f'joint {index}', wanted, ModelError, ('radius',))}
-    label = f'joint "{printable(given["name"], f"joint {index}: name", ModelError)}"'
-    kind = given['type']
-    if kind not in ('revolute', 'prismatic'):
-        raise ModelError(f'{label}: type {shown(kind)}, expected revolute or prismatic')
-    limit = 'm' if kind == 'prismatic' else 'rad'
-    return given | _numbers(given, label, {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'})
-
-
-def _tool(data: Any) -> dict[str, Any]:
-    """Return the row of the tool, its radius and a `d` of 0 included."""
-    wanted = ('alpha', 'a', 'offset')
-    given = mapping(data, 'tool', wanted, ModelError, ('d', 'radius'))
-    row = _numbers({'d': 0.0, 'radius': 0.0, **given}, 'tool', {**ROW, 'radius': 'm'})
-    if row['d'] != 0.0:
-        raise ModelError(f'tool: d = {row["d"]}, expected none: the ray begins at the frame [m]')
-    return row
-
-
-def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> dict[str, float]:
-    return {
-        key: number(given[key], f'{label}: {key}', unit, ModelError) for key, unit in units.items()
-    }
 
 
 def forward_kinematics(arm: ArmModel, q: Array) -> Array:

@@ -2,14 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps of axis-aligned boxes, in the plane or in any dimension, for a point to move among."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.entries import printable
-from rrth_planner.errors import SceneError, shown
+from rrth_planner.errors import printable, SceneError
 from rrth_planner.kernels import chain, contacts, jit, map_validity
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.problem import PlanningProblem
@@ -19,9 +16,6 @@ EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)
 NO_CONTACTS = jit.first_class(contacts.no_contacts)
 FREE_RADIUS = jit.first_class(map_validity.free_radius)
-# What a mapping that describes a map may say.
-ENTRIES = ('name', 'bounds', 'rectangles', 'boxes', 'start', 'goal')
-EXPECTED = 'bounds, rectangles or boxes, start and goal, and a name or none'
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -91,47 +85,6 @@ class BoxMap:
                     f'{name}: {field} {q.tolist()} is inside obstacle '
                     f'{int(np.argmax(inside))}, expected a free point'
                 )
-
-
-def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:
-    """
-    Return the map that a mapping describes, laid out as the files in `config/maps`.
-
-    In the plane a row of `rectangles` is xmin, ymin, xmax, ymax; in general a row of `boxes` is
-    the lower corner, then the upper one, and `bounds` alike. A map has the one or the other.
-
-    Raises
-    ------
-    SceneError
-        Something is missing, has another name, is there twice or describes no map.
-
-    """
-    label = f'map "{printable(name, "name of a map", SceneError)}"'
-    if not isinstance(data, Mapping):
-        raise SceneError(f'{label}: {shown(data)}, expected a mapping with {EXPECTED}')
-    # A wall under a name that nobody reads would be no wall.
-    unknown = [str(key) for key in data if key not in ENTRIES]
-    if unknown:
-        raise SceneError(f'{label}: {", ".join(unknown)} unknown, expected only {EXPECTED}')
-    if 'rectangles' in data and 'boxes' in data:
-        raise SceneError(f'{label}: rectangles and boxes, expected one of them')
-    rows = 'rectangles' if 'rectangles' in data else 'boxes'
-    for key in ('bounds', rows, 'start', 'goal'):
-        if key not in data:
-            raise SceneError(f'{label}: no {key!r}, expected {EXPECTED}')
-    start = frozen_array(data['start'], (None,), f'{label}: start', 'map', SceneError)
-    dof = len(start)
-    bounds = frozen_array(data['bounds'], (2 * dof,), f'{label}: bounds', 'map', SceneError)
-    obstacles = data[rows]
-    if obstacles != []:
-        obstacles = frozen_array(obstacles, (None, 2 * dof), f'{label}: {rows}', 'map', SceneError)
-    return BoxMap(
-        name=data.get('name', name),
-        bounds=bounds.reshape(2, dof),
-        obstacles=np.reshape(obstacles, (-1, 2, dof)),
-        start=start,
-        goal=data['goal'],
-    )
 
 
 def map_world(box_map: BoxMap) -> World:

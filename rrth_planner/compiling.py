@@ -10,7 +10,7 @@ import sys
 # What either process compiles, about as much each, the one what the other does not ask for soon.
 SHARES = (
     ('lean', 'arm_clearance', 'chain', 'pieces'),
-    ('quick_stop', 'following', 'speeds', 'depths', 'taut', 'rrt', 'rrt_h', 'goals'),
+    ('quick_stop', 'quintics', 'speeds', 'depths', 'taut', 'rrt', 'rrt_h', 'goals'),
 )
 
 

@@ -8,9 +8,6 @@ from typing import Any
 
 from rrth_planner.errors import RrthError, shown
 
-# Of what messages and pictures call things [characters].
-LONGEST_NAME = 256
-
 
 def mapping(
     value: Any,
@@ -73,16 +70,3 @@ def text(value: Any, name: str, error: type[RrthError]) -> str:
     if not isinstance(value, str):
         raise error(f'{name}: {shown(value)}, expected a text')
     return value
-
-
-def printable(value: Any, name: str, error: type[RrthError]) -> str:
-    """
-    Return a name, which sentences may quote, or raise.
-
-    Line ends, escape sequences of terminals and marks that turn the direction of writing round
-    are not printable.
-    """
-    given = text(value, name, error)
-    if not 0 < len(given) <= LONGEST_NAME or not given.isprintable():
-        raise error(f'{name}: {shown(given)}, expected 1 to {LONGEST_NAME} printable characters')
-    return given

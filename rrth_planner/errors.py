@@ -5,6 +5,9 @@
 import reprlib
 from typing import Any
 
+# Of what messages and pictures call things [characters].
+LONGEST_NAME = 256
+
 # Whatever was given may be as long as it likes; what is said of it may not [characters].
 LONGEST_SENTENCE = 1000
 
@@ -57,3 +60,17 @@ class MessageError(RrthError):
 
 class RecordError(RrthError):
     """A record of an incident that says too little, too much or nothing."""
+
+
+def printable(value: Any, name: str, error: type[RrthError]) -> str:
+    """
+    Return a name, which sentences may quote, or raise.
+
+    Line ends, escape sequences of terminals and marks that turn the direction of writing round
+    are not printable.
+    """
+    if not isinstance(value, str):
+        raise error(f'{name}: {shown(value)}, expected a text')
+    if not 0 < len(value) <= LONGEST_NAME or not value.isprintable():
+        raise error(f'{name}: {shown(value)}, expected 1 to {LONGEST_NAME} printable characters')
+    return value

@@ -13,7 +13,7 @@ from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
 from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import Lead
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import MotionLimits, part_of, Trajectory
+from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import grown, World
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
@@ -117,14 +117,6 @@ def way_out(
         f'{sentence}, and no straight way out of it is proven free; expected a start clear of '
         'the wearer',
     )
-
-
-def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
-    """Return what is left of a motion when the arm is out, at one of its points [s]."""
-    if escape_time == 0.0:
-        return trajectory
-    begin = trajectory.times[np.abs(trajectory.times - escape_time).argmin()]
-    return part_of(trajectory, float(begin), trajectory.duration)
 
 
 def _said(world: World, depths: Array, hair: float) -> str:

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.entries import mapping, printable, sequence
-from rrth_planner.errors import RecordError, RrthError, shown
+from rrth_planner.entries import mapping, sequence
+from rrth_planner.errors import printable, RecordError, RrthError, shown
 from rrth_planner.text_files import MOST_VALUES, parse_yaml, read_text, to_yaml
 from rrth_planner.trajectory import sample, Trajectory
 

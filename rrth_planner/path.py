@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import RrthError
-from rrth_planner.kernels import tree
+from rrth_planner.kernels import vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,4 +33,4 @@ class Path:
     @property
     def length(self) -> float:
         """Sum of the edge lengths in joint space [rad]."""
-        return float(tree.path_length(self.waypoints, len(self.waypoints)))
+        return float(vectors.path_length(self.waypoints, len(self.waypoints)))

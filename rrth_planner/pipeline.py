@@ -32,8 +32,9 @@ from rrth_planner.refusal import (
     within_limits,
 )
 from rrth_planner.scene import Box, Scene
+from rrth_planner.start_state import Takeover
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import Lead, lead_in, stop_first, Takeover
+from rrth_planner.takeover import Lead, lead_in, stop_first
 from rrth_planner.touch import Disagreement
 from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World

@@ -11,7 +11,7 @@ from rrth_planner.errors import OptionsError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import TreeOptions
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import Takeover
+from rrth_planner.start_state import Takeover
 from rrth_planner.trajectory import MotionLimits
 
 

@@ -9,8 +9,7 @@ import sys
 
 import numpy as np
 from rrth_planner.aiming import check_pointing_arm
-from rrth_planner.arm import arm_from_mapping
-from rrth_planner.arm_file import arm_to_mapping, arm_to_yaml
+from rrth_planner.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import ModelError, one_line, RrthError
 from rrth_planner.rotation import pose_matrix

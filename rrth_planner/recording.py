@@ -12,8 +12,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array, frozen_array
 from rrth_planner.errors import RecordError
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import REST_SPEED
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.world import arm_world, World
 
 # What the guard says while it brakes.

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import frozen_array
-from rrth_planner.entries import mapping, number, printable, sequence, whole
-from rrth_planner.errors import RecordError, shown
+from rrth_planner.entries import mapping, number, sequence, whole
+from rrth_planner.errors import printable, RecordError, shown
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import ALGORITHMS, TreeOptions
 from rrth_planner.question import PlanQuestion
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import MotionState, Takeover
+from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import MotionLimits, Trajectory
 

@@ -5,9 +5,7 @@
 from pathlib import Path
 import sys
 
-from rrth_planner.arm import arm_from_mapping, ArmModel
 from rrth_planner.errors import ModelError
-from rrth_planner.text_files import parse_yaml, read_text
 
 
 def resource_path(name: str) -> Path:
@@ -30,35 +28,6 @@ def resource_path(name: str) -> Path:
         if (folder / name).is_file():
             return folder / name
     raise ModelError(f'file {name}: not found, expected in one of {[str(f) for f in folders]}')
-
-
-def load_arm(path: str | Path | None = None) -> ArmModel:
-    """
-    Return the arm that a YAML file describes, laid out as `config/arm.yaml`.
-
-    Parameters
-    ----------
-    path : str or Path, optional
-        None or empty: the packaged arm.
-
-    Raises
-    ------
-    ModelError
-        The file cannot be read, or describes no arm.
-
-    """
-    file = Path(path) if path else resource_path('config/arm.yaml')
-    text = read_text(file)
-    if text.lstrip().startswith('<'):
-        raise ModelError(
-            f'file {file}: XML, as a URDF is, expected an arm laid out as config/arm.yaml; '
-            'read_urdf writes one from a URDF'
-        )
-    data = parse_yaml(text, f'file {file}')
-    try:
-        return arm_from_mapping(data)
-    except ModelError as problem:
-        raise ModelError(f'file {file}: {problem}') from problem
 
 
 def _share_folders() -> list[Path]:

@@ -7,9 +7,15 @@ import math
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.kernels.following import time_on
-from rrth_planner.takeover import REST_SPEED, SAME_POSITION
-from rrth_planner.trajectory import piece_coefficients, positions_at, sample, Trajectory
+from rrth_planner.kernels.quintics import time_on
+from rrth_planner.localization import SAME_POSITION
+from rrth_planner.trajectory import (
+    piece_coefficients,
+    positions_at,
+    REST_SPEED,
+    sample,
+    Trajectory,
+)
 
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
 SLOW, LATEST = 0.05, 0.05

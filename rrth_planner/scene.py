@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.entries import printable
-from rrth_planner.errors import SceneError
+from rrth_planner.errors import printable, SceneError
 from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
 
 

@@ -8,42 +8,16 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.braking import brake
 from rrth_planner.kernels.speeds import ramp_time
+from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.timing import peaks
-from rrth_planner.trajectory import MotionLimits, near_point, sample, Trajectory
+from rrth_planner.trajectory import MotionLimits, Trajectory
 
-# An arm that moves no faster is at rest [rad/s].
-REST_SPEED = 0.01
 # What rounding leaves of a speed where a motion ends: it has no direction [rad/s].
 RESIDUAL_SPEED = 1e-6
 # Accelerations die away in whole ticks, so that no two points are closer [s].
 TICK = 1e-3
 # The joints' limits less this, for the end of the lead-in to spend.
 RESERVE = 0.99
-# A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
-SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
-SEARCH_SPACING = 1e-3
-# Where it hardly moves, so close [rad], and by so small a share of its own speed; slower, it has
-# no direction [rad/s].
-SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
-# No arm goes much faster than it was told.
-FASTEST_RATE = 1.05
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class MotionState:
-    """
-    Where the arm is and how it moves.
-
-    Parameters
-    ----------
-    positions, velocities, accelerations : ndarray, shape (dof,)
-        [rad, rad/s, rad/s^2].
-
-    """
-
-    positions: Array
-    velocities: Array
-    accelerations: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -126,27 +100,6 @@ def reserved(limits: MotionLimits) -> MotionLimits:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Takeover:
-    """
-    What an arm that moves does when a motion takes over from its present one.
-
-    Parameters
-    ----------
-    state : MotionState
-        At that time.
-    running : Trajectory or None
-        The motion that it follows until then; None where that is not known.
-    time : float
-        Within that motion [s].
-
-    """
-
-    state: MotionState
-    running: Trajectory | None = None
-    time: float = 0.0
-
-
 def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
     """Return the lead that is a stop along the present motion; None where that is not known."""
     if moving.running is None:
@@ -158,90 +111,3 @@ def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
         v, a, j = (np.maximum(*pair) for pair in own)
         allowed = MotionLimits(velocity=v, acceleration=a, jerk=j)
     return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)
-
-
-def takeover(
-    positions: Array,
-    velocities: Array,
-    running: Trajectory | None,
-    ahead: float,
-    known: tuple[float, float] | None = None,
-) -> Takeover:
-    """
-    Return what an arm will do, from a reading of it.
-
-    An arm that is seen to follow a known motion, at whatever rate, goes on to follow it, and what
-    it is told next it follows at the same rate: the state is that of the motion. Any other goes on
-    at the velocity it has; of its acceleration nothing is known.
-
-    Parameters
-    ----------
-    positions, velocities : ndarray, shape (dof,)
-        Of the reading [rad, rad/s].
-    running : Trajectory or None
-        The motion that the arm was last told to follow.
-    ahead : float
-        From the reading on, >= 0 [s].
-    known : tuple of float, optional
-        Where in that motion the arm is known to be [s], and at which rate it follows it; without,
-        that is looked for.
-
-    """
-    found = known
-    if running is not None and found is None:
-        found = phase_of(positions, velocities, running)
-    if running is None or found is None:
-        return Takeover(
-            state=MotionState(
-                positions=positions + ahead * velocities,
-                velocities=velocities,
-                accelerations=np.zeros_like(velocities),
-            )
-        )
-    phase, rate = found
-    # At a point of the motion where there is one: no piece of what follows is too short.
-    time = near_point(running, min(phase + rate * ahead, running.duration))
-    q, v, a = (values[0] for values in sample(running, [time]))
-    return Takeover(
-        state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time
-    )
-
-
-def sharp_phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
-    """Return the same as `phase_of` of an arm that hardly moves, where its reading is so exact."""
-    speed = float(np.linalg.norm(v))
-    if speed < STILL:
-        return None
-    found = phase_of(q, v, running, (SHARP_POSITION, SHARP_VELOCITY * speed))
-    return None if found is None or found[1] > FASTEST_RATE else found
-
-
-def phase_of(
-    q: Array,
-    v: Array,
-    running: Trajectory,
-    same: tuple[float, float] = (SAME_POSITION, SAME_VELOCITY),
-) -> tuple[float, float] | None:
-    """
-    Return the time within a motion at which the arm is [s], and at which rate it follows it.
-
-    None where the motion does not pass so close to the reading, `same` [rad, rad/s].
-    """
-    n = max(2, int(running.duration / SEARCH_SPACING))
-    times = np.linspace(0.0, running.duration, n)
-    path, along, _ = sample(running, times)
-    # A motion that passes a place twice does so in another direction.
-    speed, pace = float(np.linalg.norm(v)), np.linalg.norm(along, axis=1)
-    heading = along @ v / (pace * speed + 1e-300)
-    gaps = np.linalg.norm(path - q, axis=1) + np.where(heading > 0.9, 0.0, np.inf)
-    phase = float(times[int(np.argmin(gaps))])
-    if not np.isfinite(gaps.min()):
-        return None
-    for _ in range(3):
-        # The nearest point, by Newton's method.
-        p, w, _ = (values[0] for values in sample(running, [phase]))
-        phase = float(np.clip(phase + (q - p) @ w / (w @ w + 1e-300), 0.0, running.duration))
-    p, w, _ = (values[0] for values in sample(running, [phase]))
-    rate = float(v @ w / (w @ w + 1e-300))
-    is_same = np.abs(q - p).max() <= same[0] and np.abs(v - rate * w).max() <= same[1]
-    return (phase, rate) if is_same else None

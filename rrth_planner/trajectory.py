@@ -10,6 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import OptionsError, RrthError
 
+# An arm that moves no faster is at rest [rad/s].
+REST_SPEED = 0.01
+
 # A point so near to a cut gives way to it [s]: in a shorter piece the last digit of a position is
 # a jerk. The polynomial of the piece beyond the point goes on over that time; where the jerk jumps
 # by 80 rad/s^3 at the point it is 1.3e-14 rad from that of the piece before.
@@ -305,3 +308,11 @@ def _state(c: Array, u: Array, width: Array | float) -> tuple[Array, Array, Arra
 
 def _position(c: Array, u: Array) -> Array:
     return ((((c[:, 5] * u + c[:, 4]) * u + c[:, 3]) * u + c[:, 2]) * u + c[:, 1]) * u + c[:, 0]
+
+
+def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
+    """Return what is left of a motion when the arm is out, at one of its points [s]."""
+    if escape_time == 0.0:
+        return trajectory
+    begin = trajectory.times[np.abs(trajectory.times - escape_time).argmin()]
+    return part_of(trajectory, float(begin), trajectory.duration)

@@ -14,8 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.entries import printable
-from rrth_planner.errors import ModelError
+from rrth_planner.errors import ModelError, printable
 from rrth_planner.text_files import load_xml
 
 # An installation by colcon does not bring them, which is said when a file is to be read.

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
+from rrth_planner.arm_file import load_arm
 from rrth_planner.errors import ModelError, RrthError
-from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import load_yaml
 from rrth_planner.urdf import arm_to_urdf

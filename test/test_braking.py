@@ -16,7 +16,7 @@ from rrth_planner.scene import Box, Scene
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import jerks_at, piece_coefficients, sample, Trajectory
 from rrth_planner.world import arm_world
-from test_stopping import any_motion
+from sample_motions import any_motion, path_distance
 from worlds import (
     dense_touch,
     examples,
@@ -31,18 +31,6 @@ from worlds import (
 SEEDS = st.integers(0, 2**32 - 1)
 LIMITS = limits()
 ARM = table_1_arm()
-
-
-def path_distance(points, trajectory, begin, end):
-    """Return how far points, (n, dof), are from a stretch of a motion, joint by joint [rad]."""
-    path = sample(trajectory, np.linspace(begin, end, 3001))[0]
-    best = np.full(len(points), np.inf)
-    for a, b in zip(path[:-1], path[1:], strict=True):
-        along = b - a
-        share = np.clip((points - a) @ along / (along @ along + 1e-300), 0.0, 1.0)
-        off = np.abs(points - a - share[:, None] * along).max(axis=1)
-        best = np.minimum(best, off)
-    return best
 
 
 @examples(150)

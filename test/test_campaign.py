@@ -11,6 +11,7 @@ pa = pytest.importorskip('pyarrow')
 pytest.importorskip('tqdm')
 
 import pyarrow.parquet as pq
+from rrth_planner.arm_file import load_arm
 from rrth_planner.campaign import cluster
 from rrth_planner.campaign.cluster import cluster_client, run_campaign
 from rrth_planner.campaign.escape_claims import both_ways_shares
@@ -32,7 +33,6 @@ from rrth_planner.campaign.store import append_rows, finished_keys, histories, r
 from rrth_planner.campaign.table_1 import is_the_papers
 from rrth_planner.errors import RrthError
 from rrth_planner.map_file import load_map
-from rrth_planner.resources import load_arm
 from rrth_planner.shortest import shortest_path
 
 # Columns that differ from run to run whatever the seed.

@@ -21,8 +21,7 @@ from rrth_planner.trajectory import (
     sample,
     Trajectory,
 )
-from test_braking import path_distance
-from test_stopping import any_motion, foreign_motion, planned_motion
+from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -18,8 +18,8 @@ from rrth_planner.path_search import SPARES
 from rrth_planner.reach import bar_ends
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box, Scene
+from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import MotionState, Takeover
 from rrth_planner.timing import parameterize
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import positions_at, sample

@@ -28,7 +28,7 @@ from rrth_planner.incident_files import (
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
 from rrth_planner.question import PlanQuestion
 from rrth_planner.scene import Box, Scene
-from rrth_planner.takeover import MotionState, Takeover
+from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.text_files import parse_yaml
 from rrth_planner.touch import Disagreement, Touch
 from rrth_planner.trajectory import MotionLimits, Trajectory

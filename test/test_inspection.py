@@ -5,8 +5,8 @@
 import numpy as np
 import pytest
 from rrth_planner.arm import tool_pose
+from rrth_planner.arm_file import load_arm
 from rrth_planner.inspection import inspect_motion, UnsafeMotionError
-from rrth_planner.resources import load_arm
 from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import MotionLimits, Trajectory
 

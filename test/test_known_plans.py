@@ -18,9 +18,9 @@ from rrth_planner import (
     load_body,
     load_map,
     map_problem,
-    PrintedRRTHOptions,
     plan,
     PointingGoal,
+    PrintedRRTHOptions,
     RRTHOptions,
     RRTOptions,
     RRTStarOptions,
@@ -30,7 +30,7 @@ from rrth_planner import (
 )
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.settings import load_settings
-from rrth_planner.takeover import MotionState, Takeover
+from rrth_planner.start_state import MotionState, Takeover
 
 ROOT, FILE = Path(__file__).parent.parent, Path(__file__).with_suffix('.csv')
 MARGIN, RAY = 0.02, 1.0

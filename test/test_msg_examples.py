@@ -11,20 +11,18 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.inspection import inspect_motion  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
 from rrth_planner.oracle import first_contact  # noqa: E402
 from rrth_planner.pipeline import plan_motion  # noqa: E402
-from rrth_planner.resources import load_arm, resource_path  # noqa: E402
+from rrth_planner.resources import resource_path  # noqa: E402
+from rrth_planner.ros.bodies import scene_of, WearerBody
+from rrth_planner.ros.goals import goal_from_msg
+from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.message_files import message_from_file  # noqa: E402
-from rrth_planner.ros.messages import (  # noqa: E402
-    configuration_from_msg,
-    goal_from_msg,
-    scene_of,
-    WearerBody,
-)
 from rrth_planner.text_files import load_yaml
 from rrth_planner.trajectory import MotionLimits  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

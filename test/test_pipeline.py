@@ -16,8 +16,9 @@ from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import first_contact
 from rrth_planner.refusal import goal_refusal
 from rrth_planner.scene import Box, Scene
+from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.status import PlanStatus
-from rrth_planner.takeover import lead_in, MotionState, Takeover
+from rrth_planner.takeover import lead_in
 from rrth_planner.touch import Touch
 from rrth_planner.trajectory import sample
 from rrth_planner.world import arm_world

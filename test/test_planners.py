@@ -8,8 +8,9 @@ import functools
 import numpy as np
 import pytest
 from rrth_planner import oracle, star
-from rrth_planner.box_map import BoxMap, map_from_mapping, map_problem, map_world
+from rrth_planner.box_map import BoxMap, map_problem, map_world
 from rrth_planner.checking import by_check_points, sampled
+from rrth_planner.map_file import map_from_mapping
 from rrth_planner.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,

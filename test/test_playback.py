@@ -5,11 +5,11 @@
 import numpy as np
 import pytest
 from rrth_planner.acceptance import accept, PlaybackRules
+from rrth_planner.arm_file import load_arm
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.errors import MessageError, OptionsError
 from rrth_planner.path import Path
 from rrth_planner.playback import Playback, standing, stop
-from rrth_planner.resources import load_arm
 from rrth_planner.timing import parameterize
 from rrth_planner.trajectory import sample, Trajectory
 from worlds import limits

@@ -7,8 +7,8 @@ import pytest
 
 image = pytest.importorskip('matplotlib.image')
 
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.recording import Recording, Told  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.settings import load_settings  # noqa: E402
 from rrth_planner.trajectory import sample, Trajectory  # noqa: E402

@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rrth_planner.arm import forward_kinematics, tool_pose  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.trajectory import MotionLimits, Trajectory  # noqa: E402
 from rrth_planner.viewers import arm_view  # noqa: E402

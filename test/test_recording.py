@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from rrth_planner.arm_file import load_arm
 from rrth_planner.errors import RecordError
 from rrth_planner.oracle import least_clearance
 from rrth_planner.recording import (
@@ -17,7 +18,6 @@ from rrth_planner.recording import (
     Told,
     told_at,
 )
-from rrth_planner.resources import load_arm
 from rrth_planner.scene import Box, Scene
 from rrth_planner.trajectory import sample, Trajectory
 

@@ -7,7 +7,8 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.arm_file import load_arm
+from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
 import yaml
 

@@ -9,7 +9,8 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.aiming import FEW, goal_configurations
-from rrth_planner.arm import arm_from_mapping, ArmModel, forward_kinematics
+from rrth_planner.arm import ArmModel, forward_kinematics
+from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.arrays import FARTHEST, frozen_array
 from rrth_planner.blend import round_corners
 from rrth_planner.certificate import certify, least_clearance

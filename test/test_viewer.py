@@ -14,11 +14,11 @@ pytest.importorskip('fcl')
 pytest.importorskip('viser')
 
 from rrth_planner.arm import pointing_error, tool_pose
-from rrth_planner.body_file import load_body
+from rrth_planner.arm_file import load_arm
 from rrth_planner.errors import OptionsError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.question import PlanQuestion
-from rrth_planner.resources import load_arm, resource_path
+from rrth_planner.resources import resource_path
 from rrth_planner.result import Tree
 from rrth_planner.settings import load_settings
 from rrth_planner.viewers.viewer import _served, main
@@ -33,6 +33,7 @@ from rrth_planner.viewers.viewer_geometry import along_z, path_curve, tree_segme
 from rrth_planner.viewers.viewer_model import ViewerModel
 from rrth_planner.viewers.viewer_panel import answer_html
 from rrth_planner.viewers.viewer_player import Player
+from rrth_planner.wearer_file import load_body
 
 WAIT = 120.0
 ARM = load_arm()
@@ -125,8 +126,8 @@ def test_an_example_body_is_read_without_ros(name):
 
 def test_an_example_body_is_that_of_the_messages():
     pytest.importorskip('rclpy')
+    from rrth_planner.ros.bodies import scene_of, WearerBody
     from rrth_planner.ros.message_files import message_from_file
-    from rrth_planner.ros.messages import scene_of, WearerBody
     from visualization_msgs.msg import MarkerArray
 
     for name in BODIES:

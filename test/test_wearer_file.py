@@ -4,11 +4,10 @@
 
 import numpy as np
 import pytest
-from rrth_planner.body_file import load_body
 from rrth_planner.errors import SceneError
 from rrth_planner.plan_files import main as plan
 from rrth_planner.resources import resource_path
-from rrth_planner.wearer_file import load_wearer
+from rrth_planner.wearer_file import load_body, load_wearer
 
 MARKERS = """
 markers:
@@ -47,8 +46,8 @@ def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
     scene = load_wearer(file)
     assert [box.name for box in scene.boxes] == ['torso', 'arms[0]', 'arms[1]']
     pytest.importorskip('rclpy')
+    from rrth_planner.ros.bodies import scene_of, WearerBody
     from rrth_planner.ros.message_files import message_from_file
-    from rrth_planner.ros.messages import scene_of, WearerBody
     from visualization_msgs.msg import MarkerArray
 
     body = WearerBody().apply(message_from_file(file, MarkerArray), 0.0, 'torso')

@@ -8,7 +8,8 @@ from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
 from rrth_planner.aiming import target_in_mount
-from rrth_planner.arm import arm_from_mapping, ArmModel, tool_pose
+from rrth_planner.arm import ArmModel, tool_pose
+from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.goal import PointingGoal
 from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.oracle import bars

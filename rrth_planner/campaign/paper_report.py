@@ -4,6 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from rrth_planner.arm_file import load_arm
 from rrth_planner.campaign.arm_claims import (
     arm_table,
     long_table,
@@ -24,7 +25,6 @@ from rrth_planner.campaign.problems import MARGIN, RAY
 from rrth_planner.campaign.statistics import markdown_table, Rows
 from rrth_planner.campaign.table_1 import table_1, table_1_claim
 from rrth_planner.kernels.arm_sampling import POINTS_PER_BAR
-from rrth_planner.resources import load_arm
 
 
 def report(

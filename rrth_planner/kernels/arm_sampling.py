@@ -17,7 +17,7 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     VEC,
 )
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.vectors import distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
 POINTS_PER_BAR = 10

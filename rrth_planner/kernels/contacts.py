@@ -9,7 +9,7 @@ from rrth_planner.kernels import scratch
 from rrth_planner.kernels.arm_validity import ENDS_ROOM, MAX_GROUPS
 from rrth_planner.kernels.jit import CHAIN, D, kernel, LANES, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import MAX_DOF
-from rrth_planner.kernels.tree import distance
+from rrth_planner.kernels.vectors import distance
 
 # Passing closer than this counts as leaning on the box [m].
 CLOSE = 0.03

@@ -23,7 +23,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.pointing import is_goal_free
-from rrth_planner.kernels.tree import copy, distance
+from rrth_planner.kernels.vectors import copy, distance
 
 # Draws by which a first straight way is sought, which then bounds how far the others may be.
 FIRST_DRAWS = 16

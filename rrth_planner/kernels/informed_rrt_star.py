@@ -19,7 +19,7 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
 from rrth_planner.kernels.sampling import draw_informed, draw_uniform
-from rrth_planner.kernels.tree import copy
+from rrth_planner.kernels.vectors import copy
 
 
 @kernel(STAR_SIGNATURE)

@@ -18,7 +18,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.taut import ENOUGH, MOVES, pull_taut, SPACING
-from rrth_planner.kernels.tree import copy, distance, path_length
+from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Gap that a path is left with, for the proof of its edges to succeed [m].
 LEFT = 1e-4

@@ -25,7 +25,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.kinematics import sine_cosine
-from rrth_planner.kernels.tree import copy, distance
+from rrth_planner.kernels.vectors import copy, distance
 
 TURN = 2.0 * math.pi
 # Joints of an arm that aims in closed form, at most: the search for a nearer goal looks at all

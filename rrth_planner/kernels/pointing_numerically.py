@@ -26,7 +26,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.pointing import is_goal_free, unwrap
-from rrth_planner.kernels.tree import copy, distance
+from rrth_planner.kernels.vectors import copy, distance
 
 # Configurations nearer than this in every joint are one [rad or m].
 TWIN = 1e-6

@@ -15,7 +15,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     READ_INTS,
 )
-from rrth_planner.kernels.tree import copy, distance
+from rrth_planner.kernels.vectors import copy, distance
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))

@@ -31,7 +31,8 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.rrt import advance as grow
 from rrth_planner.kernels.shortening import pull, settle
 from rrth_planner.kernels.taut import TAUT
-from rrth_planner.kernels.tree import copy, distance, path_length, trace_path
+from rrth_planner.kernels.tree import trace_path
+from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].
 STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)

@@ -32,14 +32,8 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.sampling import draw_uniform
-from rrth_planner.kernels.tree import (
-    adapted_step,
-    copy,
-    distance,
-    nearest,
-    squared_distances,
-    steer,
-)
+from rrth_planner.kernels.tree import adapted_step, nearest, squared_distances, steer
+from rrth_planner.kernels.vectors import copy, distance
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: functions, resolution,
 # robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two trees or one,

@@ -23,7 +23,7 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.random import uniform
 from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.sampling import draw_ball, draw_uniform
-from rrth_planner.kernels.tree import copy, path_length
+from rrth_planner.kernels.vectors import copy, path_length
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64))

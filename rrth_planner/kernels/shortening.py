@@ -16,7 +16,7 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.kernels.taut import ENOUGH, MOVES
-from rrth_planner.kernels.tree import path_length
+from rrth_planner.kernels.vectors import path_length
 
 # Entries of the settings of `shorten`: those of `taut`, and, for the steps as printed, the
 # spacings of the points P_T and P_C.

@@ -12,7 +12,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     VEC,
 )
-from rrth_planner.kernels.tree import copy, distance, path_length
+from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Entries of the settings of `shorten` (kernels.jit.SHORTEN): k of the paper [rad], rounds at most
 # in which corners move, what pulling must gain to go on, relative.

@@ -10,8 +10,9 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import RrthError
 from rrth_planner.ros.answers import answer_from_text
-from rrth_planner.ros.messages import configuration_from_msg, joint_trajectory_from_msg
+from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.planner_client import PlannerClient
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from rrth_planner.trajectory import Trajectory
 from visualization_msgs.msg import MarkerArray
 

@@ -7,10 +7,10 @@ from rrth_planner.arm import pointing_error
 from rrth_planner.errors import MessageError
 from rrth_planner.pipeline import warm_up
 from rrth_planner.ros.answers import Answer, answer_from_text
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
-from rrth_planner.ros.messages import WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.planner_client import PlannerClient
 from rrth_planner.ros.requests import plan_request

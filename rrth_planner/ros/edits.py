@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the markers of one array do to the wearer, read in one go: bodies come often."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.boxes import boxes_of, first_bad
+from rrth_planner.arrays import Array, FARTHEST
 from rrth_planner.errors import MessageError, one_line, SceneError
-from rrth_planner.kernels.boxes import place, POSED
-from rrth_planner.kernels.layout import NUMBERS
+from rrth_planner.kernels.boxes import first_bad as first_bad_row, place, POSED
+from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.ros.fields import seconds_of, triple_of, unit_quaternion_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
 from rrth_planner.scene import Box
@@ -202,3 +202,26 @@ def _placed(msg: MarkerArray, reading: _Reading) -> tuple[Box, ...]:
 
 def _label(index: int, marker: Any) -> str:
     return f'marker {index} ("{marker_name(marker)}")'
+
+
+def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:
+    """
+    Return boxes from their names and numbers, shape (n, 15), which are frozen by this.
+
+    Raises
+    ------
+    SceneError
+        Of the first that is no box.
+
+    """
+    numbers.setflags(write=False)
+    bad = first_bad(numbers)
+    if bad >= 0:
+        row = numbers[bad]
+        Box(names[bad], row[:SIZE], row[SIZE:ROTATION], row[ROTATION:].reshape(3, 3))
+    return tuple(Box.of_row(name, row) for name, row in zip(names, numbers, strict=True))
+
+
+def first_bad(numbers: Array) -> int:
+    """Return which of some numbers, shape (n, 15), are the first that are no box; -1: none."""
+    return int(first_bad_row(numbers, FARTHEST))

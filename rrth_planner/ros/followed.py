@@ -4,11 +4,11 @@
 
 import numpy as np
 from rrth_planner.arrays import Array
+from rrth_planner.localization import phase_of
 from rrth_planner.ros.inputs import Input
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.takeover import phase_of, REST_SPEED
-from rrth_planner.trajectory import sample
+from rrth_planner.trajectory import REST_SPEED, sample
 from rrth_planner.underway import taken_over
 
 # An arm that stands still that long after the end of its motion is taken to have arrived; where it

@@ -21,13 +21,12 @@ from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.errors import one_line
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.bodies import scene_of
 from rrth_planner.ros.followed import Followed
-from rrth_planner.ros.inputs import Inputs
-from rrth_planner.ros.messages import scene_of
+from rrth_planner.ros.inputs import Inputs, out_of_sight
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.ros.sight import out_of_sight
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory

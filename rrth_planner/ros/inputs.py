@@ -12,13 +12,16 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, RrthError
 from rrth_planner.goal import PointingGoal
+from rrth_planner.localization import sharp_phase_of, takeover
+from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
-from rrth_planner.ros.messages import JointReading, scene_of, WearerBody
+from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.right_of_way import RightOfWay
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
-from rrth_planner.takeover import REST_SPEED, sharp_phase_of, Takeover, takeover
+from rrth_planner.start_state import Takeover
+from rrth_planner.trajectory import REST_SPEED
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].
@@ -309,3 +312,26 @@ def _require_fresh(
             f'the last good message on {heard.topic} is {age:.3f} s old, expected at most '
             f'{timeout:g} s ({name})',
         )
+
+
+def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:
+    """Return why nobody knows any more how arm and wearer are; empty: it is known."""
+    if heard.body.is_last_refused:
+        return f'the last body was refused, {heard.body.refusal}'
+    if heard.joint_refusal is not None:
+        return f'the last joint positions were refused, {heard.joint_refusal}'
+    body = heard.body.value.at(now)
+    if body.expired:
+        return f'lost parts of the body, whose lifetime has passed: {body.expired_names}'
+    if not body.n_boxes:
+        return 'the body is empty'
+    age, most = heard.body.age(now), parameters.body_timeout
+    if 0.0 < most < age:
+        return f'the body is {age:.3f} s old, expected at most {most:g} s (body_timeout)'
+    age, most = heard.joints.age(now), parameters.joint_timeout
+    if 0.0 < most < age:
+        return (
+            f'the last joint positions are {age:.3f} s old, expected at most {most:g} s '
+            '(joint_timeout)'
+        )
+    return ''

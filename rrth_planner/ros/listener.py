@@ -11,11 +11,13 @@ from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rrth_planner.errors import MessageError, one_line
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.frames import Frames
+from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.inputs import Input, Inputs
+from rrth_planner.ros.joints import has_joint_of, joint_reading
 from rrth_planner.ros.marker_order import MarkerOrder
-from rrth_planner.ros.messages import goal_from_msg, has_joint_of, joint_reading, WearerBody
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.quick_decoding import quick_decoder
 from rrth_planner.ros.right_of_way import Breather

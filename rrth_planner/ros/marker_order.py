@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.edits import Edit, Key
-from rrth_planner.ros.subscriptions import Stamp
 from visualization_msgs.msg import Marker
+
+# When a message was sent: source timestamp [ns] and sequence number.
+Stamp = tuple[int, int]
 
 # So many deleted markers, and so many namespaces, are remembered; of one that is forgotten a late
 # array may add the box once more.

@@ -10,9 +10,9 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.arm import ArmModel
+from rrth_planner.arm_file import load_arm
 from rrth_planner.errors import OptionsError, RrthError
 from rrth_planner.options import ALGORITHMS, TreeOptions
-from rrth_planner.resources import load_arm
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 from rrth_planner.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
 from rrth_planner.trajectory import MotionLimits

@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import time
 import traceback
 from typing import Any
@@ -23,7 +23,6 @@ from rrth_planner.ros.last_look import busy, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.ros.response import Response
 from rrth_planner.ros.resting import Rest
 from rrth_planner.ros.right_of_way import stand_back
 from rrth_planner.ros.second_opinion import incident_of_stop
@@ -34,6 +33,29 @@ from rrth_planner.trajectory import Trajectory
 # So often is a moment sought to tell a motion in.
 MOST_TRIES = 20
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """
+    What a request is answered.
+
+    Parameters
+    ----------
+    is_solved : bool
+        Whether a motion was published.
+    text : str
+    tool_path : callable
+        Returns the tool's path; empty where no motion was published.
+    conclude : callable
+        What is left to do when it has been answered: to show and to report it.
+
+    """
+
+    is_solved: bool
+    text: str
+    tool_path: Callable[[], Path]
+    conclude: Callable[[], None]
 
 
 class _Ticket:

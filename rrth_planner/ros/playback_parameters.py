@@ -8,9 +8,9 @@ import numpy as np
 from rclpy.node import Node
 from rrth_planner.acceptance import PlaybackRules
 from rrth_planner.arm import ArmModel
+from rrth_planner.arm_file import load_arm
 from rrth_planner.arrays import Array
 from rrth_planner.errors import OptionsError
-from rrth_planner.resources import load_arm
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 from rrth_planner.trajectory import MotionLimits
 

@@ -9,9 +9,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rrth_planner.arrays import Array
 from rrth_planner.ros.markers import plan_markers
-from rrth_planner.ros.messages import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.profiles import COMMANDED, LATCHED
+from rrth_planner.ros.trajectories import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 from trajectory_msgs.msg import JointTrajectory

@@ -17,14 +17,10 @@ from rrth_planner.recording import Recording, Told
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.goals import goal_from_msg
+from rrth_planner.ros.joints import has_joint_of, joint_reading, JointReading
 from rrth_planner.ros.marker_order import MarkerOrder
-from rrth_planner.ros.messages import (
-    goal_from_msg,
-    has_joint_of,
-    joint_reading,
-    joint_trajectory_from_msg,
-    JointReading,
-)
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from rrth_planner.scene import Scene
 
 # The topics of a run, below whatever namespace, and their types.

@@ -17,6 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rrth_planner.errors import MessageError
+from rrth_planner.ros.marker_order import Stamp
 
 DEPTH = 50
 # Longer messages are not decoded, which would hold up everything else: half a second for a
@@ -26,8 +27,6 @@ MOST_BYTES = 512 * 1024
 REMEMBERED = 1024
 # How often publishers are looked at where the middleware does not announce them [s].
 POLL_PERIOD = 0.2
-# When a message was sent: source timestamp [ns] and sequence number.
-Stamp = tuple[int, int]
 
 
 def decoded(

@@ -22,12 +22,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rrth_planner.arrays import Array
 from rrth_planner.errors import MessageError, one_line, OptionsError, RrthError
+from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
-from rrth_planner.ros.messages import joint_trajectory_from_msg, scene_of, WearerBody
 from rrth_planner.ros.parameters import declare_parameters
 from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from rrth_planner.scene import Scene
 from rrth_planner.trajectory import Trajectory
 from std_srvs.srv import Trigger

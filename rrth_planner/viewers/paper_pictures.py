@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
+from rrth_planner.arm_file import load_arm
 from rrth_planner.arrays import Array
 from rrth_planner.campaign.escape import scattered_growths
 from rrth_planner.campaign.escape_claims import both_ways_shares
@@ -36,7 +37,6 @@ from rrth_planner.campaign.statistics import Rows
 from rrth_planner.map_file import load_map
 from rrth_planner.path import Path as JointPath
 from rrth_planner.planner import plan
-from rrth_planner.resources import load_arm
 from rrth_planner.viewers.paper_arm import joint_paths_figure, motions_figure
 from rrth_planner.viewers.paper_figures import convergence_figure, DRAWS, histogram_figure, TIME
 from rrth_planner.viewers.paper_maps import escape_figure, trees_figure

@@ -5,10 +5,10 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.boxes import boxes_of, first_bad
 from rrth_planner.errors import SceneError
 from rrth_planner.kernels.boxes import place, rows_of
 from rrth_planner.kernels.layout import NUMBERS
+from rrth_planner.ros.edits import boxes_of, first_bad
 from rrth_planner.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
 from rrth_planner.scene import Box, Scene
 from worlds import examples, random_boxes, random_rotation

@@ -4,7 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.tree import CHUNK, distance, nearest, path_length, steer, trace_path
+from rrth_planner.kernels.tree import CHUNK, nearest, steer, trace_path
+from rrth_planner.kernels.vectors import distance, path_length
 
 
 def test_a_path_without_room_is_not_traced():

@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 from rrth_planner import oracle
 from rrth_planner.goal import PointingGoal
+from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.edits import BodyPart
 from rrth_planner.ros.guard import Guard
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.joints import JointReading
-from rrth_planner.ros.messages import WearerBody
 from rrth_planner.ros.parameters import declare_parameters
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Box

@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
 from rrth_planner.arm import pointing_error  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.scene import Box, Scene  # noqa: E402
 from rrth_planner.trajectory import sample  # noqa: E402

@@ -23,10 +23,10 @@ from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros import incidents, reporter, requests, second_opinion  # noqa: E402
+from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
-from rrth_planner.ros.messages import scene_of, WearerBody  # noqa: E402
 from rrth_planner.status import PlanStatus  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402

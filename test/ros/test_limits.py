@@ -13,10 +13,11 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.arrays import FARTHEST  # noqa: E402
 from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
-from rrth_planner.resources import load_arm, resource_path  # noqa: E402
+from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import (  # noqa: E402
@@ -25,16 +26,16 @@ from rrth_planner.ros.edits import (  # noqa: E402
     read_edits,
 )
 from rrth_planner.ros.error_codes import answer, ErrorCode  # noqa: E402
+from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.inputs import Input, PlanInputs, RequestError  # noqa: E402
+from rrth_planner.ros.joints import joint_reading
 from rrth_planner.ros.message_files import message_from_file  # noqa: E402
-from rrth_planner.ros.messages import (  # noqa: E402
-    goal_from_msg,
-    joint_reading,
-    joint_trajectory_from_msg,
-)
 from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  # noqa: E402
 from rrth_planner.ros.subscriptions import decoded, MOST_BYTES  # noqa: E402
-from rrth_planner.ros.trajectories import MOST_POINTS  # noqa: E402
+from rrth_planner.ros.trajectories import (
+    joint_trajectory_from_msg,
+    MOST_POINTS,  # noqa: E402
+)
 from rrth_planner.scene import Scene  # noqa: E402
 from rrth_planner.text_files import (  # noqa: E402
     DEEPEST,

@@ -21,7 +21,7 @@ from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.inspection import inspect_motion  # noqa: E402
 from rrth_planner.kernels import pointing  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.world import arm_world  # noqa: E402
 import samples  # noqa: E402

@@ -12,26 +12,24 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
 from rrth_planner.arm import tool_pose  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.errors import MessageError  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import bodies, edits  # noqa: E402
+from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.error_codes import (  # noqa: E402
     answer,
     code_of_refusal,
     CODE_OF_STATUS,
     ErrorCode,
 )
-from rrth_planner.ros.messages import (  # noqa: E402
-    configuration_from_msg,
-    FrameError,
-    goal_from_msg,
-    has_joint_of,
+from rrth_planner.ros.frames import FrameError
+from rrth_planner.ros.goals import goal_from_msg
+from rrth_planner.ros.joints import configuration_from_msg, has_joint_of
+from rrth_planner.ros.trajectories import (
     joint_trajectory_from_msg,
     joint_trajectory_to_msg,
-    scene_of,
     tool_path_to_msg,
-    WearerBody,
 )
 from rrth_planner.rotation import pose_matrix, rotation_matrix  # noqa: E402
 from rrth_planner.status import PlanStatus  # noqa: E402

@@ -17,12 +17,12 @@ from rclpy.node import Node  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.ros import start  # noqa: E402
+from rrth_planner.ros.bodies import WearerBody  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Input, Inputs, PlanInputs  # noqa: E402
 from rrth_planner.ros.joints import JointReading  # noqa: E402
 from rrth_planner.ros.last_look import LastLook, require_news  # noqa: E402
-from rrth_planner.ros.messages import WearerBody  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.requests import plan_request  # noqa: E402
 from rrth_planner.ros.start import EARLY, LEADS  # noqa: E402

@@ -28,16 +28,16 @@ from rclpy.qos import (  # noqa: E402
 )
 from rrth_planner import judges  # noqa: E402
 from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
 from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
 from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.last_look import LastLook  # noqa: E402
-from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

@@ -24,12 +24,12 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
-from rrth_planner.resources import load_arm  # noqa: E402
+from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.definitions import definition_of, type_name  # noqa: E402
-from rrth_planner.ros.messages import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.record import TOPICS  # noqa: E402
 from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
+from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.viewers.plot import main as plot  # noqa: E402
 from samples import target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

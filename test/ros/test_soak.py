@@ -48,7 +48,7 @@ from benchmarks.standstill import StandstillWatch, united  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
-from rrth_planner.ros.messages import joint_trajectory_to_msg  # noqa: E402
+from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.trajectory import Trajectory  # noqa: E402
 import worlds  # noqa: E402
 

@@ -17,8 +17,8 @@ from rrth_planner.ros import marker_order  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402
 from rrth_planner.ros.inputs import Input  # noqa: E402
+from rrth_planner.ros.joints import joint_reading  # noqa: E402
 from rrth_planner.ros.marker_order import MarkerOrder  # noqa: E402
-from rrth_planner.ros.messages import joint_reading  # noqa: E402
 from rrth_planner.ros.subscriptions import (  # noqa: E402
     Copies,
     OpenSubscription,

@@ -1,0 +1,33 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Small vectors: copies, distances, lengths of paths."""
+
+import math
+
+from numba.core.types import float64, int64, void
+from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, VEC
+
+
+@kernel(void(VEC, OUT_VEC))
+def copy(q, to):
+    """Write q to another place; an assignment of arrays takes the compiler ten times as long."""
+    for k in range(q.shape[0]):
+        to[k] = q[k]
+
+
+@kernel(float64(VEC, VEC))
+def distance(p, q):
+    """Return the length of the straight edge between two configurations."""
+    total = 0.0
+    for k in range(p.shape[0]):
+        total += (p[k] - q[k]) ** 2
+    return math.sqrt(total)
+
+
+@kernel(float64(MAT, int64))
+def path_length(path, n):
+    """Return the length of the first n waypoints of a path."""
+    total = 0.0
+    for i in range(n - 1):
+        total += distance(path[i], path[i + 1])
+    return total

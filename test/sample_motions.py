@@ -1,0 +1,68 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Random motions that tests share, and how far points are beside one."""
+
+import numpy as np
+from rrth_planner.blend import Blend
+from rrth_planner.path import Path
+from rrth_planner.timing import parameterize
+from rrth_planner.trajectory import sample, Trajectory
+from worlds import limits
+
+LIMITS = limits()
+
+
+def planned_motion(rng):
+    """Return a motion with rounded corners, stops, and straights of any length."""
+    n = int(rng.integers(2, 7))
+    steps = rng.standard_normal((n - 1, 4)) * rng.choice([0.02, 0.2, 1.0])
+    q = np.vstack([np.zeros(4), np.cumsum(steps, axis=0)])
+    lengths = np.linalg.norm(steps, axis=1)
+    directions = steps / lengths[:, None]
+    blends = tuple(
+        Blend(
+            corner=q[i],
+            u_in=directions[i - 1],
+            u_out=directions[i],
+            half_length=float(
+                rng.choice([0.0, rng.uniform(0.02, 0.45)]) * min(lengths[i - 1], lengths[i])
+            ),
+        )
+        for i in range(1, n - 1)
+    )
+    return parameterize(Path(q), blends, LIMITS)
+
+
+def foreign_motion(rng):
+    """Return a motion of another planner: through any states, with any jerk, to rest."""
+    n, reach = int(rng.integers(2, 5)), rng.choice([0.2, 0.6])
+    states = rng.uniform(-reach, reach, (3, n, 4))
+    states[1:, -1] = 0.0
+    if rng.random() < 0.5:
+        states[1:, 0] = 0.0
+    if rng.random() < 0.3:
+        # One that turns back in all joints at once.
+        states[1, n // 2] = 0.0
+    return Trajectory(
+        times=np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.5, n - 1))]),
+        positions=states[0],
+        velocities=states[1],
+        accelerations=2.0 * states[2],
+    )
+
+
+def any_motion(rng):
+    """Return a motion of either kind."""
+    return planned_motion(rng) if rng.random() < 0.6 else foreign_motion(rng)
+
+
+def path_distance(points, trajectory, begin, end):
+    """Return how far points, (n, dof), are from a stretch of a motion, joint by joint [rad]."""
+    path = sample(trajectory, np.linspace(begin, end, 3001))[0]
+    best = np.full(len(points), np.inf)
+    for a, b in zip(path[:-1], path[1:], strict=True):
+        along = b - a
+        share = np.clip((points - a) @ along / (along @ along + 1e-300), 0.0, 1.0)
+        off = np.abs(points - a - share[:, None] * along).max(axis=1)
+        best = np.minimum(best, off)
+    return best
