@@ -12,8 +12,9 @@ from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arrays import Array, check_dof
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import jit, pointing
-from rrth_planner.kernels.goals import find_goals
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.kinematics import pan_tilt_ik
+from rrth_planner.kernels.kinematics.goal_selection import find_goals
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
@@ -47,8 +48,8 @@ class PointingKernels:
 
 
 CLOSED_FORM = PointingKernels(
-    goal_candidates=jit.first_class(pointing.goal_candidates),
-    slide_goal=jit.first_class(pointing.slide_goal),
+    goal_candidates=jit.first_class(pan_tilt_ik.goal_candidates),
+    slide_goal=jit.first_class(pan_tilt_ik.slide_goal),
     n_solved=2,
 )
 
@@ -91,14 +92,14 @@ def pointing_kernels(arm: ArmModel) -> PointingKernels:
     tail = arm.dh[-2:]
     is_square = np.abs(np.cos(tail[:, 0])).max() < 1e-9 and np.abs(tail[:, 1]).max() < 1e-12
     is_unit = arm.dof >= 2 and not any(arm.is_prismatic[-2:]) and is_square
-    is_closed = is_unit and arm.dof <= pointing.MAX_CLOSED_DOF
+    is_closed = is_unit and arm.dof <= pan_tilt_ik.MAX_CLOSED_DOF
     return CLOSED_FORM if is_closed else numerical()
 
 
 @functools.cache
 def numerical() -> PointingKernels:
     """Return how any arm aims; compiled when the first arm needs it."""
-    kernels = import_module('rrth_planner.kernels.pointing_numerically')
+    kernels = import_module('rrth_planner.kernels.kinematics.numerical_ik')
     return PointingKernels(
         goal_candidates=jit.first_class(kernels.goal_candidates),
         slide_goal=jit.first_class(kernels.slide_goal),

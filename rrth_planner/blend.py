@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.arrays import Array, check_dof
-from rrth_planner.kernels import arm_validity
+from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.path import Path
 from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.errors import printable, SceneError
-from rrth_planner.kernels import chain, contacts, jit, map_validity
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.collision import edge_contacts, map_validity
+from rrth_planner.kernels.kinematics import generated_fk
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 
 EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)
-NO_CONTACTS = jit.first_class(contacts.no_contacts)
+NO_CONTACTS = jit.first_class(edge_contacts.no_contacts)
 FREE_RADIUS = jit.first_class(map_validity.free_radius)
 
 
@@ -96,7 +98,7 @@ def map_world(box_map: BoxMap) -> World:
     upper = np.where(upper >= high, upper + beyond, upper)
     return World(
         bounds=box_map.bounds,
-        chain=chain.NO_CHAIN,
+        chain=generated_fk.NO_CHAIN,
         robot=np.zeros((1, 1)),
         obstacles=np.hstack([lower, upper]),
         edge_check=EDGE_CHECK,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.arrays import Array
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels.boxes import pack
+from rrth_planner.kernels.collision.boxes import pack
 from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
 
 Indices = NDArray[np.int64]

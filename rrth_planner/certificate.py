@@ -9,9 +9,9 @@ import math
 import numpy as np
 from rrth_planner.arrays import Array, check_dof
 from rrth_planner.bernstein import to_bernstein
-from rrth_planner.kernels.arm_clearance import least_along
-from rrth_planner.kernels.pieces import prove_pieces
-from rrth_planner.kernels.quintics import bound
+from rrth_planner.kernels.collision.arm_clearance import least_along
+from rrth_planner.kernels.collision.trajectory_check import prove_pieces
+from rrth_planner.kernels.trajectory.quintics import bound
 from rrth_planner.trajectory import piece_coefficients, Trajectory
 from rrth_planner.world import World
 
@@ -71,7 +71,8 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     """
     Return the proof that a quintic-interpolated trajectory is free of the world's boxes.
 
-    Each piece is proven by the second-order certificate of `kernels.arm_validity.prove_curve`,
+    Each piece is proven by the second-order certificate of
+    `kernels.collision.arm_validity.prove_curve`,
     from the very numbers that the trajectory holds.
 
     Parameters

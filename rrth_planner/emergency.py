@@ -3,8 +3,8 @@
 """A stop along a running motion that is found within a millisecond."""
 
 import numpy as np
-from rrth_planner.kernels.quick_stop import quick_stop
-from rrth_planner.kernels.stop_points import SPACINGS
+from rrth_planner.kernels.trajectory.fast_stop import quick_stop
+from rrth_planner.kernels.trajectory.stop_trajectory import SPACINGS
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # A stop is not expected to reach the controller before [s].

@@ -9,8 +9,8 @@ from importlib import import_module
 import numpy as np
 from rrth_planner.arrays import Array, check_dof
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels import rrt, rrt_h, tree
-from rrth_planner.kernels.random import random_state
+from rrth_planner.kernels.search import rrt, rrt_h, tree
+from rrth_planner.kernels.search.random import random_state
 from rrth_planner.options import GrowthOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -182,7 +182,7 @@ def plant(
     if not previous:
         return
     # Compiled when a plan first builds on another one.
-    reuse = import_module('rrth_planner.kernels.reuse')
+    reuse = import_module('rrth_planner.kernels.search.tree_reuse')
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
     for side, old in enumerate(previous[: 2 if options.is_bidirectional else 1]):
         check_dof(old.nodes, len(problem.q_start), 'previous')

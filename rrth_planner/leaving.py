@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.kernels.depths import depths
+from rrth_planner.kernels.collision.penetration import depths
 from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.trajectory import part_of, positions_at, Trajectory
 from rrth_planner.world import World

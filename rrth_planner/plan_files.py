@@ -13,10 +13,10 @@ import numpy as np
 from rrth_planner.arm import ArmModel, tool_pose
 from rrth_planner.arm_file import load_arm
 from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.compiling import compile_kernels
 from rrth_planner.errors import one_line, OptionsError, RrthError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.jit import cache_folder, is_compiled
+from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion, warm_up

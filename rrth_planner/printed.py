@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from rrth_planner import rrt_h
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels import jit, rrt_h_printed
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.search import rrt_h_published
 from rrth_planner.options import PrintedRRTHOptions
 from rrth_planner.problem import PlanningProblem, STAY
 from rrth_planner.result import PlanResult, Tree
 
-SHORTEN = jit.first_class(rrt_h_printed.shorten)
+SHORTEN = jit.first_class(rrt_h_published.shorten)
 
 
 def search(

@@ -9,9 +9,10 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grown_trees, plant, room_for
-from rrth_planner.kernels import jit, lean, rrt_h
-from rrth_planner.kernels.random import random_state
-from rrth_planner.kernels.taut import TAUT
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.search import elastic_band, rrt_h
+from rrth_planner.kernels.search.random import random_state
+from rrth_planner.kernels.search.shortcut import TAUT
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -19,7 +20,7 @@ from rrth_planner.result import PlanResult, Tree
 from rrth_planner.status import PlanStatus
 from rrth_planner.workspace import Workspace, workspace
 
-TIGHTEN = jit.first_class(lean.tighten)
+TIGHTEN = jit.first_class(elastic_band.tighten)
 # Time between two looks at whether to stop [s].
 SLICE = 0.005
 

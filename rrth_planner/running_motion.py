@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 from rrth_planner.arrays import Array
-from rrth_planner.kernels.quintics import time_on
+from rrth_planner.kernels.trajectory.quintics import time_on
 from rrth_planner.localization import SAME_POSITION
 from rrth_planner.trajectory import (
     piece_coefficients,

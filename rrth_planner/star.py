@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from rrth_planner.arrays import Array, check_dof
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels import informed_rrt_star, reuse, rrt_star, rrt_star_smart
-from rrth_planner.kernels.random import random_state
+from rrth_planner.kernels.search import informed_rrt_star, rrt_star, rrt_star_smart, tree_reuse
+from rrth_planner.kernels.search.random import random_state
 from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
@@ -56,7 +56,7 @@ class _Trees:
         check_dof(old.nodes, len(problem.q_start), 'previous')
         world, n_roots = problem.world, int(self.sizes[side])
         parents = np.full(self.tree_q.shape[1], -1, dtype=np.int64)
-        n = reuse.transplant(
+        n = tree_reuse.transplant(
             world.edge_check,
             world.resolution,
             world.chain,
@@ -79,7 +79,7 @@ class _Trees:
     def _meet(self, problem: PlanningProblem, options: RRTStarOptions) -> None:
         """Look for a first path in the trees that were taken over."""
         world, meeting = problem.world, np.full(2, -1, dtype=np.int64)
-        reuse.join(
+        tree_reuse.join(
             world.edge_check,
             world.resolution,
             world.chain,

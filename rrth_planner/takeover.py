@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.braking import brake
-from rrth_planner.kernels.speeds import ramp_time
+from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.timing import peaks
 from rrth_planner.trajectory import MotionLimits, Trajectory

@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.arrays import Array
 from rrth_planner.blend import Blend
 from rrth_planner.errors import RrthError
-from rrth_planner.kernels.speeds import cell_speeds, knots, MOST_PHASES
+from rrth_planner.kernels.trajectory.speed_profile import cell_speeds, knots, MOST_PHASES
 from rrth_planner.path import Path
 from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
 
@@ -48,7 +48,7 @@ def parameterize(
     Return the trajectory that follows a path with rounded corners to rest.
 
     Stretches get the fastest profile of constant jerk phases between speeds that
-    `kernels.speeds` finds. On straight ones, and on blends at constant speed,
+    `kernels.trajectory.speed_profile` finds. On straight ones, and on blends at constant speed,
     every piece between two points is a polynomial of at most fourth degree: the quintic that a
     controller interpolates is the curve itself.
 
@@ -113,7 +113,7 @@ class _Segments:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Speeds:
-    """What `kernels.speeds.cell_speeds` says of the cells, each of them a row of a segment."""
+    """What `speed_profile.cell_speeds` says of the cells, each of them a row of a segment."""
 
     rows: list[int]
     places: Array

@@ -9,7 +9,7 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array
 from rrth_planner.box_tree import tree_depth
 from rrth_planner.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
-from rrth_planner.kernels import pieces
+from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.leaving import leads_out
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.scene import Scene
@@ -151,7 +151,9 @@ def is_place_free(
     boxes, T_arm_base = scene.numbers, mount_inverse(arm)
     depth = tree_depth(len(scene.boxes))
     return bool(
-        pieces.is_place_free(q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth)
+        trajectory_check.is_place_free(
+            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
+        )
     )
 
 
@@ -170,7 +172,7 @@ def _is_rest_free(
         return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
-        pieces.is_rest_free(
+        trajectory_check.is_rest_free(
             trajectory.times,
             trajectory.positions,
             trajectory.velocities,

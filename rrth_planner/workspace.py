@@ -5,7 +5,7 @@
 import threading
 
 import numpy as np
-from rrth_planner.kernels import rrt_h
+from rrth_planner.kernels.search import rrt_h
 
 MAX_WAYPOINTS = 4096
 # Points of the path club, and improvements of the best path, that are kept.

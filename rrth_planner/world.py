@@ -12,8 +12,10 @@ from rrth_planner.arm import ArmModel
 from rrth_planner.arrays import Array, check_dof, FARTHEST
 from rrth_planner.box_tree import grown_groups, pack_boxes
 from rrth_planner.errors import OptionsError
-from rrth_planner.kernels import arm_clearance, arm_validity, chain, contacts, jit
-from rrth_planner.kernels.boxes import rows_of
+from rrth_planner.kernels import jit
+from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_contacts as contacts
+from rrth_planner.kernels.collision.boxes import rows_of
+from rrth_planner.kernels.kinematics import generated_fk as chain
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene
 
@@ -219,7 +221,7 @@ def mount_inverse(arm: ArmModel) -> Array:
 
 
 def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
-    """Return the rows of the boxes, grown by the margin, (15, m), as `kernels.boxes.rows_of`."""
+    """Return the rows of the boxes, grown by the margin, (15, m), as `boxes.rows_of`."""
     rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
     rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
     return rows

@@ -8,9 +8,9 @@ import pytest
 from rrth_planner.blend import Blend
 from rrth_planner.braking import brake
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
-from rrth_planner.kernels.quick_stop import first_look, first_rest
-from rrth_planner.kernels.stops import line_stop, seems_to_hold, stop_way
-from rrth_planner.kernels.way_ahead import look_ahead, MOST, TIME, time_after, WAY
+from rrth_planner.kernels.trajectory.fast_stop import first_look, first_rest
+from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, TIME, time_after, WAY
+from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold, stop_way
 from rrth_planner.path import Path
 from rrth_planner.running import along_path, derivatives_at, Running, slowed
 from rrth_planner.timing import limit_ratio, parameterize

@@ -10,7 +10,7 @@ import pytest
 from rrth_planner.aiming import GoalSet, target_in_mount
 from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels.pointing import aim
+from rrth_planner.kernels.kinematics.pan_tilt_ik import aim
 from rrth_planner.leaving import box_depths
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import first_contact

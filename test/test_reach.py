@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.certificate import derivative_bounds
-from rrth_planner.kernels.arm_validity import curvature_bounds
+from rrth_planner.kernels.collision.arm_validity import curvature_bounds
 from rrth_planner.oracle import frames
 from rrth_planner.reach import bar_ends, bar_names, reach_table
 from rrth_planner.scene import Scene

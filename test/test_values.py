@@ -16,7 +16,7 @@ from rrth_planner.blend import round_corners
 from rrth_planner.certificate import certify, least_clearance
 from rrth_planner.errors import ModelError, OptionsError, RrthError, SceneError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import arm_validity
+from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.options import RRTHOptions
 from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem

@@ -10,7 +10,7 @@ from rrth_planner import aiming, growth, star, workspace
 from rrth_planner.box_map import map_problem
 from rrth_planner.errors import RrthError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import rrt_h
+from rrth_planner.kernels.search import rrt_h
 from rrth_planner.map_file import load_map
 from rrth_planner.options import (
     InformedRRTStarOptions,

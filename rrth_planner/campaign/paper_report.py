@@ -24,7 +24,7 @@ from rrth_planner.campaign.plane_claims import goal_bias_table, plane_claims, pl
 from rrth_planner.campaign.problems import MARGIN, RAY
 from rrth_planner.campaign.statistics import markdown_table, Rows
 from rrth_planner.campaign.table_1 import table_1, table_1_claim
-from rrth_planner.kernels.arm_sampling import POINTS_PER_BAR
+from rrth_planner.kernels.collision.arm_sampled import POINTS_PER_BAR
 
 
 def report(

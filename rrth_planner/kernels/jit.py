@@ -38,7 +38,7 @@ OUT_INT_CUBE = types.Array(int64, 3, 'C')
 RNG = types.Array(types.uint64, 1, 'C')
 OUT_POOL = types.Array(int32, 1, 'C')
 
-# An arm's forward kinematics: (q, ray_length, points, at) -> number of bars (`chain.py`).
+# An arm's forward kinematics: (q, ray_length, points, at) -> number of bars (`generated_fk.py`).
 CHAIN = types.FunctionType(int64(VEC, float64, OUT_VEC, int64))
 
 # The seam between planning and geometry: (q_from, q_to, resolution, chain, robot, obstacles)
@@ -50,7 +50,7 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, CHAIN, MAT, MAT
 FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 
 # Where an edge leans on obstacles: (q_from, q_to, chain, robot, obstacles, contacts) -> how many
-# rows of `contacts` were written (`contacts.py`).
+# rows of `contacts` were written (`edge_contacts.py`).
 CONTACTS = types.FunctionType(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 
 # A third: (edge check, contacts, resolution, chain, robot, obstacles, bounds, path, n, how) ->
@@ -103,7 +103,7 @@ def _cache_folder() -> Path | None:
     """Return the folder of the compiled code, or None where none can be kept."""
     # A kernel of another file may be part of what is kept, so all sources name the folder.
     digest = hashlib.sha256(f'{numba.__version__} {sys.implementation.cache_tag}'.encode())
-    for source in sorted(Path(__file__).parent.glob('*.py')):
+    for source in sorted(Path(__file__).parent.rglob('*.py')):
         digest.update(source.read_bytes())
     root = os.environ.get('RRTH_CACHE_DIR') or os.path.join(
         os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache'),

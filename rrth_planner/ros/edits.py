@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.arrays import Array, FARTHEST
 from rrth_planner.errors import MessageError, one_line, SceneError
-from rrth_planner.kernels.boxes import first_bad as first_bad_row, place, POSED
+from rrth_planner.kernels.collision.boxes import first_bad as first_bad_row, place, POSED
 from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.ros.fields import seconds_of, triple_of, unit_quaternion_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base

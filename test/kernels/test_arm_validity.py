@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rrth_planner.box_tree import pack_boxes
 from rrth_planner.certificate import derivative_bounds
-from rrth_planner.kernels.arm_validity import (
+from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
     is_edge_free,
     MAX_NODES,
@@ -416,15 +416,15 @@ import json
 import numpy as np
 from rrth_planner.box_tree import pack_boxes
 from rrth_planner.certificate import derivative_bounds
-from rrth_planner.kernels.arm_validity import is_configuration_free, prove_curve
-from rrth_planner.kernels.geometry import bar_box_distance
-from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
+from rrth_planner.kernels.collision.bar_box import bar_box_distance
+from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.aiming import goal_configurations, pointing_problem
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.clock import now
-from rrth_planner.kernels.contacts import edge_contacts, SLOPES
-from rrth_planner.kernels.random import next_word, normal, random_state, uniform
-from rrth_planner.kernels.sampling import draw_near
+from rrth_planner.kernels.collision.edge_contacts import edge_contacts, SLOPES
+from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform
+from rrth_planner.kernels.search.sampling import draw_near
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem

@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.errors import SceneError
-from rrth_planner.kernels.boxes import place, rows_of
+from rrth_planner.kernels.collision.boxes import place, rows_of
 from rrth_planner.kernels.layout import NUMBERS
 from rrth_planner.ros.edits import boxes_of, first_bad
 from rrth_planner.rotation import pose_matrix, quaternion_xyzw, rotation_matrix

@@ -35,7 +35,7 @@ CHAIN = """
 import sys
 import numpy as np
 from rrth_planner.kernels import jit
-from rrth_planner.kernels.chain import chain_of
+from rrth_planner.kernels.kinematics.generated_fk import chain_of
 from rrth_planner.kernels.kept_code import KeptCode
 compiled = []
 save = KeptCode.save_overload

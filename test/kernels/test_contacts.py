@@ -5,7 +5,8 @@
 import numpy as np
 import pytest
 from rrth_planner.box_tree import pack_boxes
-from rrth_planner.kernels.contacts import (
+from rrth_planner.kernels.collision.bar_box import bar_box_distance
+from rrth_planner.kernels.collision.edge_contacts import (
     bar_gaps,
     CLOSE,
     edge_contacts,
@@ -14,7 +15,6 @@ from rrth_planner.kernels.contacts import (
     SLOPES,
     SPACING,
 )
-from rrth_planner.kernels.geometry import bar_box_distance
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.scene import Scene
 from rrth_planner.world import arm_world

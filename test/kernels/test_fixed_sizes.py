@@ -19,19 +19,13 @@ from rrth_planner.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.box_tree import tree_depth
 from rrth_planner.errors import ModelError, OptionsError, SceneError
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels import (
-    arm_validity,
-    contacts,
-    geometry,
-    layout,
-    lean,
-    pointing,
-    scratch,
-    speeds,
-    tree,
-)
-from rrth_planner.kernels.chain import chain_source
+from rrth_planner.kernels import layout, scratch
+from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
 from rrth_planner.kernels.jit import BOX_ROWS, LANES
+from rrth_planner.kernels.kinematics import pan_tilt_ik
+from rrth_planner.kernels.kinematics.generated_fk import chain_source
+from rrth_planner.kernels.search import elastic_band, tree
+from rrth_planner.kernels.trajectory import speed_profile
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch
 from rrth_planner.planner import plan
@@ -103,17 +97,17 @@ NUMBERS = {
     'arm_validity': {'2': 'ends of an edge', '16': 'two bars of two points of four numbers'},
     'boxes': {'3': 'coordinates', '1': 'the part that is all boxes'},
     'clock': {'2': 'seconds and nanoseconds'},
-    'depths': {'3': 'coordinates'},
-    'geometry': {'3': 'coordinates'},
-    'pieces': {'6': 'coefficients of a quintic'},
-    'pointing': {'12': 'three axes and an origin', '3': 'coordinates'},
-    'quick_stop': {'3': 'limits; phases', '4': 'derivatives; columns', '5': 'columns'},
+    'penetration': {'3': 'coordinates'},
+    'bar_box': {'3': 'coordinates'},
+    'trajectory_check': {'6': 'coefficients of a quintic'},
+    'pan_tilt_ik': {'12': 'three axes and an origin', '3': 'coordinates'},
+    'fast_stop': {'3': 'limits; phases', '4': 'derivatives; columns', '5': 'columns'},
     'rrt': {'2': 'ends of a path'},
-    'speeds': {'2': 'columns', '3': 'derivatives'},
-    'stop_points': {'3': 'derivatives', '4': 'derivatives'},
+    'speed_profile': {'2': 'columns', '3': 'derivatives'},
+    'stop_trajectory': {'3': 'derivatives', '4': 'derivatives'},
     'stop_search': {'3': 'phases', '5': 'columns'},
-    'taut': {'2': 'sides of a corner'},
-    'way_ahead': {'3': 'derivatives', '4': 'derivatives'},
+    'shortcut': {'2': 'sides of a corner'},
+    'lookahead': {'3': 'derivatives', '4': 'derivatives'},
 }
 MADE = {
     *(f'scratch.{name}' for name in ('floats', 'ints', 'longs')),
@@ -124,7 +118,7 @@ MADE = {
 def fixed_sizes():
     """Return (module, size) of all arrays in kernels with a size that no argument decides."""
     found = set()
-    for file in sorted(KERNELS.glob('*.py')):
+    for file in sorted(KERNELS.rglob('*.py')):
         for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
             if not isinstance(node, ast.Call) or ast.unparse(node.func) not in MADE:
                 continue
@@ -155,7 +149,7 @@ def test_every_listed_size_has_its_tests():
 
 
 def test_sizes_that_follow_from_others_do():
-    assert geometry.MAX_ENDS == layout.MAX_BARS + 1
+    assert bar_box.MAX_ENDS == layout.MAX_BARS + 1
     # A group is replaced by those below it, on each level but the last.
     n_waiting = 1 + (LANES - 1) * (tree_depth(layout.MAX_BOXES) - 1)
     assert n_waiting <= arm_validity.MAX_GROUPS
@@ -214,7 +208,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         n_free += not any(touched)
     assert 10 < n_free < 90
     proofs = {1: 0, 0: 0, -1: 0}
-    rows = np.empty((50, contacts.SLOPES + n_joints))
+    rows = np.empty((50, edge_contacts.SLOPES + n_joints))
     for _ in range(20):
         q = free_configuration(rng, world)
         step = rng.standard_normal(n_joints)
@@ -231,7 +225,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         )
         assert not (proof == 1 and edge_touches(arm, scene, MARGIN, 0.5, q, q_to))
         proofs[proof] += 1
-        contacts.edge_contacts(q, q_to, world.chain, world.robot, world.obstacles, rows)
+        edge_contacts.edge_contacts(q, q_to, world.chain, world.robot, world.obstacles, rows)
     assert proofs[1] > 5
 
 
@@ -313,10 +307,10 @@ def test_the_queue_and_the_points_of_a_proof_hold_all_of_its_nodes():
     # A row of the queue for each interval that was begun with, two for each node beyond.
     assert arm_validity.QUEUE_ROOM >= 4 * 2 * arm_validity.MAX_NODES
     # Of the longest arm, too, there is room for more nodes than one interval needs.
-    assert arm_validity.POINTS_ROOM // (4 * geometry.MAX_ENDS) > 2
+    assert arm_validity.POINTS_ROOM // (4 * bar_box.MAX_ENDS) > 2
     arm = long_arm(layout.MAX_DOF, layout.MAX_BARS)
     world = arm_world(arm, Scene(()), 0.0, 0.5)
-    q, n_nodes = np.zeros(layout.MAX_DOF), arm_validity.POINTS_ROOM // (4 * geometry.MAX_ENDS)
+    q, n_nodes = np.zeros(layout.MAX_DOF), arm_validity.POINTS_ROOM // (4 * bar_box.MAX_ENDS)
     for length, is_proven in ((n_nodes - 1.5, True), (n_nodes - 0.5, False), (n_nodes, False)):
         q_to = np.eye(layout.MAX_DOF)[3] * length
         rest = (world.resolution, world.chain, world.robot, world.obstacles)
@@ -340,18 +334,18 @@ def test_an_edge_that_leans_on_more_than_there_is_room_for_finds_as_many_as_ther
     n_most = 0
     for _ in range(40):
         q_from, q_to = rng.uniform(*arm.bounds, (2, 4))
-        for capacity in (0, 1, 7, lean.MAX_CONTACTS):
-            rows = np.full((capacity + 2, contacts.SLOPES + 4), 7.0)
-            n = contacts.edge_contacts(
+        for capacity in (0, 1, 7, elastic_band.MAX_CONTACTS):
+            rows = np.full((capacity + 2, edge_contacts.SLOPES + 4), 7.0)
+            n = edge_contacts.edge_contacts(
                 q_from, q_to, world.chain, world.robot, world.obstacles, rows[:capacity]
             )
             assert n <= capacity
             assert (rows[capacity:] == 7.0).all()
         n_most = max(n_most, n)
-    assert n_most > contacts.MAX_PAIRS
+    assert n_most > edge_contacts.MAX_PAIRS
 
 
-@pytest.mark.parametrize('n_joints', [pointing.MAX_CLOSED_DOF, pointing.MAX_CLOSED_DOF + 1])
+@pytest.mark.parametrize('n_joints', [pan_tilt_ik.MAX_CLOSED_DOF, pan_tilt_ik.MAX_CLOSED_DOF + 1])
 def test_an_arm_of_many_joints_aims_numerically_if_it_has_too_many(n_joints):
     dh = np.zeros((n_joints + 1, 4))
     dh[:-3, 3] = 0.1
@@ -364,7 +358,7 @@ def test_an_arm_of_many_joints_aims_numerically_if_it_has_too_many(n_joints):
         radii=np.zeros(n_joints + 1),
         T_base_mount=np.eye(4),
     )
-    is_closed = n_joints <= pointing.MAX_CLOSED_DOF
+    is_closed = n_joints <= pan_tilt_ik.MAX_CLOSED_DOF
     assert (pointing_kernels(arm) is CLOSED_FORM) == is_closed
     assert (pointing_kernels(arm) is numerical()) != is_closed
     scene = Scene((Box('box', [0.4, 0.0, 0.3], [0.2, 0.2, 0.2], np.eye(3)),))
@@ -383,11 +377,11 @@ def test_a_stretch_has_no_more_phases_than_there_is_room_for():
     for _ in range(2000):
         v_from, v_to, top = np.sort(rng.uniform(0.0, 1.0, 3))
         cell = np.array([10.0 ** rng.uniform(-3, 1), top, *10.0 ** rng.uniform(-1, 2, 2)])
-        phases = np.full((speeds.MOST_PHASES + 1, 2), 7.0)
-        n = speeds.stretch_phases(v_from, v_to, cell, phases[: speeds.MOST_PHASES])
+        phases = np.full((speed_profile.MOST_PHASES + 1, 2), 7.0)
+        n = speed_profile.stretch_phases(v_from, v_to, cell, phases[: speed_profile.MOST_PHASES])
         assert (phases[-1] == 7.0).all()
         found.add(n)
-    assert max(found) == speeds.MOST_PHASES
+    assert max(found) == speed_profile.MOST_PHASES
 
 
 def test_a_group_holds_as_many_boxes_as_it_has_lanes():

@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.box_tree import pack_boxes
-from rrth_planner.kernels.geometry import bar_box_distance, open_lanes, touched_lanes
+from rrth_planner.kernels.collision.bar_box import bar_box_distance, open_lanes, touched_lanes
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.oracle import bar_box_touch
 from worlds import examples, random_rotation

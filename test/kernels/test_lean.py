@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.lean import MAX_CORNERS, tighten
-from rrth_planner.kernels.taut import pull_taut, TAUT
+from rrth_planner.kernels.search.elastic_band import MAX_CORNERS, tighten
+from rrth_planner.kernels.search.shortcut import pull_taut, TAUT
 from rrth_planner.world import arm_world
 from worlds import (
     blocked_pair,

@@ -5,7 +5,8 @@
 from hypothesis import given, settings, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels import chain, map_validity
+from rrth_planner.kernels.collision import map_validity
+from rrth_planner.kernels.kinematics import generated_fk
 
 SEEDS = st.integers(0, 2**32 - 1)
 DOFS = (2, 3, 4, 6)
@@ -34,7 +35,7 @@ def depth(points, lower, upper):
 def check(kernel, q_from, q_to, resolution, lower, upper):
     """Return what an edge check says."""
     rows = np.hstack([lower, upper])
-    return kernel(q_from, q_to, resolution, chain.NO_CHAIN, np.zeros((1, 1)), rows)
+    return kernel(q_from, q_to, resolution, generated_fk.NO_CHAIN, np.zeros((1, 1)), rows)
 
 
 @pytest.mark.parametrize('dof', DOFS)
@@ -90,6 +91,6 @@ def test_the_free_radius_is_the_distance_from_the_nearest_box(dof, seed):
     rng = np.random.default_rng(seed)
     lower, upper, q, _ = random_map(rng, dof)
     rows = np.hstack([lower, upper])
-    radius = map_validity.free_radius(q, chain.NO_CHAIN, np.zeros((1, 1)), rows)
+    radius = map_validity.free_radius(q, generated_fk.NO_CHAIN, np.zeros((1, 1)), rows)
     nearest = np.linalg.norm(q - np.clip(q, lower, upper), axis=1).min()
     assert radius == pytest.approx(nearest, abs=1e-12)

@@ -14,7 +14,7 @@ from rrth_planner.aiming import (
 )
 from rrth_planner.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.goal import PointingGoal
-from rrth_planner.kernels.pointing import aim, unwrap
+from rrth_planner.kernels.kinematics.pan_tilt_ik import aim, unwrap
 from rrth_planner.world import arm_world, robot_rows
 from worlds import (
     aiming_candidates,

@@ -16,7 +16,7 @@ from rrth_planner.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.errors import ModelError
 from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
-from rrth_planner.kernels.goal_projection import measure_aim, project, WORK_ROWS
+from rrth_planner.kernels.kinematics.ik_projection import measure_aim, project, WORK_ROWS
 from rrth_planner.scene import Scene
 from rrth_planner.world import arm_world, robot_rows
 from worlds import (

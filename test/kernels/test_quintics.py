@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rrth_planner.bernstein import to_bernstein
 from rrth_planner.errors import RrthError
-from rrth_planner.kernels.quintics import bound, fit, larger
+from rrth_planner.kernels.trajectory.quintics import bound, fit, larger
 from rrth_planner.trajectory import piece_coefficients, Trajectory
 from worlds import examples
 

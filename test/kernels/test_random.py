@@ -3,7 +3,7 @@
 """Random numbers of the kernels: the published generator, evenly and normally distributed."""
 
 import numpy as np
-from rrth_planner.kernels.random import next_word, normal, random_state, uniform
+from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform
 
 WORD = 2**64 - 1
 

@@ -7,8 +7,8 @@ import pytest
 from rrth_planner import growth, rrt_h, workspace
 from rrth_planner.box_map import BoxMap, map_problem
 from rrth_planner.deadline import Deadline
-from rrth_planner.kernels.random import random_state
-from rrth_planner.kernels.rrt import is_rejected_by_club
+from rrth_planner.kernels.search.random import random_state
+from rrth_planner.kernels.search.rrt import is_rejected_by_club
 from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 from rrth_planner.box_map import BoxMap, map_problem, map_world
-from rrth_planner.kernels.rrt_h_printed import cut_corners, first_contact, pull_forward
+from rrth_planner.kernels.search.rrt_h_published import cut_corners, first_contact, pull_forward
 from rrth_planner.kernels.vectors import path_length
 from rrth_planner.options import PrintedRRTHOptions, RRTOptions
 from rrth_planner.planner import plan

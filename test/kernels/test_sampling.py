@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.random import random_state
-from rrth_planner.kernels.sampling import (
+from rrth_planner.kernels.search.random import random_state
+from rrth_planner.kernels.search.sampling import (
     draw_ball,
     draw_informed,
     draw_near,

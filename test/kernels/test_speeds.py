@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.blend import round_corners
-from rrth_planner.kernels import speeds
+from rrth_planner.kernels.trajectory import speed_profile
 from rrth_planner.path import Path
 from rrth_planner.scene import Scene
 from rrth_planner.timing import parameterize
@@ -27,7 +27,7 @@ def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     top, grip, snap = 10.0 ** rng.uniform(-1.0, 1.0, 3) * [1.0, 3.0, 30.0]
     v_from = rng.choice([0.0, rng.uniform(0.0, top)])
     least = 10.0 ** rng.uniform(-3.0, 1.0)
-    v_to = speeds.reachable_speed(v_from, least, rng.uniform(v_from, top), grip, snap)
+    v_to = speed_profile.reachable_speed(v_from, least, rng.uniform(v_from, top), grip, snap)
     length = least * rng.choice([1.01, 1.1, 3.0])
     if rng.random() < 0.5:
         v_from, v_to = v_to, v_from
@@ -41,7 +41,7 @@ def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     assert Ruckig(1).calculate(request, profile) in (Result.Working, Result.Finished)
     phases = np.empty((7, 2))
     cell = np.array([length, top, grip, snap])
-    n = speeds.stretch_phases(v_from, v_to, cell, phases)
+    n = speed_profile.stretch_phases(v_from, v_to, cell, phases)
     assert phases[:n, 0].sum() == pytest.approx(profile.duration, rel=1e-5, abs=1e-6)
 
 

@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from rrth_planner.box_map import BoxMap, map_world
-from rrth_planner.kernels.taut import pull_forward, pull_taut, TAUT
+from rrth_planner.kernels.search.shortcut import pull_forward, pull_taut, TAUT
 from rrth_planner.kernels.vectors import path_length
 from worlds import (
     edge_touches,

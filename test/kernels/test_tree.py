@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.tree import CHUNK, nearest, steer, trace_path
+from rrth_planner.kernels.search.tree import CHUNK, nearest, steer, trace_path
 from rrth_planner.kernels.vectors import distance, path_length
 
 

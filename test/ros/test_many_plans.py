@@ -19,7 +19,7 @@ from rrth_planner import oracle  # noqa: E402
 from rrth_planner.aiming import target_in_mount  # noqa: E402
 from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.inspection import inspect_motion  # noqa: E402
-from rrth_planner.kernels import pointing  # noqa: E402
+from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
@@ -87,7 +87,9 @@ def _is_blocked_by_oracle(rng, arm, scene, target):
     postures, rays = [], []
     for _ in range(4000):
         q = rng.uniform(*arm.bounds)
-        reach = pointing.aim(world.robot, arm.bounds, in_mount, q.copy(), int(rng.integers(2)), q)
+        reach = pan_tilt_ik.aim(
+            world.robot, arm.bounds, in_mount, q.copy(), int(rng.integers(2)), q
+        )
         if reach >= 0.0:
             postures.append(q)
             rays.append([max(RAY, reach)])

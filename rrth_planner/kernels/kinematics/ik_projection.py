@@ -19,7 +19,7 @@ from rrth_planner.kernels.jit import (
     SIN_ALPHA,
     VEC,
 )
-from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 
 # Rows of `work`, a column for each joint: how it moves the target past the tool (3), the slopes
 # of the two equations (2), is the joint held at a limit, a wish, the step, a configuration.

@@ -6,14 +6,6 @@ import math
 
 from numba.core.types import boolean, float64, int64
 import numpy as np
-from rrth_planner.kernels.goal_projection import (
-    measure_aim,
-    project,
-    STEP,
-    step_along,
-    WISH,
-    WORK_ROWS,
-)
 from rrth_planner.kernels.jit import (
     CHAIN,
     EDGE_CHECK,
@@ -25,7 +17,15 @@ from rrth_planner.kernels.jit import (
     REVOLUTE,
     VEC,
 )
-from rrth_planner.kernels.pointing import is_goal_free, unwrap
+from rrth_planner.kernels.kinematics.ik_projection import (
+    measure_aim,
+    project,
+    STEP,
+    step_along,
+    WISH,
+    WORK_ROWS,
+)
+from rrth_planner.kernels.kinematics.pan_tilt_ik import is_goal_free, unwrap
 from rrth_planner.kernels.vectors import copy, distance
 
 # Configurations nearer than this in every joint are one [rad or m].

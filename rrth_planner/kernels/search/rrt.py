@@ -23,9 +23,9 @@ from rrth_planner.kernels.jit import (
     RNG,
     VEC,
 )
-from rrth_planner.kernels.random import uniform
-from rrth_planner.kernels.sampling import draw_informed, draw_near, draw_uniform
-from rrth_planner.kernels.tree import adapted_step, nearest, steer
+from rrth_planner.kernels.search.random import uniform
+from rrth_planner.kernels.search.sampling import draw_informed, draw_near, draw_uniform
+from rrth_planner.kernels.search.tree import adapted_step, nearest, steer
 from rrth_planner.kernels.vectors import copy, distance
 
 # With so many nodes the share of draws near the ends has fallen to a half.

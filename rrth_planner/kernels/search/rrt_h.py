@@ -28,10 +28,10 @@ from rrth_planner.kernels.jit import (
     RNG,
     VEC,
 )
-from rrth_planner.kernels.rrt import advance as grow
-from rrth_planner.kernels.shortening import pull, settle
-from rrth_planner.kernels.taut import TAUT
-from rrth_planner.kernels.tree import trace_path
+from rrth_planner.kernels.search.path_shortening import pull, settle
+from rrth_planner.kernels.search.rrt import advance as grow
+from rrth_planner.kernels.search.shortcut import TAUT
+from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].

@@ -22,7 +22,7 @@ from rrth_planner.kernels.jit import (
     READ_INTS,
     VEC,
 )
-from rrth_planner.kernels.pointing import is_goal_free
+from rrth_planner.kernels.kinematics.pan_tilt_ik import is_goal_free
 from rrth_planner.kernels.vectors import copy, distance
 
 # Draws by which a first straight way is sought, which then bounds how far the others may be.

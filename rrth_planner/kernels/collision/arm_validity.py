@@ -7,7 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.geometry import MAX_ENDS, open_lanes, touched_lanes
+from rrth_planner.kernels.collision.bar_box import MAX_ENDS, open_lanes, touched_lanes
 from rrth_planner.kernels.jit import (
     CHAIN,
     D,

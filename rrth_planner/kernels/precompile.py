@@ -9,8 +9,22 @@ import sys
 
 # What either process compiles, about as much each, the one what the other does not ask for soon.
 SHARES = (
-    ('lean', 'arm_clearance', 'chain', 'pieces'),
-    ('quick_stop', 'quintics', 'speeds', 'depths', 'taut', 'rrt', 'rrt_h', 'goals'),
+    (
+        'search.elastic_band',
+        'collision.arm_clearance',
+        'kinematics.generated_fk',
+        'collision.trajectory_check',
+    ),
+    (
+        'trajectory.fast_stop',
+        'trajectory.quintics',
+        'trajectory.speed_profile',
+        'collision.penetration',
+        'search.shortcut',
+        'search.rrt',
+        'search.rrt_h',
+        'kinematics.goal_selection',
+    ),
 )
 
 
@@ -21,7 +35,7 @@ def compile_kernels() -> bool:
     The compiler keeps some 150 MB for good; so they end, and this process loads what they leave.
     Without a folder to leave it in, each process compiles for itself.
     """
-    folder = str(Path(__file__).parent.parent)
+    folder = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, (folder, os.environ.get('PYTHONPATH', ''))))
     children = [
         subprocess.Popen(

@@ -5,7 +5,11 @@
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.arm_validity import ENDS_ROOM, is_configuration_free, is_edge_free
+from rrth_planner.kernels.collision.arm_validity import (
+    ENDS_ROOM,
+    is_configuration_free,
+    is_edge_free,
+)
 from rrth_planner.kernels.jit import (
     BOX_HALF,
     BOX_OFFSET,

@@ -4,8 +4,8 @@
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-from rrth_planner.kernels.arm_validity import is_configuration_free, prove_curve
-from rrth_planner.kernels.boxes import pack, rows_of
+from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
+from rrth_planner.kernels.collision.boxes import pack, rows_of
 from rrth_planner.kernels.jit import (
     BOX_ROWS,
     CHAIN,
@@ -17,7 +17,7 @@ from rrth_planner.kernels.jit import (
     OUT_MAT,
     VEC,
 )
-from rrth_planner.kernels.quintics import bound, fit
+from rrth_planner.kernels.trajectory.quintics import bound, fit
 
 
 @kernel(void(MAT, float64, OUT_MAT))

@@ -16,9 +16,9 @@ from rrth_planner.kernels.jit import (
     kernel,
     N_GOALS,
 )
-from rrth_planner.kernels.random import uniform
-from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE
-from rrth_planner.kernels.sampling import draw_informed, draw_uniform
+from rrth_planner.kernels.search.random import uniform
+from rrth_planner.kernels.search.rrt_star import extend, STAR_SIGNATURE
+from rrth_planner.kernels.search.sampling import draw_informed, draw_uniform
 from rrth_planner.kernels.vectors import copy
 
 

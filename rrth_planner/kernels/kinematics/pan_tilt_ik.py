@@ -7,7 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.arm_validity import is_configuration_free
+from rrth_planner.kernels.collision.arm_validity import is_configuration_free
 from rrth_planner.kernels.jit import (
     A,
     CHAIN,
@@ -24,7 +24,7 @@ from rrth_planner.kernels.jit import (
     SIN_ALPHA,
     VEC,
 )
-from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.kernels.vectors import copy, distance
 
 TURN = 2.0 * math.pi

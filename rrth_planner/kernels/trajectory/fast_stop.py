@@ -7,7 +7,10 @@ import math
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, VEC
-from rrth_planner.kernels.stop_points import (
+from rrth_planner.kernels.trajectory.lookahead import derivatives_on, look_ahead, MOST, TIME, WAY
+from rrth_planner.kernels.trajectory.stop_profile import stop_way
+from rrth_planner.kernels.trajectory.stop_search import soonest_stop
+from rrth_planner.kernels.trajectory.stop_trajectory import (
     CLOSEST,
     CLOSEST_FIRST,
     is_on_path,
@@ -17,9 +20,6 @@ from rrth_planner.kernels.stop_points import (
     stop_times,
     TICK,
 )
-from rrth_planner.kernels.stop_search import soonest_stop
-from rrth_planner.kernels.stops import stop_way
-from rrth_planner.kernels.way_ahead import derivatives_on, look_ahead, MOST, TIME, WAY
 
 # How far is looked ahead at first, in times that a stop on a line takes; then so many times
 # further. Cells are no longer than this [s], but for their number.

@@ -30,9 +30,9 @@ from rrth_planner.kernels.jit import (
     RNG,
     VEC,
 )
-from rrth_planner.kernels.random import uniform
-from rrth_planner.kernels.sampling import draw_uniform
-from rrth_planner.kernels.tree import adapted_step, nearest, squared_distances, steer
+from rrth_planner.kernels.search.random import uniform
+from rrth_planner.kernels.search.sampling import draw_uniform
+from rrth_planner.kernels.search.tree import adapted_step, nearest, squared_distances, steer
 from rrth_planner.kernels.vectors import copy, distance
 
 # What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: functions, resolution,

@@ -6,7 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, void
 from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, RNG, VEC
-from rrth_planner.kernels.random import normal, uniform
+from rrth_planner.kernels.search.random import normal, uniform
 from rrth_planner.kernels.vectors import distance
 
 # Draws near an end: from this share of the way to the other end on.

@@ -5,7 +5,7 @@
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.contacts import GAP, PRESSED, SHARE, SLOPES
+from rrth_planner.kernels.collision.edge_contacts import GAP, PRESSED, SHARE, SLOPES
 from rrth_planner.kernels.jit import (
     CHAIN,
     CONTACTS,
@@ -17,7 +17,7 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     VEC,
 )
-from rrth_planner.kernels.taut import ENOUGH, MOVES, pull_taut, SPACING
+from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES, pull_taut, SPACING
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Gap that a path is left with, for the proof of its edges to succeed [m].

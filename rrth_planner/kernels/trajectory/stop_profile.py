@@ -6,7 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, int64
 from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, READ_INTS
-from rrth_planner.kernels.way_ahead import BEGIN, CUBES, END, MOST, TINY, WAY
+from rrth_planner.kernels.trajectory.lookahead import BEGIN, CUBES, END, MOST, TINY, WAY
 
 # Columns of `phases`, (3, 5): how long each lasts [s]; way, speed, slope of the speed at its
 # begin [-, 1/s, 1/s^2], and the slope's slope [1/s^3].

@@ -7,8 +7,8 @@ import math
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.arm_validity import ENDS_ROOM
-from rrth_planner.kernels.geometry import bar_box_distance, bar_distance
+from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM
+from rrth_planner.kernels.collision.bar_box import bar_box_distance, bar_distance
 from rrth_planner.kernels.jit import (
     BOX_HALF,
     BOX_OFFSET,
@@ -23,7 +23,7 @@ from rrth_planner.kernels.jit import (
     REACH,
     VEC,
 )
-from rrth_planner.kernels.quintics import state_at
+from rrth_planner.kernels.trajectory.quintics import state_at
 
 
 @kernel(void(MAT, float64, CHAIN, MAT, OUT_MAT))

@@ -20,9 +20,9 @@ from rrth_planner.kernels.jit import (
     N_GOALS,
     OUT_MAT,
 )
-from rrth_planner.kernels.random import uniform
-from rrth_planner.kernels.rrt_star import extend, STAR_SIGNATURE, trace_path
-from rrth_planner.kernels.sampling import draw_ball, draw_uniform
+from rrth_planner.kernels.search.random import uniform
+from rrth_planner.kernels.search.rrt_star import extend, STAR_SIGNATURE, trace_path
+from rrth_planner.kernels.search.sampling import draw_ball, draw_uniform
 from rrth_planner.kernels.vectors import copy, path_length
 
 

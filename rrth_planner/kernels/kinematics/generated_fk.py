@@ -37,7 +37,7 @@ HEADER = '''"""Points of one arm, written out from its Denavit-Hartenberg rows."
 from numba.core.types import float64, int64
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import kernel, OUT_VEC, VEC
-from rrth_planner.kernels.kinematics import sine_cosine
+from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 
 
 @kernel(int64(VEC, float64, OUT_VEC, int64))

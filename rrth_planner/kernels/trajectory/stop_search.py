@@ -7,8 +7,8 @@ import math
 from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
-from rrth_planner.kernels.stops import line_stop, seems_to_hold
-from rrth_planner.kernels.way_ahead import BEGIN, CUBES, SLOPE, SPEED, TIME, WAY
+from rrth_planner.kernels.trajectory.lookahead import BEGIN, CUBES, SLOPE, SPEED, TIME, WAY
+from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold
 
 # What is tried, as shares of what the limits leave along the way: decelerations, jerks; and how
 # long after another delay the next one is tried, or one that ends at a point of the motion [s].

@@ -6,7 +6,7 @@ import math
 
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.arm_validity import ENDS_ROOM, MAX_GROUPS
+from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM, MAX_GROUPS
 from rrth_planner.kernels.jit import CHAIN, D, kernel, LANES, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.kernels.vectors import distance

@@ -15,7 +15,7 @@ from rrth_planner.kernels.jit import (
     SLIDE,
     VEC,
 )
-from rrth_planner.kernels.taut import ENOUGH, MOVES
+from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES
 from rrth_planner.kernels.vectors import path_length
 
 # Entries of the settings of `shorten`: those of `taut`, and, for the steps as printed, the

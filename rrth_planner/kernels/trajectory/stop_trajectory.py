@@ -7,8 +7,8 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_INTS, VEC
-from rrth_planner.kernels.stops import A, J, LASTS, stop_way, V, X
-from rrth_planner.kernels.way_ahead import derivatives_on, TIME, time_after, WAY
+from rrth_planner.kernels.trajectory.lookahead import derivatives_on, TIME, time_after, WAY
+from rrth_planner.kernels.trajectory.stop_profile import A, J, LASTS, stop_way, V, X
 
 # Points of a stop are no further apart, where that keeps it on its path, and no closer [s]: the
 # closer, the more of the jerk between them is rounding, and the further from its place a jump of

@@ -5,7 +5,7 @@
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, CONTACTS, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
-from rrth_planner.kernels.taut import remove_waypoint, reverse_path, SPACING
+from rrth_planner.kernels.search.shortcut import remove_waypoint, reverse_path, SPACING
 from rrth_planner.kernels.vectors import copy, distance
 
 MAX_CUTS = 1000
