@@ -5,8 +5,8 @@
 from collections.abc import Mapping
 
 import numpy as np
-from rrth_planner.arm import ArmModel
 from rrth_planner.arm_file import arm_from_mapping
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
 

@@ -14,11 +14,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.scene import Scene
 from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.rotation import quaternion_xyzw
-from rrth_planner.scene import Scene
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray

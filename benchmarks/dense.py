@@ -10,9 +10,9 @@ boxes grown by as much as any of its points moves until their ends.
 
 from numba import njit
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.scene import Scene
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
 
 
 def touching_edges(

@@ -3,9 +3,9 @@
 """What is drawn at random: configurations, edges, wearers, targets."""
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.rotation import rotation_matrix
-from rrth_planner.scene import Box, Scene
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.rotation import rotation_matrix
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.world import World
 
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.aiming import FEW, goal_configurations, MANY, pointing_problem
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
 from rrth_planner.result import PlanResult
-from rrth_planner.scene import Scene
 from rrth_planner.world import arm_world, World
 
 from benchmarks.clock import timed, uncollected

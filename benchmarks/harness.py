@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 
 from benchmarks.queries import FOLDER, load_query, MAPS, QUERIES
 from benchmarks.task import path_row, Row, Task

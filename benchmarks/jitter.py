@@ -17,13 +17,13 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.arrays import Array
 from rrth_planner.campaign.store import replace_file
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.fields import nanoseconds_of
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg
-from rrth_planner.trajectory import sample, Trajectory
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 

@@ -5,7 +5,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 from benchmarks import full_query, plans
 from benchmarks.task import Row

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 NANOSECONDS = 1e9
 # Between two samples of a curve [s].

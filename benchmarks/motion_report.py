@@ -34,7 +34,7 @@ METHOD = """\
   over these, all else over the random queries alone.
 - **The curve** is what joint_trajectory_controller interpolates by the numbers of the message,
   computed as its source does, in seconds and whole nanoseconds; nothing of it comes from
-  `rrth_planner.trajectory`. It is looked at every 0.2 ms and at both sides of every point;
+  `rrth_planner.model.trajectory`. It is looked at every 0.2 ms and at both sides of every point;
   jerk is the third derivative of each quintic, greatest exactly.
 - **Touching** is judged by plain numpy that shares nothing with the planner: bars of the arm
   against the boxes grown by the margin, at the end with the ray out to the target.

@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
     if missing:
         print(MISSING.format(', '.join(missing)), file=sys.stderr)
         return 2
-    from rrth_planner.errors import RrthError
+    from rrth_planner.model.errors import RrthError
 
     try:
         _run(options, _command(options))
@@ -99,7 +99,7 @@ def _planned(n_queries: int, n_bent: int) -> Iterator[tuple['Motion', bool]]:
     The queries go on round later wearers until there are n_bent motions with corners; of those
     later queries the ones answered by a straight motion are left out, all others are kept.
     """
-    from rrth_planner.status import PlanStatus
+    from rrth_planner.model.status import PlanStatus
 
     from benchmarks.motion_plan import default_limits, planned_motions
 

@@ -11,7 +11,7 @@ import tempfile
 import time
 
 import psutil
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.child_process import ChildProcess
 
 from benchmarks.extent import Extent

@@ -3,7 +3,7 @@
 """A million certified edges, looked at densely: no proof may have been wrong."""
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 from benchmarks import dense, loops
 from benchmarks.draws import random_edges

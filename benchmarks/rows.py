@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 from rrth_planner.campaign.store import replace_file
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 
 from benchmarks.task import Row
 

@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
     if missing:
         print(MISSING.format(', '.join(missing)), file=sys.stderr)
         return 2
-    from rrth_planner.errors import RrthError
+    from rrth_planner.model.errors import RrthError
 
     try:
         return _run(options)

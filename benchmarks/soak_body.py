@@ -10,9 +10,9 @@ import time
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.rotation import quaternion_xyzw
-from rrth_planner.scene import Box, Scene
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.scene import Box, Scene
 from visualization_msgs.msg import Marker, MarkerArray
 
 from benchmarks.draws import random_wearer

@@ -12,8 +12,8 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 import psutil
 from rclpy.qos import QoSProfile
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory

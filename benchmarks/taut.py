@@ -4,8 +4,8 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array
 from rrth_planner.checking import sampled
+from rrth_planner.model.arrays import Array
 from rrth_planner.options import RRTHOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem

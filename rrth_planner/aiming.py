@@ -8,13 +8,13 @@ import functools
 from importlib import import_module
 
 import numpy as np
-from rrth_planner.arm import ArmModel, forward_kinematics
-from rrth_planner.arrays import Array, check_dof
-from rrth_planner.errors import ModelError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.goal_selection import find_goals
+from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.errors import ModelError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.world import World
 

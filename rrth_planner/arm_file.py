@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel, ROW
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.entries import mapping, number, sequence
-from rrth_planner.errors import ModelError, printable, shown
+from rrth_planner.model.arm import ArmModel, ROW
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import ModelError, printable, shown
+from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
 from rrth_planner.resources import resource_path
-from rrth_planner.rotation import pose_matrix, quaternion_xyzw
 from rrth_planner.text_files import parse_yaml, read_text, to_yaml
 
 LAYOUT = (

@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array, check_dof
 from rrth_planner.kernels.collision import arm_validity
-from rrth_planner.path import Path
-from rrth_planner.trajectory import MotionLimits
+from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.world import World
 
 # A blend takes at most this share of an edge, so that two neighbours leave a straight between.

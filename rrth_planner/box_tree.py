@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array
-from rrth_planner.errors import SceneError
 from rrth_planner.kernels.collision.boxes import pack
 from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import SceneError
 
 Indices = NDArray[np.int64]
 

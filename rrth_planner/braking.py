@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.certificate import Certificate, certify
 from rrth_planner.emergency import emergency_stop
-from rrth_planner.trajectory import MotionLimits, part_of, sample, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
 from rrth_planner.world import World
 
 # What rounding leaves of an acceleration [rad/s^2].

@@ -5,7 +5,7 @@
 from collections.abc import Callable
 import time
 
-from rrth_planner.status import PlanStatus
+from rrth_planner.model.status import PlanStatus
 
 
 class Deadline:

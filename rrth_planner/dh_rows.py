@@ -5,8 +5,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import ModelError
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import ModelError
 
 # Directions this near to parallel are made parallel: the common normal of axes that only rounding
 # tilts would be kilometres away [rad].

@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.kernels.trajectory.fast_stop import quick_stop
 from rrth_planner.kernels.trajectory.stop_trajectory import SPACINGS
-from rrth_planner.trajectory import MotionLimits, piece_coefficients, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
 # A stop is not expected to reach the controller before [s].
 ON_ITS_WAY = 0.01

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 import sys
 from typing import Any
 
-from rrth_planner.errors import RrthError, shown
+from rrth_planner.model.errors import RrthError, shown
 
 
 def mapping(

@@ -14,7 +14,9 @@ import platform
 from typing import Any
 
 from rrth_planner.entries import number, text
-from rrth_planner.errors import one_line, RecordError, shown
+from rrth_planner.model.errors import one_line, RecordError, shown
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.question import PlanQuestion
 from rrth_planner.records import (
     fields_of,
@@ -24,9 +26,7 @@ from rrth_planner.records import (
     touch_from_mapping,
     trajectory_from_mapping,
 )
-from rrth_planner.scene import Scene
 from rrth_planner.touch import Disagreement, Touch
-from rrth_planner.trajectory import Trajectory
 
 # Of the layout of a record; another one is refused.
 FORMAT = 1

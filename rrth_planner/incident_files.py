@@ -7,8 +7,8 @@ import os
 from pathlib import Path
 import uuid
 
-from rrth_planner.errors import RecordError, RrthError
 from rrth_planner.incident import Incident, incident_from_mapping, incident_to_mapping
+from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.text_files import load_yaml, to_yaml
 
 MOST_FILES = 100

@@ -5,12 +5,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.oracle import first_contact, frames, least_clearance, quintic_states
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import MotionLimits, Trajectory
 
 # Time between two instants at which a controller's states are looked at [s].
 PERIOD = 0.0005

@@ -5,13 +5,13 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from rrth_planner.arm import ArmModel
 from rrth_planner.certificate import certify
 from rrth_planner.fcl_check import first_touch, touch_on_way_out
 from rrth_planner.leaving import box_depths, leads_out
-from rrth_planner.scene import Scene
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import beyond, Trajectory
 from rrth_planner.touch import Touch
-from rrth_planner.trajectory import beyond, Trajectory
 from rrth_planner.world import World
 
 

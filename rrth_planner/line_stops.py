@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

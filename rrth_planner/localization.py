@@ -3,9 +3,9 @@
 """Where in a motion an arm is, by a reading of it."""
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.start_state import MotionState, Takeover
-from rrth_planner.trajectory import near_point, sample, Trajectory
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.trajectory import near_point, sample, Trajectory
 
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from rrth_planner.errors import OptionsError, shown
+from rrth_planner.model.errors import OptionsError, shown
 
 NUMBERS = (int, float, np.integer, np.floating)
 

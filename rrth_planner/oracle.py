@@ -10,9 +10,9 @@ against the slabs of the box, and a motion is looked at instant by instant.
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.scene import Scene
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)

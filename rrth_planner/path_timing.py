@@ -7,20 +7,20 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from rrth_planner.arm import ArmModel, reach_to
 from rrth_planner.blend import Blend, round_corners
 from rrth_planner.certificate import certify
 from rrth_planner.escape import Escape
-from rrth_planner.goal import PointingGoal
 from rrth_planner.judges import touch_seen
-from rrth_planner.path import Path
+from rrth_planner.model.arm import ArmModel, reach_to
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.refusal import CANCELLED, Refusal
-from rrth_planner.scene import Scene
-from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import Lead, reserved
 from rrth_planner.timing import excess, parameterize, TooFastError
 from rrth_planner.touch import Disagreement
-from rrth_planner.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.world import grown, World
 
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof

@@ -9,16 +9,20 @@ import time
 
 import numpy as np
 from rrth_planner.aiming import check_pointing_arm
-from rrth_planner.arm import ArmModel, reach_to, tool_pose
-from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify, least_clearance
 from rrth_planner.escape import Escape, way_out
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import jit
 from rrth_planner.leaving import box_depths
+from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.options import TreeOptions
-from rrth_planner.path import Path
 from rrth_planner.path_search import find_path, SPARES
 from rrth_planner.path_timing import time_path
 from rrth_planner.planner import PlanResult
@@ -31,12 +35,8 @@ from rrth_planner.refusal import (
     target_refusal,
     within_limits,
 )
-from rrth_planner.scene import Box, Scene
-from rrth_planner.start_state import Takeover
-from rrth_planner.status import PlanStatus
 from rrth_planner.takeover import Lead, lead_in, stop_first
 from rrth_planner.touch import Disagreement
-from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown, World
 
 # A wearer who holds still makes the same world from plan to plan.

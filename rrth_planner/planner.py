@@ -8,7 +8,7 @@ from importlib import import_module
 
 import numpy as np
 from rrth_planner.deadline import Deadline
-from rrth_planner.errors import OptionsError
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 from rrth_planner.rate import RateProfile
 from rrth_planner.running import first_rest, Running
 from rrth_planner.stopping import soonest_stop
-from rrth_planner.trajectory import MotionLimits, sample, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

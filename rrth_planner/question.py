@@ -5,14 +5,14 @@
 from dataclasses import dataclass, fields
 from typing import Any
 
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import OptionsError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.options import TreeOptions
-from rrth_planner.scene import Scene
-from rrth_planner.start_state import Takeover
-from rrth_planner.trajectory import MotionLimits
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -5,8 +5,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import RrthError
 
 # By how much rate and slope may miss 0 at the end; by how much the rate may be below 0 [-].
 REST, ROUNDING = 1e-7, 1e-9

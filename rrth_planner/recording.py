@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import RecordError
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import REST_SPEED, sample, Trajectory
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import RecordError
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.world import arm_world, World
 
 # What the guard says while it brakes.

@@ -8,17 +8,17 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import frozen_array
 from rrth_planner.entries import mapping, number, sequence, whole
-from rrth_planner.errors import printable, RecordError, shown
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import frozen_array
+from rrth_planner.model.errors import printable, RecordError, shown
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import ALGORITHMS, TreeOptions
 from rrth_planner.question import PlanQuestion
-from rrth_planner.scene import Box, Scene
-from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.touch import Touch
-from rrth_planner.trajectory import MotionLimits, Trajectory
 
 
 def plain(value: Any) -> Any:

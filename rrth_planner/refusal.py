@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.aiming import GoalSet
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
 from rrth_planner.certificate import certify
-from rrth_planner.goal import PointingGoal
 from rrth_planner.leaving import box_depths
-from rrth_planner.scene import Scene
-from rrth_planner.status import PlanStatus
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.takeover import Lead
-from rrth_planner.trajectory import MotionLimits
 from rrth_planner.world import World
 
 # A joint this far beyond its limit is at it [rad, m].

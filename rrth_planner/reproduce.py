@@ -12,7 +12,7 @@ import sys
 
 from rrth_planner.campaign.paper_runs import Extent, QUICK, spread_runs, timed_runs
 from rrth_planner.campaign.runs import processor_name, source_digest
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 
 MISSING = """{}: the reproduction needs more libraries than the planner; install them by
     pip install -r requirements/campaign.txt"""

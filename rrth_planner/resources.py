@@ -5,7 +5,7 @@
 from pathlib import Path
 import sys
 
-from rrth_planner.errors import ModelError
+from rrth_planner.model.errors import ModelError
 
 
 def resource_path(name: str) -> Path:

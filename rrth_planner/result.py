@@ -8,10 +8,10 @@ from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import RrthError
-from rrth_planner.path import Path
-from rrth_planner.status import PlanStatus
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.path import Path
+from rrth_planner.model.status import PlanStatus
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -7,9 +7,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
 from rrth_planner.line_stops import line_stops, LineStops
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.rate import integrated, RateProfile
 from rrth_planner.running import (
     along_path,
@@ -18,7 +19,6 @@ from rrth_planner.running import (
     Running,
     slowed,
 )
-from rrth_planner.trajectory import MotionLimits
 
 # What is tried: delays, in shares of the time that is looked at; in shares of the limits that are
 # left along the path, decelerations and the jerks that build them up.

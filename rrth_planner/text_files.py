@@ -9,7 +9,7 @@ import re
 from typing import Any
 from xml.etree import ElementTree
 
-from rrth_planner.errors import ModelError
+from rrth_planner.model.errors import ModelError
 import yaml
 
 # The largest files that are written here are incidents round 10,000 boxes, seen twice: 600,000

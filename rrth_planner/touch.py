@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.model.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,10 @@
 """How far the bars of an arm have moved at most by some instants of a trajectory."""
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.reach import reach_table
-from rrth_planner.trajectory import piece_coefficients, Trajectory
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.reach import reach_table
+from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 
 # Stretches that each piece is cut into, and the powers of u that q'(u) has at their ends.
 STRETCHES = 8

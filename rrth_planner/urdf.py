@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import ModelError
-from rrth_planner.rotation import roll_pitch_yaw
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import ModelError
+from rrth_planner.model.rotation import roll_pitch_yaw
 
 MOUNT, TOOL = 'mount', 'tool'
 # How much of the pointing ray is drawn, and how thick it is beside the bars.

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 
 from rrth_planner.arm_file import load_arm
-from rrth_planner.errors import ModelError, RrthError
+from rrth_planner.model.errors import ModelError, RrthError
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import load_yaml

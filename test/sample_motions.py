@@ -4,9 +4,9 @@
 
 import numpy as np
 from rrth_planner.blend import Blend
-from rrth_planner.path import Path
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import sample, Trajectory
 from worlds import limits
 
 LIMITS = limits()

@@ -12,10 +12,10 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm_file import load_arm
-from rrth_planner.arrays import FARTHEST
-from rrth_planner.errors import LONGEST_SENTENCE, RrthError
 from rrth_planner.incident_files import incident_to_yaml, read_incident
 from rrth_planner.map_file import load_map
+from rrth_planner.model.arrays import FARTHEST
+from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
 from rrth_planner.motion_files import read_motion, write_motion
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import load_yaml, parse_yaml, to_yaml

@@ -31,7 +31,7 @@ from benchmarks.table import peer_lines, survival_lines, TARGET_HEADER, target_l
 from benchmarks.targets import TARGETS
 from benchmarks.task import figure_row, origin, path_row
 import numpy as np
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 from rrth_planner.shortest import shortest_path
 
 NAMES = (*MAPS, *QUERIES)

@@ -5,7 +5,7 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.bernstein import first_outside, from_values, to_bernstein
+from rrth_planner.model.bernstein import first_outside, from_values, to_bernstein
 from worlds import examples
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
-from rrth_planner.errors import OptionsError, RrthError, SceneError
+from rrth_planner.model.errors import OptionsError, RrthError, SceneError
+from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.options import RRTOptions
 from rrth_planner.resources import resource_path
-from rrth_planner.rotation import rotation_matrix
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import load_yaml
 from rrth_planner.wearer_file import load_body, scene_from_mapping

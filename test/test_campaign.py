@@ -31,8 +31,8 @@ from rrth_planner.campaign.runs import execute, Run
 from rrth_planner.campaign.statistics import histories_on, Rows
 from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
 from rrth_planner.campaign.table_1 import is_the_papers
-from rrth_planner.errors import RrthError
 from rrth_planner.map_file import load_map
+from rrth_planner.model.errors import RrthError
 from rrth_planner.shortest import shortest_path
 
 # Columns that differ from run to run whatever the seed.

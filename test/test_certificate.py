@@ -6,11 +6,11 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.certificate import certify, CLEARANCE_PERIOD, derivative_bounds, least_clearance
+from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.oracle import first_contact
-from rrth_planner.path import Path
-from rrth_planner.scene import Scene
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.world import arm_world
 from worlds import (
     bezier_quintic,

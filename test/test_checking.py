@@ -8,11 +8,13 @@ import functools
 import numpy as np
 import pytest
 from rrth_planner.aiming import goal_configurations
-from rrth_planner.arm import tool_pose
 from rrth_planner.box_map import map_problem
 from rrth_planner.checking import by_check_points, sampled
-from rrth_planner.goal import PointingGoal
 from rrth_planner.map_file import load_map
+from rrth_planner.model.arm import tool_pose
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.options import (
     InformedRRTStarOptions,
     RRTHOptions,
@@ -23,9 +25,7 @@ from rrth_planner.options import (
 from rrth_planner.oracle import first_contact
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.scene import Box, Scene
 from rrth_planner.shortest import enters, extended_obstacles
-from rrth_planner.status import PlanStatus
 from rrth_planner.world import arm_world
 from worlds import FOLDED, MARGIN, oracle_bars, RAY, table_1_arm, wearer
 

@@ -4,15 +4,15 @@
 
 import numpy as np
 import pytest
-from rrth_planner.arm import pointing_error, tool_pose
 from rrth_planner.arm_file import load_arm
 from rrth_planner.certificate import certify
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import pointing_error, tool_pose
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import positions_at
 from rrth_planner.oracle import first_contact
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
-from rrth_planner.status import PlanStatus
-from rrth_planner.trajectory import positions_at
 from rrth_planner.wearer_file import load_body
 from rrth_planner.world import arm_world
 

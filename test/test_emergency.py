@@ -11,16 +11,16 @@ from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.kernels.trajectory.fast_stop import first_look, first_rest
 from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, TIME, time_after, WAY
 from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold, stop_way
-from rrth_planner.path import Path
-from rrth_planner.running import along_path, derivatives_at, Running, slowed
-from rrth_planner.timing import limit_ratio, parameterize
-from rrth_planner.trajectory import (
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import (
     jerks_at,
     MotionLimits,
     piece_coefficients,
     sample,
     Trajectory,
 )
+from rrth_planner.running import along_path, derivatives_at, Running, slowed
+from rrth_planner.timing import limit_ratio, parameterize
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
 

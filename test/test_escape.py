@@ -9,20 +9,20 @@ import re
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from rrth_planner.goal import PointingGoal
 from rrth_planner.leaving import box_depths, leads_out, relaxed
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.path import Path
+from rrth_planner.model.reach import bar_ends
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import positions_at, sample
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch, first_contact
-from rrth_planner.path import Path
 from rrth_planner.path_search import SPARES
-from rrth_planner.reach import bar_ends
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Box, Scene
-from rrth_planner.start_state import MotionState, Takeover
-from rrth_planner.status import PlanStatus
 from rrth_planner.timing import parameterize
 from rrth_planner.touch import Touch
-from rrth_planner.trajectory import positions_at, sample
 from rrth_planner.underway import is_still_free
 from rrth_planner.world import arm_world, grown
 from worlds import (

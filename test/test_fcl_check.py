@@ -4,9 +4,9 @@
 
 import numpy as np
 import pytest
-from rrth_planner.arm import tool_pose
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.model.arm import tool_pose
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.world import arm_world
 from worlds import (
     compiled_chain,

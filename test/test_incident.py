@@ -9,8 +9,6 @@ from types import MappingProxyType
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.errors import RecordError, RrthError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import (
     disagreement_incident,
     error_incident,
@@ -25,13 +23,15 @@ from rrth_planner.incident_files import (
     read_incident,
     write_incident,
 )
+from rrth_planner.model.errors import RecordError, RrthError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
 from rrth_planner.question import PlanQuestion
-from rrth_planner.scene import Box, Scene
-from rrth_planner.start_state import MotionState, Takeover
 from rrth_planner.text_files import parse_yaml
 from rrth_planner.touch import Disagreement, Touch
-from rrth_planner.trajectory import MotionLimits, Trajectory
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 import yaml
 

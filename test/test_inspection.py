@@ -4,11 +4,11 @@
 
 import numpy as np
 import pytest
-from rrth_planner.arm import tool_pose
 from rrth_planner.arm_file import load_arm
 from rrth_planner.inspection import inspect_motion, UnsafeMotionError
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.arm import tool_pose
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
 ARM = load_arm()
 START = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])

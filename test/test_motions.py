@@ -16,10 +16,10 @@ from benchmarks.queries import wearer
 import numpy as np
 from rrth_planner import oracle
 from rrth_planner.blend import Blend
-from rrth_planner.path import Path
-from rrth_planner.scene import Box, Scene
+from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import MotionLimits, sample, Trajectory
 from worlds import limits, table_1_arm
 
 MARGIN, RAY = 0.02, 1.0

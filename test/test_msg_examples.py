@@ -12,9 +12,10 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
-from rrth_planner.errors import MessageError  # noqa: E402
-from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.inspection import inspect_motion  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
+from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.trajectory import MotionLimits  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
 from rrth_planner.oracle import first_contact  # noqa: E402
 from rrth_planner.pipeline import plan_motion  # noqa: E402
@@ -24,7 +25,6 @@ from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.message_files import message_from_file  # noqa: E402
 from rrth_planner.text_files import load_yaml
-from rrth_planner.trajectory import MotionLimits  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
@@ -170,4 +170,4 @@ def test_a_file_that_does_not_fit_its_message_is_named(tmp_path, text):
     path.write_text(text)
     with pytest.raises(Exception, match='odd.yaml') as caught:
         message_from_file(path, PointStamped)
-    assert type(caught.value).__module__ == 'rrth_planner.errors'
+    assert type(caught.value).__module__ == 'rrth_planner.model.errors'

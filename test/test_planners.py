@@ -11,6 +11,7 @@ from rrth_planner import oracle, star
 from rrth_planner.box_map import BoxMap, map_problem, map_world
 from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.map_file import map_from_mapping
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
@@ -23,7 +24,6 @@ from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import resource_path
 from rrth_planner.shortest import shortest_path
-from rrth_planner.status import PlanStatus
 from rrth_planner.text_files import load_yaml
 from rrth_planner.world import arm_world
 import worlds

@@ -7,11 +7,11 @@ import pytest
 from rrth_planner.acceptance import accept, PlaybackRules
 from rrth_planner.arm_file import load_arm
 from rrth_planner.emergency import emergency_stop
-from rrth_planner.errors import MessageError, OptionsError
-from rrth_planner.path import Path
+from rrth_planner.model.errors import MessageError, OptionsError
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import sample, Trajectory
 from worlds import limits
 
 ARM = load_arm()

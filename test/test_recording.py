@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from rrth_planner.arm_file import load_arm
-from rrth_planner.errors import RecordError
+from rrth_planner.model.errors import RecordError
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.oracle import least_clearance
 from rrth_planner.recording import (
     at,
@@ -18,8 +20,6 @@ from rrth_planner.recording import (
     Told,
     told_at,
 )
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import sample, Trajectory
 
 ARM = load_arm()
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])

@@ -10,16 +10,16 @@ import sys
 
 import numpy as np
 import pytest
-from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, error_incident, IncidentKind
 from rrth_planner.incident_files import write_incident
 from rrth_planner.localization import takeover
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.status import PlanStatus
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.options import RRTHOptions
 from rrth_planner.question import PlanQuestion
-from rrth_planner.scene import Box, Scene
-from rrth_planner.status import PlanStatus
 from rrth_planner.touch import Touch
-from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 

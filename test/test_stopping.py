@@ -5,14 +5,14 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.errors import RrthError
-from rrth_planner.path import Path
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import jerks_at, MotionLimits, sample, Trajectory
 from rrth_planner.playback import Playback, stop
 from rrth_planner.rate import RateProfile
 from rrth_planner.running import Running
 from rrth_planner.stopping import holds
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import jerks_at, MotionLimits, sample, Trajectory
 from sample_motions import any_motion, planned_motion
 from worlds import examples, limits
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hypothesis import given, strategies as st
 import pytest
-from rrth_planner.errors import ModelError
+from rrth_planner.model.errors import ModelError
 from rrth_planner.text_files import (
     DEEPEST,
     load_xml,

@@ -6,10 +6,17 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.blend import Blend
+from rrth_planner.model.path import Path
+from rrth_planner.model.trajectory import (
+    joined,
+    near_point,
+    part_of,
+    positions_at,
+    sample,
+    Trajectory,
+)
 from rrth_planner.oracle import quintic_states
-from rrth_planner.path import Path
 from rrth_planner.timing import parameterize
-from rrth_planner.trajectory import joined, near_point, part_of, positions_at, sample, Trajectory
 from worlds import examples, limits
 
 SEEDS = st.integers(0, 2**32 - 1)

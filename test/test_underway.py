@@ -10,17 +10,17 @@ import pytest
 from rrth_planner import oracle
 from rrth_planner.certificate import certify
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
-from rrth_planner.oracle import frames, quintic_states
-from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Box, Scene
-from rrth_planner.timing import limit_ratio
-from rrth_planner.trajectory import (
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import (
     joined,
     part_of,
     piece_coefficients,
     sample,
     Trajectory,
 )
+from rrth_planner.oracle import frames, quintic_states
+from rrth_planner.running_motion import RunningMotion
+from rrth_planner.timing import limit_ratio
 from rrth_planner.underway import (
     is_place_free,
     is_still_free,

@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arm_file import load_arm
-from rrth_planner.errors import ModelError
+from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.errors import ModelError
+from rrth_planner.model.rotation import roll_pitch_yaw
 from rrth_planner.oracle import bars
 from rrth_planner.resources import resource_path
-from rrth_planner.rotation import roll_pitch_yaw
 from rrth_planner.settings import load_settings
 from rrth_planner.urdf import arm_to_urdf, RAY_LENGTH
 from rrth_planner.write_urdf import main, urdf_of_file

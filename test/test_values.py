@@ -9,20 +9,20 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.aiming import FEW, goal_configurations
-from rrth_planner.arm import ArmModel, forward_kinematics
 from rrth_planner.arm_file import arm_from_mapping
-from rrth_planner.arrays import FARTHEST, frozen_array
 from rrth_planner.blend import round_corners
 from rrth_planner.certificate import certify, least_clearance
-from rrth_planner.errors import ModelError, OptionsError, RrthError, SceneError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.collision import arm_validity
+from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arrays import FARTHEST, frozen_array
+from rrth_planner.model.errors import ModelError, OptionsError, RrthError, SceneError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.path import Path
+from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import RRTHOptions
-from rrth_planner.path import Path
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import MotionLimits, Trajectory
 from rrth_planner.world import arm_world, grown
 from worlds import (
     examples,

@@ -13,10 +13,10 @@ import pytest
 pytest.importorskip('fcl')
 pytest.importorskip('viser')
 
-from rrth_planner.arm import pointing_error, tool_pose
 from rrth_planner.arm_file import load_arm
-from rrth_planner.errors import OptionsError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import pointing_error, tool_pose
+from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import resource_path
 from rrth_planner.result import Tree

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from rrth_planner import aiming, growth, star, workspace
 from rrth_planner.box_map import map_problem
-from rrth_planner.errors import RrthError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.search import rrt_h
 from rrth_planner.map_file import load_map
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
@@ -23,7 +24,6 @@ from rrth_planner.options import (
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.shortest import enters, extended_obstacles
-from rrth_planner.status import PlanStatus
 from worlds import blocked_pair, FOLDED, free_configuration, table_1_arm, wearer_world
 
 ALGORITHMS = (

@@ -3,7 +3,6 @@
 """What the paper says of the arm (Table 1, section 6.2) and of its collision test."""
 
 import numpy as np
-from rrth_planner.arrays import Array
 from rrth_planner.campaign.paper_runs import (
     CHECK_POINTS,
     Extent,
@@ -20,6 +19,7 @@ from rrth_planner.campaign.paper_runs import (
 from rrth_planner.campaign.problems import CERTIFIED
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
 from rrth_planner.map_file import load_map
+from rrth_planner.model.arrays import Array
 from rrth_planner.shortest import shortest_path
 
 # Figure 20: mean accumulated change of each joint [deg], and its reduction [%].

@@ -5,9 +5,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array
 from rrth_planner.deadline import Deadline
 from rrth_planner.growth import grow, Growth
+from rrth_planner.model.arrays import Array
 from rrth_planner.options import RRTHOptions
 from rrth_planner.problem import PlanningProblem
 

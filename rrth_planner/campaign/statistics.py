@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 NOTHING = '–'
 

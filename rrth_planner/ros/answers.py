@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 import re
 
-from rrth_planner.errors import MessageError, one_line, shown
+from rrth_planner.model.errors import MessageError, one_line, shown
 from rrth_planner.ros.error_codes import ErrorCode
 
 ANSWER = re.compile(r'([A-Z_]+) \((-?\d+)\): (.*)')

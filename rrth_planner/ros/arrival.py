@@ -8,12 +8,12 @@ import time
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm import ArmModel, pointing_error
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError
+from rrth_planner.model.arm import ArmModel, pointing_error
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError
+from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
-from rrth_planner.trajectory import positions_at, Trajectory
 from tqdm import tqdm  # type: ignore[import-untyped]
 from trajectory_msgs.msg import JointTrajectory
 

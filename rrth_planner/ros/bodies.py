@@ -5,10 +5,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rrth_planner.errors import MessageError, one_line
+from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.scene import Scene
 from rrth_planner.ros.edits import BodyPart, Edit, Key, MOST_BOXES, read_edits
 from rrth_planner.ros.frames import Lookup
-from rrth_planner.scene import Scene
 from visualization_msgs.msg import Marker, MarkerArray
 
 # So many markers whose lifetime has passed are remembered, to be named.

@@ -12,7 +12,7 @@ import sys
 from threading import Thread
 from types import TracebackType
 
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 
 # A node that has not ended by itself after this time is killed [s].
 PATIENCE = 10.0

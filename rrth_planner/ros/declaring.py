@@ -10,7 +10,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rrth_planner.errors import OptionsError
+from rrth_planner.model.errors import OptionsError
 
 # What a value is to be, and the values of an array.
 KINDS = {

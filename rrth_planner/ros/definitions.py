@@ -11,7 +11,7 @@ from rosidl_parser.definition import (  # type: ignore[import-untyped]
     AbstractNestedType,
     NamespacedType,
 )
-from rrth_planner.errors import MessageError
+from rrth_planner.model.errors import MessageError
 
 # Between the text of a message and those of the messages in it, as rosbag2 and Foxglove have it.
 SEPARATOR = '=' * 80

@@ -6,14 +6,14 @@ from collections.abc import Callable
 import time
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.answers import answer_from_text
 from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.planner_client import PlannerClient
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
-from rrth_planner.trajectory import Trajectory
 from visualization_msgs.msg import MarkerArray
 
 ARRIVED = 1e-3

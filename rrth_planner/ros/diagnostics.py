@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rrth_planner.errors import one_line
+from rrth_planner.model.errors import one_line
 from rrth_planner.ros.error_codes import answer, ErrorCode
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.parameters import PlannerParameters

@@ -3,8 +3,8 @@
 """Plan as the planner would, with its parameters and what it hears, and publish nothing."""
 
 from geometry_msgs.msg import PointStamped
-from rrth_planner.arm import pointing_error
-from rrth_planner.errors import MessageError
+from rrth_planner.model.arm import pointing_error
+from rrth_planner.model.errors import MessageError
 from rrth_planner.pipeline import warm_up
 from rrth_planner.ros.answers import Answer, answer_from_text
 from rrth_planner.ros.bodies import WearerBody

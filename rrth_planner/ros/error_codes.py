@@ -4,9 +4,9 @@
 
 from enum import IntEnum
 
-from rrth_planner.errors import MessageError, one_line
+from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.ros.frames import FrameError
-from rrth_planner.status import PlanStatus
 
 
 class ErrorCode(IntEnum):

@@ -7,8 +7,8 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError
 
 # A quaternion this far from unit length is no rounding but a mistake.
 QUATERNION_TOLERANCE = 1e-2

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from rclpy.node import Node
 from rclpy.time import Time
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError
-from rrth_planner.rotation import pose_matrix
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError
+from rrth_planner.model.rotation import pose_matrix
 
 try:
     import tf2_ros

@@ -4,8 +4,8 @@
 
 from geometry_msgs.msg import PointStamped
 import numpy as np
-from rrth_planner.errors import MessageError, SceneError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.errors import MessageError, SceneError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.fields import position_of
 from rrth_planner.ros.frames import Lookup, pose_in_base
 

@@ -19,8 +19,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.certificate import least_clearance
 from rrth_planner.emergency import emergency_stop
-from rrth_planner.errors import one_line
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.errors import one_line
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.bodies import scene_of
 from rrth_planner.ros.followed import Followed
 from rrth_planner.ros.inputs import Inputs, out_of_sight
@@ -28,8 +30,6 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
 from rrth_planner.underway import is_still_free, leads_away
 from rrth_planner.world import arm_world
 

@@ -7,11 +7,11 @@ import shlex
 import traceback
 
 from rclpy.logging import get_logging_directory
-from rrth_planner.errors import RrthError
 from rrth_planner.incident import error_incident, Incident
 from rrth_planner.incident_files import write_incident
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.question import PlanQuestion
-from rrth_planner.trajectory import Trajectory
 
 
 class PlanError(RrthError):

@@ -8,20 +8,20 @@ from threading import RLock
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, RrthError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.localization import sharp_phase_of, takeover
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.right_of_way import RightOfWay
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Scene
-from rrth_planner.start_state import Takeover
-from rrth_planner.trajectory import REST_SPEED
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import MessageError
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import MessageError
 from rrth_planner.ros.fields import seconds_of
 from sensor_msgs.msg import JointState
 

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.arm import reach_to
 from rrth_planner.judges import is_proven_free, touch_seen
 from rrth_planner.leaving import box_depths
+from rrth_planner.model.arm import reach_to
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
@@ -16,9 +18,7 @@ from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestErro
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import Start
-from rrth_planner.scene import Scene
 from rrth_planner.touch import Disagreement
-from rrth_planner.trajectory import Trajectory
 from rrth_planner.world import arm_world, World
 
 # A motion that starts further from the arm than this would begin with a jump [rad].

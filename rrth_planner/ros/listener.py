@@ -9,8 +9,8 @@ from typing import Any
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
-from rrth_planner.errors import MessageError, one_line
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.frames import Frames

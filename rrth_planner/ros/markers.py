@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from geometry_msgs.msg import Point
 from nav_msgs.msg import Path
 import numpy as np
-from rrth_planner.arm import ArmModel, forward_kinematics
-from rrth_planner.arrays import Array
-from rrth_planner.rotation import quaternion_xyzw
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import Trajectory
 from visualization_msgs.msg import Marker, MarkerArray
 
 Color = tuple[float, float, float, float]

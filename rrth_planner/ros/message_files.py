@@ -13,7 +13,7 @@ from rosidl_parser.definition import (  # type: ignore[import-untyped]
     NamespacedType,
 )
 from rrth_planner.entries import sequence, text, whole
-from rrth_planner.errors import MessageError, shown
+from rrth_planner.model.errors import MessageError, shown
 from rrth_planner.text_files import load_yaml
 
 Message = TypeVar('Message')

@@ -12,7 +12,9 @@ from typing import Any
 from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.task import Future
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.diagnostics import PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode
@@ -27,8 +29,6 @@ from rrth_planner.ros.resting import Rest
 from rrth_planner.ros.right_of_way import stand_back
 from rrth_planner.ros.second_opinion import incident_of_stop
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
 
 # So often is a moment sought to tell a motion in.
 MOST_TRIES = 20

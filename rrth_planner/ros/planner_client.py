@@ -14,8 +14,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import Arrival, OpenSubscription

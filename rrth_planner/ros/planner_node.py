@@ -21,9 +21,9 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.errors import MessageError, ModelError, one_line, RrthError
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
+from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
 from rrth_planner.ros.catching_up import CatchUp
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
 from rrth_planner.ros.parameters import current_parameters, declare_parameters

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from rclpy.node import Node
 from rrth_planner.acceptance import PlaybackRules
-from rrth_planner.arm import ArmModel
 from rrth_planner.arm_file import load_arm
-from rrth_planner.arrays import Array
-from rrth_planner.errors import OptionsError
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
-from rrth_planner.trajectory import MotionLimits
 
 FOLDED = [0.0, -0.35, np.pi / 2, np.pi / 2]
 EACH = 'a value for each joint, or one for all'

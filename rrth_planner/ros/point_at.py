@@ -18,8 +18,8 @@ import rclpy
 from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rrth_planner.arm import pointing_error
-from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.model.arm import pointing_error
+from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.answers import Answer, answer_from_text
 from rrth_planner.ros.body_messages import body_from_file
 from rrth_planner.ros.error_codes import ErrorCode

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.markers import plan_markers
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.profiles import COMMANDED, LATCHED
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg, tool_path_to_msg
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 

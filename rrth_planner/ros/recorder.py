@@ -12,7 +12,7 @@ from typing import Any
 from mcap.writer import Writer
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.definitions import definition_of, type_name, type_of_name
 from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 

@@ -11,8 +11,9 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.errors import MessageError, RecordError
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.errors import MessageError, RecordError
+from rrth_planner.model.scene import Scene
 from rrth_planner.recording import Recording, Told
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.edits import read_edits
@@ -21,7 +22,6 @@ from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.joints import has_joint_of, joint_reading, JointReading
 from rrth_planner.ros.marker_order import MarkerOrder
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
-from rrth_planner.scene import Scene
 
 # The topics of a run, below whatever namespace, and their types.
 TYPES = {

@@ -10,7 +10,7 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.errors import one_line
+from rrth_planner.model.errors import one_line
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.error_codes import answer, ErrorCode

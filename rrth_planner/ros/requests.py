@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 import secrets
 
-from rrth_planner.goal import PointingGoal
 from rrth_planner.incident import disagreement_incident, Incident
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
@@ -19,7 +20,6 @@ from rrth_planner.ros.last_look import LastLook, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import LEADS, Start
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.trajectory import Trajectory
 
 # How often both judges are asked about a motion before it is told: the wearer may never stand
 # still.

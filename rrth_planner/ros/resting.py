@@ -6,9 +6,9 @@ from collections.abc import Callable
 import time
 
 import numpy as np
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.inputs import Input
 from rrth_planner.ros.joints import JointReading
-from rrth_planner.trajectory import REST_SPEED
 
 # So much longer than its brake an arm may need to come to rest [s].
 LONGEST_SETTLING = 1.0

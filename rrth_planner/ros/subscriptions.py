@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from rrth_planner.errors import MessageError
+from rrth_planner.model.errors import MessageError
 from rrth_planner.ros.marker_order import Stamp
 
 DEPTH = 50

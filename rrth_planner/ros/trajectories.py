@@ -10,12 +10,12 @@ from typing import Any
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 import numpy as np
-from rrth_planner.arm import ArmModel, tool_pose
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, RrthError
+from rrth_planner.model.arm import ArmModel, tool_pose
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
-from rrth_planner.rotation import quaternion_xyzw
-from rrth_planner.trajectory import sample, Trajectory
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # joint_trajectory_controller refuses a last point that is faster (float epsilon) [rad/s].

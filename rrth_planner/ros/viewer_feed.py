@@ -20,8 +20,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rrth_planner.arrays import Array
-from rrth_planner.errors import MessageError, one_line, OptionsError, RrthError
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, one_line, OptionsError, RrthError
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.listener import Listener
@@ -29,8 +31,6 @@ from rrth_planner.ros.parameters import declare_parameters
 from rrth_planner.ros.profiles import LATCHED
 from rrth_planner.ros.subscriptions import Arrival, OpenSubscription
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 

@@ -10,10 +10,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 import numpy as np
-from rrth_planner.arm import ArmModel, forward_kinematics, pointing_error
-from rrth_planner.arrays import Array
-from rrth_planner.scene import Box, Scene
-from rrth_planner.trajectory import sample, Trajectory
+from rrth_planner.model.arm import ArmModel, forward_kinematics, pointing_error
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.viewers.line_of_sight import best_view, cut, is_hidden
 
 START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'

@@ -7,11 +7,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.path import Path
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.viewers.arm_view import draw_motion
 from rrth_planner.viewers.plots import JOINT_COLOURS
 

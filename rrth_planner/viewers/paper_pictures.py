@@ -9,7 +9,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.arm_file import load_arm
-from rrth_planner.arrays import Array
 from rrth_planner.campaign.escape import scattered_growths
 from rrth_planner.campaign.escape_claims import both_ways_shares
 from rrth_planner.campaign.paper_runs import (
@@ -35,7 +34,8 @@ from rrth_planner.campaign.problems import (
 )
 from rrth_planner.campaign.statistics import Rows
 from rrth_planner.map_file import load_map
-from rrth_planner.path import Path as JointPath
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.path import Path as JointPath
 from rrth_planner.planner import plan
 from rrth_planner.viewers.paper_arm import joint_paths_figure, motions_figure
 from rrth_planner.viewers.paper_figures import convergence_figure, DRAWS, histogram_figure, TIME

@@ -10,11 +10,11 @@ import sys
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.arm import ArmModel
 from rrth_planner.arm_file import load_arm
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import one_line, OptionsError, RrthError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import one_line, OptionsError, RrthError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline import plan_motion, warm_up
 from rrth_planner.recording import section
 from rrth_planner.resources import resource_path

@@ -16,10 +16,10 @@ from typing import Any, NoReturn
 import webbrowser
 
 from rrth_planner.arm_file import load_arm
-from rrth_planner.errors import OptionsError, RrthError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
+from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline import warm_up
 from rrth_planner.question import PlanQuestion
 from rrth_planner.settings import load_settings

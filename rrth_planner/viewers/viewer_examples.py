@@ -3,12 +3,12 @@
 """Bodies, targets and a start from the example messages, read as plain YAML, without ROS."""
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError, SceneError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError, SceneError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
 from rrth_planner.resources import resource_path
-from rrth_planner.scene import Scene
 from rrth_planner.text_files import load_yaml
 from rrth_planner.wearer_file import load_wearer
 

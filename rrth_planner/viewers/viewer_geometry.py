@@ -3,11 +3,11 @@
 """What joint motions look like in space: where the tool is along paths and trees."""
 
 import numpy as np
-from rrth_planner.arm import ArmModel, tool_pose
-from rrth_planner.arrays import Array
+from rrth_planner.model.arm import ArmModel, tool_pose
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.result import Tree
-from rrth_planner.rotation import quaternion_xyzw
-from rrth_planner.trajectory import sample, Trajectory
 
 # Straight joint motions are curves of the tool: points of one edge of a path, and of a tree.
 PATH_PIECES, TREE_PIECES = 24, 6

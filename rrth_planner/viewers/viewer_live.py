@@ -8,10 +8,10 @@ import time
 from typing import Any, Protocol
 
 import numpy as np
-from rrth_planner.arm import ArmModel
-from rrth_planner.arrays import Array
-from rrth_planner.scene import Scene
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.viewers.viewer_examples import example_target
 from rrth_planner.viewers.viewer_geometry import tool_positions, trajectory_curve
 from rrth_planner.viewers.viewer_panel import OWN, Panel

@@ -9,14 +9,14 @@ import time
 import traceback
 from typing import Any
 
-from rrth_planner.arrays import Array
-from rrth_planner.errors import RrthError
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.motion_plan import MotionPlan
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.question import PlanQuestion
-from rrth_planner.scene import Scene
-from rrth_planner.status import PlanStatus
 
 # Waiting for an answer looks at the clock so often [s].
 LONGEST_NAP = 0.5

@@ -10,7 +10,7 @@ import shutil
 import time
 from typing import Any
 
-from rrth_planner.errors import OptionsError, RrthError
+from rrth_planner.model.errors import OptionsError, RrthError
 
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
 WIDTH, HEIGHT = 1500, 940

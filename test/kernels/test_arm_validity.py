@@ -32,11 +32,11 @@ from rrth_planner.kernels.jit import (
     MAT,
     VEC,
 )
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch, bars, first_contact
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.scene import Box, Scene
 from rrth_planner.world import arm_world
 from worlds import (
     bezier_quintic,
@@ -420,7 +420,7 @@ from rrth_planner.kernels.collision.arm_validity import is_configuration_free, p
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.aiming import goal_configurations, pointing_problem
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.goal import PointingGoal
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.collision.edge_contacts import edge_contacts, SLOPES
 from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform

@@ -5,12 +5,12 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.errors import SceneError
 from rrth_planner.kernels.collision.boxes import place, rows_of
 from rrth_planner.kernels.layout import NUMBERS
+from rrth_planner.model.errors import SceneError
+from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.ros.edits import boxes_of, first_bad
-from rrth_planner.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
-from rrth_planner.scene import Box, Scene
 from worlds import examples, random_boxes, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -15,10 +15,7 @@ from rrth_planner.aiming import (
     pointing_kernels,
     pointing_problem,
 )
-from rrth_planner.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.box_tree import tree_depth
-from rrth_planner.errors import ModelError, OptionsError, SceneError
-from rrth_planner.goal import PointingGoal
 from rrth_planner.kernels import layout, scratch
 from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
 from rrth_planner.kernels.jit import BOX_ROWS, LANES
@@ -26,11 +23,14 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.search import elastic_band, tree
 from rrth_planner.kernels.trajectory import speed_profile
+from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
+from rrth_planner.model.errors import ModelError, OptionsError, SceneError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.reach import bar_ends
+from rrth_planner.model.scene import Box, Scene
 from rrth_planner.options import RRTHOptions
 from rrth_planner.oracle import bar_box_touch
 from rrth_planner.planner import plan
-from rrth_planner.reach import bar_ends
-from rrth_planner.scene import Box, Scene
 from rrth_planner.world import arm_world, FINEST, robot_rows
 from worlds import (
     edge_touches,

@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.kernels.trajectory.quintics import state_at, time_on
-from rrth_planner.trajectory import piece_coefficients, sample, Trajectory
+from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
 from worlds import examples
 
 SAME, SLOW, LATEST = 2e-3, 0.05, 0.05

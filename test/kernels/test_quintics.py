@@ -5,10 +5,10 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.bernstein import to_bernstein
-from rrth_planner.errors import RrthError
 from rrth_planner.kernels.trajectory.quintics import bound, fit, larger
-from rrth_planner.trajectory import piece_coefficients, Trajectory
+from rrth_planner.model.bernstein import to_bernstein
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 from worlds import examples
 
 SEEDS = st.integers(0, 2**32 - 1)

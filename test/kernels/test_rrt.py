@@ -9,10 +9,10 @@ from rrth_planner.box_map import BoxMap, map_problem
 from rrth_planner.deadline import Deadline
 from rrth_planner.kernels.search.random import random_state
 from rrth_planner.kernels.search.rrt import is_rejected_by_club
+from rrth_planner.model.status import PlanStatus
 from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.status import PlanStatus
 from worlds import (
     blocked_pair,
     edge_touches,

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 
 import numpy as np
 from rrth_planner import oracle
-from rrth_planner.goal import PointingGoal
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Box
+from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.edits import BodyPart
 from rrth_planner.ros.guard import Guard
@@ -16,8 +18,6 @@ from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import declare_parameters
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.scene import Box
-from rrth_planner.trajectory import sample, Trajectory
 import worlds
 
 ARM = worlds.table_1_arm()

@@ -15,7 +15,7 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
-from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros import followed, guard  # noqa: E402
 from rrth_planner.ros.bodies import WearerBody  # noqa: E402
 from rrth_planner.ros.followed import Followed  # noqa: E402

@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from benchmarks import jitter, jitter_report  # noqa: E402
-from rrth_planner.trajectory import sample  # noqa: E402
+from rrth_planner.model.trajectory import sample  # noqa: E402
 
 
 def test_intervals_are_compared_with_the_period():

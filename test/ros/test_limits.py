@@ -14,9 +14,10 @@ pytest.importorskip('rclpy')
 
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
-from rrth_planner.arrays import FARTHEST  # noqa: E402
-from rrth_planner.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
-from rrth_planner.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.arrays import FARTHEST  # noqa: E402
+from rrth_planner.model.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
+from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
@@ -36,7 +37,6 @@ from rrth_planner.ros.trajectories import (
     joint_trajectory_from_msg,
     MOST_POINTS,  # noqa: E402
 )
-from rrth_planner.scene import Scene  # noqa: E402
 from rrth_planner.text_files import (  # noqa: E402
     DEEPEST,
     MOST_BYTES as FILE_BYTES,

@@ -17,12 +17,12 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
 from rrth_planner.aiming import target_in_mount  # noqa: E402
-from rrth_planner.goal import PointingGoal  # noqa: E402
 from rrth_planner.inspection import inspect_motion  # noqa: E402
 from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
+from rrth_planner.model.goal import PointingGoal  # noqa: E402
+from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.world import arm_world  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

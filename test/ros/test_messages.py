@@ -11,10 +11,13 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
-from rrth_planner.arm import tool_pose  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
-from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.model.arm import tool_pose  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
+from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402
+from rrth_planner.model.status import PlanStatus  # noqa: E402
+from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros import bodies, edits  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.error_codes import (  # noqa: E402
@@ -31,9 +34,6 @@ from rrth_planner.ros.trajectories import (
     joint_trajectory_to_msg,
     tool_path_to_msg,
 )
-from rrth_planner.rotation import pose_matrix, rotation_matrix  # noqa: E402
-from rrth_planner.status import PlanStatus  # noqa: E402
-from rrth_planner.trajectory import Trajectory  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
 import worlds  # noqa: E402

@@ -27,9 +27,9 @@ from rclpy.qos import (  # noqa: E402
     ReliabilityPolicy,
 )
 from rrth_planner import judges  # noqa: E402
-from rrth_planner.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
+from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
 from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
 from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402

@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('rosbags')
 
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros import quick_decoding  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402
 from rrth_planner.ros.quick_decoding import quick_decoder  # noqa: E402

@@ -338,7 +338,7 @@ import resource, sys
 from pathlib import Path
 from sensor_msgs.msg import JointState
 import os
-from rrth_planner.errors import RrthError
+from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.recorder import RecordingFile
 path = Path(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))

@@ -48,8 +48,8 @@ from benchmarks.standstill import StandstillWatch, united  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
+from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
-from rrth_planner.trajectory import Trajectory  # noqa: E402
 import worlds  # noqa: E402
 
 ARM = worlds.table_1_arm()

@@ -12,7 +12,7 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from hypothesis import given, settings, strategies as st  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.errors import MessageError  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros import marker_order  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import read_edits  # noqa: E402

@@ -12,8 +12,8 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner import oracle  # noqa: E402
+from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.rotation import quaternion_xyzw  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

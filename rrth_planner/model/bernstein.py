@@ -5,7 +5,7 @@
 from math import comb
 
 import numpy as np
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 # After so many halvings a range is called left: the piece is shorter than a rounding error.
 DEEPEST = 40

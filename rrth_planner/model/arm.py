@@ -7,9 +7,9 @@ import functools
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import ModelError, printable
 from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import ModelError, printable
 
 # What the rows of an arm's file say, and their units.
 ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}

@@ -4,8 +4,8 @@
 
 from dataclasses import dataclass
 
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import SceneError
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import SceneError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,8 +4,8 @@
 
 from dataclasses import dataclass
 
-from rrth_planner.arrays import Array
-from rrth_planner.trajectory import Trajectory
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -5,9 +5,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import printable, SceneError
 from rrth_planner.kernels.layout import MAX_BOXES, NUMBERS, ORTHOGONAL, ROTATION, SIZE
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import printable, SceneError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

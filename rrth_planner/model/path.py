@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-from rrth_planner.arrays import Array, frozen_array
-from rrth_planner.errors import RrthError
 from rrth_planner.kernels import vectors
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import RrthError
 
 
 @dataclass(frozen=True, slots=True, eq=False)

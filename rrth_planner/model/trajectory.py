@@ -7,8 +7,8 @@ import functools
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.errors import OptionsError, RrthError
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import OptionsError, RrthError
 
 # An arm that moves no faster is at rest [rad/s].
 REST_SPEED = 0.01

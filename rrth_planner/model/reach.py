@@ -6,8 +6,8 @@ import functools
 import math
 
 import numpy as np
-from rrth_planner.arm import ArmModel, bars_of
-from rrth_planner.arrays import Array
+from rrth_planner.model.arm import ArmModel, bars_of
+from rrth_planner.model.arrays import Array
 
 # A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
 Offsets = list[tuple[int, str]]

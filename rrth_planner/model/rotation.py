@@ -4,7 +4,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from rrth_planner.arrays import Array
+from rrth_planner.model.arrays import Array
 
 
 def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.errors import RrthError, shown
+from rrth_planner.model.errors import RrthError, shown
 
 Array = NDArray[np.float64]
 
