@@ -3,7 +3,7 @@
 """What one check costs: of a configuration, of an edge, among many boxes, for other arms."""
 
 import numpy as np
-from rrth_planner.world import arm_world, World
+from rrth_planner.collision.world import arm_world, World
 
 from benchmarks import loops
 from benchmarks.arms import NAMES, other_arm

@@ -3,10 +3,10 @@
 """What is drawn at random: configurations, edges, wearers, targets."""
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.world import World
 
 
 def free_configurations(rng: np.random.Generator, world: World, n: int) -> Array:

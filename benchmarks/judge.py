@@ -4,10 +4,10 @@
 
 import numpy as np
 from rrth_planner.box_map import BoxMap
+from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.oracle import first_contact
 from rrth_planner.shortest import enters, extended_obstacles
 
 # Between two instants at which the arm is looked at [rad].

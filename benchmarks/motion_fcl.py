@@ -4,10 +4,10 @@
 
 import fcl
 import numpy as np
+from rrth_planner.collision.reference_checker import bars
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.oracle import bars
 
 # Between two instants [s].
 PERIOD = 1e-3

@@ -5,11 +5,11 @@
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.oracle import first_contact
 
 from benchmarks.motion_curve import (
     controller_curve,

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from rrth_planner.arm_file import load_arm
 from rrth_planner.box_map import BoxMap, map_problem
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.map_file import map_from_mapping
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -21,7 +22,6 @@ from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import resource_path
 from rrth_planner.shortest import shortest_path
 from rrth_planner.text_files import load_yaml
-from rrth_planner.world import arm_world, World
 
 from benchmarks import judge
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from rrth_planner.collision.reference_checker import first_contact, least_clearance
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.oracle import first_contact, least_clearance
 
 from benchmarks.soak_body import BodyAt, HAND, scene_of_body
 from benchmarks.soak_judge import COARSE, MARGIN, RAY, SLACK, states_of

@@ -12,10 +12,10 @@ import time
 import numpy as np
 from rclpy.serialization import deserialize_message
 from rrth_planner.arm_file import load_arm
+from rrth_planner.collision.reference_checker import bars
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.oracle import bars
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg
 from tqdm import tqdm

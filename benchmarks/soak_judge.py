@@ -9,11 +9,11 @@ from functools import cache
 
 import numpy as np
 from rrth_planner.arm_file import load_arm
+from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.oracle import first_contact
 
 from benchmarks.motion_curve import derivative, instants
 from benchmarks.motion_judge import curve_of

@@ -11,9 +11,9 @@ import time
 
 import numpy as np
 from rrth_planner.arm_file import load_arm
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arrays import Array
 from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.world import arm_world
 from tqdm import tqdm
 
 from benchmarks.client import ros_client

@@ -8,6 +8,7 @@ import functools
 from importlib import import_module
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.goal_selection import find_goals
@@ -16,7 +17,6 @@ from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.world import World
 
 # Draws of joints: a few give good postures at once; many, before none is said to be free.
 FEW, MANY = 176, 4096

@@ -5,11 +5,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.world import World
 
 # A blend takes at most this share of an edge, so that two neighbours leave a straight between.
 SHARE = 0.45

@@ -5,6 +5,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision import edge_contacts, map_validity
 from rrth_planner.kernels.kinematics import generated_fk
@@ -12,7 +13,6 @@ from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import printable, SceneError
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.world import World
 
 EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.leaving import box_depths, leads_out
+from rrth_planner.collision.penetration import box_depths, leads_out
+from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
@@ -14,7 +15,6 @@ from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
 from rrth_planner.takeover import Lead
 from rrth_planner.timing import parameterize
-from rrth_planner.world import grown, World
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
 LONGEST, N_DIRECTIONS = 1.5, 48

@@ -13,6 +13,7 @@ from pathlib import Path
 import platform
 from typing import Any
 
+from rrth_planner.collision.violation import Disagreement, Touch
 from rrth_planner.entries import number, text
 from rrth_planner.model.errors import one_line, RecordError, shown
 from rrth_planner.model.scene import Scene
@@ -26,7 +27,6 @@ from rrth_planner.records import (
     touch_from_mapping,
     trajectory_from_mapping,
 )
-from rrth_planner.touch import Disagreement, Touch
 
 # Of the layout of a record; another one is refused.
 FORMAT = 1

@@ -4,11 +4,11 @@
 
 from dataclasses import dataclass
 
+from rrth_planner.collision.violation import Disagreement
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.planner import PlanResult
-from rrth_planner.touch import Disagreement
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

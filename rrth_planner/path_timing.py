@@ -8,9 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 from rrth_planner.blend import Blend, round_corners
-from rrth_planner.certificate import certify
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.trajectory_validation import touch_seen
+from rrth_planner.collision.violation import Disagreement
+from rrth_planner.collision.world import grown, World
 from rrth_planner.escape import Escape
-from rrth_planner.judges import touch_seen
 from rrth_planner.model.arm import ArmModel, reach_to
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
@@ -20,8 +22,6 @@ from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.refusal import CANCELLED, Refusal
 from rrth_planner.takeover import Lead, reserved
 from rrth_planner.timing import excess, parameterize, TooFastError
-from rrth_planner.touch import Disagreement
-from rrth_planner.world import grown, World
 
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].

@@ -9,10 +9,12 @@ import time
 
 import numpy as np
 from rrth_planner.aiming import check_pointing_arm
-from rrth_planner.certificate import certify, least_clearance
+from rrth_planner.collision.certificate import certify, least_clearance
+from rrth_planner.collision.penetration import box_depths
+from rrth_planner.collision.violation import Disagreement
+from rrth_planner.collision.world import arm_world, grown, World
 from rrth_planner.escape import Escape, way_out
 from rrth_planner.kernels import jit
-from rrth_planner.leaving import box_depths
 from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
@@ -36,8 +38,6 @@ from rrth_planner.refusal import (
     within_limits,
 )
 from rrth_planner.takeover import Lead, lead_in, stop_first
-from rrth_planner.touch import Disagreement
-from rrth_planner.world import arm_world, grown, World
 
 # A wearer who holds still makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import tree
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RrthError
-from rrth_planner.world import World
 
 NOWHERE = frozen_array(np.zeros(3), (3,), 'target', 'm', RrthError)
 STAY = jit.first_class(tree.stay)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
-from rrth_planner.world import arm_world, World
 
 # What the guard says while it brakes.
 BRAKING = 'brakes'

@@ -8,6 +8,7 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
+from rrth_planner.collision.violation import Touch
 from rrth_planner.entries import mapping, number, sequence, whole
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
@@ -18,7 +19,6 @@ from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import ALGORITHMS, TreeOptions
 from rrth_planner.question import PlanQuestion
-from rrth_planner.touch import Touch
 
 
 def plain(value: Any) -> Any:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.aiming import GoalSet
-from rrth_planner.certificate import certify
-from rrth_planner.leaving import box_depths
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.penetration import box_depths
+from rrth_planner.collision.world import World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
@@ -16,7 +17,6 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.takeover import Lead
-from rrth_planner.world import World
 
 # A joint this far beyond its limit is at it [rad, m].
 ROUNDING = 1e-6

@@ -10,12 +10,12 @@ import sys
 import traceback
 
 import numpy as np
+from rrth_planner.collision.checker_comparison import Verdict, verdict_of
 from rrth_planner.incident import Incident, IncidentKind, versions
 from rrth_planner.incident_files import read_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.opinions import Verdict, verdict_of
 from rrth_planner.pipeline import plan_motion, warm_up
 
 DESCRIPTION = """\

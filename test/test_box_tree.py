@@ -7,12 +7,12 @@ import itertools
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.box_tree import grown_groups, pack_boxes
+from rrth_planner.collision.box_tree import grown_groups, pack_boxes
+from rrth_planner.collision.reference_checker import bar_box_touch, bars
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Scene
-from rrth_planner.oracle import bar_box_touch, bars
-from rrth_planner.world import arm_world
 from worlds import (
     edge_touches,
     examples,

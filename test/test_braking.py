@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from rrth_planner.blend import round_corners
 from rrth_planner.braking import brake, certify_braking
-from rrth_planner.certificate import certify
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.reference_checker import quintic_states
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import jerks_at, piece_coefficients, sample, Trajectory
-from rrth_planner.oracle import quintic_states
 from rrth_planner.path_timing import first_proven, in_time
 from rrth_planner.timing import parameterize
-from rrth_planner.world import arm_world
 from sample_motions import any_motion, path_distance
 from worlds import (
     dense_touch,

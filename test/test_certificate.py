@@ -5,13 +5,18 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.certificate import certify, CLEARANCE_PERIOD, derivative_bounds, least_clearance
+from rrth_planner.collision.certificate import (
+    certify,
+    CLEARANCE_PERIOD,
+    derivative_bounds,
+    least_clearance,
+)
+from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
-from rrth_planner.oracle import first_contact
 from rrth_planner.timing import parameterize
-from rrth_planner.world import arm_world
 from worlds import (
     bezier_quintic,
     compiled_chain,

@@ -10,6 +10,8 @@ import pytest
 from rrth_planner.aiming import goal_configurations
 from rrth_planner.box_map import map_problem
 from rrth_planner.checking import by_check_points, sampled
+from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.world import arm_world
 from rrth_planner.map_file import load_map
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
@@ -22,11 +24,9 @@ from rrth_planner.options import (
     RRTStarOptions,
     RRTStarSmartOptions,
 )
-from rrth_planner.oracle import first_contact
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.shortest import enters, extended_obstacles
-from rrth_planner.world import arm_world
 from worlds import FOLDED, MARGIN, oracle_bars, RAY, table_1_arm, wearer
 
 # Of each bar, the ray's first metre among them (section 6.2).

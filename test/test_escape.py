@@ -9,7 +9,10 @@ import re
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from rrth_planner.leaving import box_depths, leads_out, relaxed
+from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
+from rrth_planner.collision.reference_checker import bar_box_touch, first_contact
+from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
@@ -18,13 +21,10 @@ from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at, sample
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import bar_box_touch, first_contact
 from rrth_planner.path_search import SPARES
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing import parameterize
-from rrth_planner.touch import Touch
 from rrth_planner.underway import is_still_free
-from rrth_planner.world import arm_world, grown
 from worlds import (
     examples,
     FOLDED,
@@ -40,7 +40,8 @@ from worlds import (
 )
 
 pytest.importorskip('fcl')
-from rrth_planner import fcl_check, judges, pipeline  # noqa: E402
+from rrth_planner import pipeline  # noqa: E402
+from rrth_planner.collision import fcl_checker, trajectory_validation  # noqa: E402
 
 ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
@@ -345,7 +346,7 @@ def test_a_target_in_the_wearer_is_refused_wherever_the_arm_is():
 
 def second_opinion(arm, scene, world, trajectory):
     depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-    return fcl_check.touch_on_way_out(
+    return fcl_checker.touch_on_way_out(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
 
@@ -353,7 +354,7 @@ def second_opinion(arm, scene, world, trajectory):
 def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
     arm, scene = pressed()
     touch = Touch(0.001, 0.005, 'pointing ray', 'hand')
-    monkeypatch.setattr(judges, 'touch_on_way_out', lambda *_: touch)
+    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None

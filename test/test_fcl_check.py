@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.world import arm_world
 from worlds import (
     compiled_chain,
     dense_touch,
@@ -18,8 +18,8 @@ from worlds import (
     wearer,
 )
 
-fcl_check = pytest.importorskip('rrth_planner.fcl_check', exc_type=ImportError)
-fcl_shapes = pytest.importorskip('rrth_planner.fcl_shapes', exc_type=ImportError)
+fcl_check = pytest.importorskip('rrth_planner.collision.fcl_checker', exc_type=ImportError)
+fcl_shapes = pytest.importorskip('rrth_planner.collision.fcl_objects', exc_type=ImportError)
 
 
 def straight(q_from, q_to, duration=1.0):

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.collision.violation import Disagreement, Touch
 from rrth_planner.incident import (
     disagreement_incident,
     error_incident,
@@ -31,7 +32,6 @@ from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
 from rrth_planner.question import PlanQuestion
 from rrth_planner.text_files import parse_yaml
-from rrth_planner.touch import Disagreement, Touch
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 import yaml
 

@@ -14,8 +14,8 @@ from benchmarks.motion_judge import curve_of, verdict
 from benchmarks.motion_path import distances, planned_pieces
 from benchmarks.queries import wearer
 import numpy as np
-from rrth_planner import oracle
 from rrth_planner.blend import Blend
+from rrth_planner.collision import reference_checker
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
@@ -115,9 +115,9 @@ def test_a_planted_touch_is_found_by_the_margin(gap, is_touching):
     arm, (trajectory, bound) = table_1_arm(), straight()
     q = sample(trajectory, [0.37 * trajectory.duration])[0]
     # A small box beside the middle of the ray, square to it and to the way it moves.
-    now = oracle.bars(arm, q, RAY)[0, -1]
+    now = reference_checker.bars(arm, q, RAY)[0, -1]
     ahead = sample(trajectory, [0.37 * trajectory.duration + 1e-3])[0]
-    later = oracle.bars(arm, ahead, RAY)[0, -1]
+    later = reference_checker.bars(arm, ahead, RAY)[0, -1]
     along, moved = now[1] - now[0], later.mean(axis=0) - now.mean(axis=0)
     beside = np.cross(along, moved)
     beside /= np.linalg.norm(beside)
@@ -138,7 +138,7 @@ def test_a_planted_touch_is_found_by_the_margin(gap, is_touching):
 
 def test_the_ray_is_judged_out_to_the_target_at_the_end_only():
     arm, (trajectory, bound) = table_1_arm(), straight()
-    tip, far = oracle.bars(arm, trajectory.positions[-1:], 3.0)[0, -1]
+    tip, far = reference_checker.bars(arm, trajectory.positions[-1:], 3.0)[0, -1]
     scene = Scene((Box('beyond', far, [0.02] * 3, np.eye(3)),))
     assert np.linalg.norm(far - tip) == pytest.approx(3.0)
     assert judged(trajectory, bound, scene, reach=2.5).contact == ''
@@ -186,7 +186,7 @@ def test_python_fcl_agrees_with_the_oracle_about_distances():
     arm, scene, rng = table_1_arm(), wearer(), np.random.default_rng(5)
     n_near = 0
     for q in rng.uniform(*arm.bounds, (400, 4)):
-        exact = oracle.least_clearance(arm, scene, q[None], RAY)
+        exact = reference_checker.least_clearance(arm, scene, q[None], RAY)
         told = least_distance(arm, scene, q[None], RAY, MARGIN)
         if 1e-4 < exact < MARGIN:
             n_near += 1

@@ -12,12 +12,12 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
-from rrth_planner.inspection import inspect_motion  # noqa: E402
+from rrth_planner.collision.motion_inspection import inspect_motion  # noqa: E402
+from rrth_planner.collision.reference_checker import first_contact  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits  # noqa: E402
 from rrth_planner.options import RRTHOptions  # noqa: E402
-from rrth_planner.oracle import first_contact  # noqa: E402
 from rrth_planner.pipeline import plan_motion  # noqa: E402
 from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody

@@ -8,16 +8,16 @@ import functools
 import numpy as np
 from rrth_planner import path_timing
 from rrth_planner.blend import round_corners
-from rrth_planner.certificate import certify
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import first_contact
 from rrth_planner.path_timing import HAIR, time_path
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.world import arm_world, grown
 from worlds import FOLDED, free_configuration, limits, MARGIN, RAY, table_1_arm, wearer
 
 ARM, WEARER = table_1_arm(), wearer()

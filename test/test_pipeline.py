@@ -8,8 +8,11 @@ import re
 import numpy as np
 import pytest
 from rrth_planner.aiming import GoalSet, target_in_mount
+from rrth_planner.collision.penetration import box_depths
+from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.kinematics.pan_tilt_ik import aim
-from rrth_planner.leaving import box_depths
 from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
@@ -17,11 +20,8 @@ from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import first_contact
 from rrth_planner.refusal import goal_refusal
 from rrth_planner.takeover import lead_in
-from rrth_planner.touch import Touch
-from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
     FOLDED,

@@ -7,9 +7,11 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner import oracle, star
+from rrth_planner import star
 from rrth_planner.box_map import BoxMap, map_problem, map_world
 from rrth_planner.checking import by_check_points, sampled
+from rrth_planner.collision import reference_checker
+from rrth_planner.collision.world import arm_world
 from rrth_planner.map_file import map_from_mapping
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.options import (
@@ -25,7 +27,6 @@ from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import resource_path
 from rrth_planner.shortest import shortest_path
 from rrth_planner.text_files import load_yaml
-from rrth_planner.world import arm_world
 import worlds
 
 COMMON = {'time_limit': 60.0, 'max_samples': 1500}
@@ -536,11 +537,13 @@ def test_bars_of_the_oracle_touch_where_the_check_points_do():
     rng = np.random.default_rng(1)
     q = rng.uniform(*arm.bounds, (2000, 4))
     by_points = np.array([points.is_edge_valid(p, p) for p in q])
-    ends = oracle.bars(arm, q, 1.0)
+    ends = reference_checker.bars(arm, q, 1.0)
     touching = np.zeros(len(q), dtype=bool)
     for box in scene.boxes:
         half = 0.5 * box.size
-        touching |= oracle.bar_box_touch(ends, box.center, box.rotation, half).any(axis=1)
+        touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+            axis=1
+        )
     # A check point inside means a bar inside; a seventh of the colliding postures is missed.
     assert not (~by_points & ~touching).any()
     assert 0.02 < (by_points & touching).sum() / touching.sum() < 0.3

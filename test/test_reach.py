@@ -5,12 +5,12 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.certificate import derivative_bounds
+from rrth_planner.collision.certificate import derivative_bounds
+from rrth_planner.collision.reference_checker import frames
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import curvature_bounds
 from rrth_planner.model.reach import bar_ends, bar_names, reach_table
 from rrth_planner.model.scene import Scene
-from rrth_planner.oracle import frames
-from rrth_planner.world import arm_world
 from worlds import bezier_quintic, compiled_chain, examples, line, oracle_bars, table_1_arm
 
 SEEDS = st.integers(0, 2**32 - 1)

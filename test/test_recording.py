@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from rrth_planner.arm_file import load_arm
+from rrth_planner.collision.reference_checker import least_clearance
 from rrth_planner.model.errors import RecordError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.oracle import least_clearance
 from rrth_planner.recording import (
     at,
     brakes,

@@ -10,6 +10,8 @@ import sys
 
 import numpy as np
 import pytest
+from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.world import arm_world
 from rrth_planner.incident import disagreement_incident, error_incident, IncidentKind
 from rrth_planner.incident_files import write_incident
 from rrth_planner.localization import takeover
@@ -19,12 +21,11 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.options import RRTHOptions
 from rrth_planner.question import PlanQuestion
-from rrth_planner.touch import Touch
-from rrth_planner.world import arm_world
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 
 pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
-from rrth_planner import judges, opinions, replay
+from rrth_planner import replay
+from rrth_planner.collision import checker_comparison, trajectory_validation
 
 ROOT = Path(__file__).parent.parent
 TOUCH = Touch(0.25, 0.0123, 'ray', 'head')
@@ -43,7 +44,7 @@ QUESTION = PlanQuestion(
 
 def disagree(monkeypatch):
     """Have python-fcl see a touch in every motion."""
-    monkeypatch.setattr(judges, 'first_touch', lambda *_: TOUCH)
+    monkeypatch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
 
 
 def disagreement(monkeypatch, question=QUESTION):
@@ -158,7 +159,7 @@ def test_a_motion_that_first_leaves_a_box_is_judged_as_one(monkeypatch, capsys):
 def test_every_judge_has_an_opinion_on_every_piece(monkeypatch):
     trajectory = disagreement(monkeypatch).trajectory
     arguments = (table_1_arm(), wearer(), QUESTION.goal, trajectory, MARGIN, RAY)
-    verdict = opinions.verdict_of(*arguments)
+    verdict = checker_comparison.verdict_of(*arguments)
     assert verdict.is_proven
     assert verdict.touch is None
     assert not verdict.is_disagreement
@@ -180,7 +181,9 @@ def test_a_motion_without_pieces_and_a_wearer_without_boxes_have_a_verdict():
         velocities=np.zeros((1, 4)),
         accelerations=np.zeros((1, 4)),
     )
-    verdict = opinions.verdict_of(table_1_arm(), Scene(()), QUESTION.goal, still, MARGIN, RAY)
+    verdict = checker_comparison.verdict_of(
+        table_1_arm(), Scene(()), QUESTION.goal, still, MARGIN, RAY
+    )
     assert verdict.is_proven
     assert verdict.clearance == np.inf
     assert len(verdict.opinions) == 1

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from rrth_planner import path_timing
 from rrth_planner.braking import brake
-from rrth_planner.certificate import certify
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.localization import sharp_phase_of, takeover
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
@@ -17,7 +18,6 @@ from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import quintic_states
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.takeover import lead_in, reserved
 from rrth_planner.timing import limit_ratio, parameterize

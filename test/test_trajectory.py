@@ -6,6 +6,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.blend import Blend
+from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
     joined,
@@ -15,7 +16,6 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.oracle import quintic_states
 from rrth_planner.timing import parameterize
 from worlds import examples, limits
 

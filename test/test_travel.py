@@ -4,8 +4,8 @@
 
 from hypothesis import given, strategies as st
 import numpy as np
+from rrth_planner.collision.displacement_bounds import travelled
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.travel import travelled
 from worlds import examples, oracle_bars, random_chain, table_1_arm
 
 RAY = 0.8

@@ -7,8 +7,10 @@ import functools
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner import oracle
-from rrth_planner.certificate import certify
+from rrth_planner.collision import reference_checker
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.reference_checker import frames, quintic_states
+from rrth_planner.collision.world import arm_world
 from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
@@ -18,7 +20,6 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.oracle import frames, quintic_states
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing import limit_ratio
 from rrth_planner.underway import (
@@ -27,7 +28,6 @@ from rrth_planner.underway import (
     leads_away,
     taken_over,
 )
-from rrth_planner.world import arm_world
 from worlds import (
     dense_touch,
     examples,
@@ -155,7 +155,7 @@ def test_a_reading_tells_how_far_the_motion_is(seed):
 def hand_beside(rng, q, gap):
     """Return the wearer with a hand that a bar of an arm at q is so far from [m]."""
     for _ in range(100):
-        bars = oracle.bars(table_1_arm(), q[None], 0.0)[0]
+        bars = reference_checker.bars(table_1_arm(), q[None], 0.0)[0]
         a, b = bars[rng.integers(len(bars)), :, :3]
         way = rng.normal(size=3)
         hand = Box(
@@ -164,7 +164,7 @@ def hand_beside(rng, q, gap):
             np.full(3, rng.uniform(0.02, 0.1)),
             np.eye(3),
         )
-        away = oracle.least_clearance(table_1_arm(), Scene((hand,)), q[None], RAY)
+        away = reference_checker.least_clearance(table_1_arm(), Scene((hand,)), q[None], RAY)
         if 0.0 < away < gap:
             return Scene((*wearer().boxes, hand))
     return None
@@ -188,7 +188,7 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         found = leads_away(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
         told[found] += 1
         hand = Scene(scene.boxes[-1:])
-        gaps = [oracle.least_clearance(arm, hand, row[None], RAY) for row in q]
+        gaps = [reference_checker.least_clearance(arm, hand, row[None], RAY) for row in q]
         if found:
             assert min(gaps) > gaps[0] - 1e-4
             assert gaps[-1] >= MARGIN - 1e-6

@@ -10,10 +10,10 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm_file import load_arm
+from rrth_planner.collision.reference_checker import bars
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import roll_pitch_yaw
-from rrth_planner.oracle import bars
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
 from rrth_planner.urdf import arm_to_urdf, RAY_LENGTH

@@ -11,7 +11,8 @@ import pytest
 from rrth_planner.aiming import FEW, goal_configurations
 from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.blend import round_corners
-from rrth_planner.certificate import certify, least_clearance
+from rrth_planner.collision.certificate import certify, least_clearance
+from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import FARTHEST, frozen_array
@@ -23,7 +24,6 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.options import RRTHOptions
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.world import arm_world, grown
 from worlds import (
     examples,
     FOLDED,

@@ -11,6 +11,8 @@ from rrth_planner.aiming import check_pointing_arm, goal_configurations, MANY
 from rrth_planner.arm_file import load_arm
 from rrth_planner.box_map import map_problem
 from rrth_planner.checking import by_check_points, sampled
+from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.map_file import load_map
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -18,12 +20,10 @@ from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.oracle import first_contact
 from rrth_planner.problem import PlanningProblem
 from rrth_planner.resources import resource_path
 from rrth_planner.shortest import enters, extended_obstacles
 from rrth_planner.text_files import load_yaml
-from rrth_planner.world import arm_world, World
 
 CERTIFIED = 'certified'
 # Eight points round the wearer [m]; from the folded state none is reached by a straight edge.

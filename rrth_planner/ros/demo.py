@@ -17,11 +17,11 @@ import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.arm_file import load_arm
-from rrth_planner.inspection import inspect_motion
+from rrth_planner.collision.motion_inspection import inspect_motion
+from rrth_planner.collision.reference_checker import first_contact, least_clearance
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.oracle import first_contact, least_clearance
 from rrth_planner.resources import resource_path
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.child_process import ChildProcess

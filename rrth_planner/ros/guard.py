@@ -17,7 +17,8 @@ import traceback
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.certificate import least_clearance
+from rrth_planner.collision.certificate import least_clearance
+from rrth_planner.collision.world import arm_world
 from rrth_planner.emergency import emergency_stop
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
@@ -31,7 +32,6 @@ from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.underway import is_still_free, leads_away
-from rrth_planner.world import arm_world
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02

@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.judges import is_proven_free, touch_seen
-from rrth_planner.leaving import box_depths
+from rrth_planner.collision.penetration import box_depths
+from rrth_planner.collision.trajectory_validation import is_proven_free, touch_seen
+from rrth_planner.collision.violation import Disagreement
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -18,8 +20,6 @@ from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestErro
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import Start
-from rrth_planner.touch import Disagreement
-from rrth_planner.world import arm_world, World
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3

@@ -4,14 +4,14 @@
 
 from collections.abc import Callable
 
-from rrth_planner.fcl_check import first_touch
+from rrth_planner.collision.fcl_checker import first_touch
+from rrth_planner.collision.violation import Disagreement
 from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.question import PlanQuestion
 from rrth_planner.ros.parameters import PlannerParameters
-from rrth_planner.touch import Disagreement
 
 
 def incident_of_stop(

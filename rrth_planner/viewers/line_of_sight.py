@@ -6,9 +6,9 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from rrth_planner.collision.reference_checker import bar_box_touch
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.oracle import bar_box_touch
 
 # Pieces that a line is cut into, each of which is hidden or seen as a whole.
 N_PIECES = 40

@@ -12,8 +12,10 @@ import numba
 from numba.core.types import boolean, float64
 import numpy as np
 import pytest
-from rrth_planner.box_tree import pack_boxes
-from rrth_planner.certificate import derivative_bounds
+from rrth_planner.collision.box_tree import pack_boxes
+from rrth_planner.collision.certificate import derivative_bounds
+from rrth_planner.collision.reference_checker import bar_box_touch, bars, first_contact
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
     is_edge_free,
@@ -34,10 +36,8 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import bar_box_touch, bars, first_contact
 from rrth_planner.planner import plan
 from rrth_planner.problem import PlanningProblem
-from rrth_planner.world import arm_world
 from worlds import (
     bezier_quintic,
     compiled_chain,
@@ -414,8 +414,8 @@ def test_an_edge_longer_than_the_proof_has_room_for_is_refused():
 SAMPLE = """
 import json
 import numpy as np
-from rrth_planner.box_tree import pack_boxes
-from rrth_planner.certificate import derivative_bounds
+from rrth_planner.collision.box_tree import pack_boxes
+from rrth_planner.collision.certificate import derivative_bounds
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine

@@ -4,7 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.box_tree import pack_boxes
+from rrth_planner.collision.box_tree import pack_boxes
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.collision.edge_contacts import (
     bar_gaps,
@@ -17,7 +18,6 @@ from rrth_planner.kernels.collision.edge_contacts import (
 )
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.scene import Scene
-from rrth_planner.world import arm_world
 from worlds import (
     compiled_chain,
     free_configuration,

@@ -15,7 +15,9 @@ from rrth_planner.aiming import (
     pointing_kernels,
     pointing_problem,
 )
-from rrth_planner.box_tree import tree_depth
+from rrth_planner.collision.box_tree import tree_depth
+from rrth_planner.collision.reference_checker import bar_box_touch
+from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
 from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
 from rrth_planner.kernels.jit import BOX_ROWS, LANES
@@ -29,9 +31,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.options import RRTHOptions
-from rrth_planner.oracle import bar_box_touch
 from rrth_planner.planner import plan
-from rrth_planner.world import arm_world, FINEST, robot_rows
 from worlds import (
     edge_touches,
     free_configuration,

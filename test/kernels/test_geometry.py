@@ -7,10 +7,10 @@ from itertools import product
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.box_tree import pack_boxes
+from rrth_planner.collision.box_tree import pack_boxes
+from rrth_planner.collision.reference_checker import bar_box_touch
 from rrth_planner.kernels.collision.bar_box import bar_box_distance, open_lanes, touched_lanes
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
-from rrth_planner.oracle import bar_box_touch
 from worlds import examples, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)

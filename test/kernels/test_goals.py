@@ -12,10 +12,10 @@ from rrth_planner.aiming import (
     pointing_kernels,
     target_in_mount,
 )
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.world import arm_world
 from worlds import (
     compiled_chain,
     edge_touches,

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.search.elastic_band import MAX_CORNERS, tighten
 from rrth_planner.kernels.search.shortcut import pull_taut, TAUT
-from rrth_planner.world import arm_world
 from worlds import (
     blocked_pair,
     compiled_chain,

@@ -12,10 +12,10 @@ from rrth_planner.aiming import (
     pointing_kernels,
     target_in_mount,
 )
+from rrth_planner.collision.world import arm_world, robot_rows
 from rrth_planner.kernels.kinematics.pan_tilt_ik import aim, unwrap
 from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.world import arm_world, robot_rows
 from worlds import (
     aiming_candidates,
     edge_touches,

@@ -7,7 +7,7 @@ from threading import RLock
 from types import SimpleNamespace
 
 import numpy as np
-from rrth_planner import oracle
+from rrth_planner.collision import reference_checker
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box
 from rrth_planner.model.trajectory import sample, Trajectory
@@ -91,7 +91,7 @@ class Monitored:
     def hand(self, ahead, away, motion=None):
         """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
         at = PHASE + ahead if motion is None else ahead
-        T = oracle.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
+        T = reference_checker.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
         tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]
         onward = (next_tip - tip) / np.linalg.norm(next_tip - tip)
         return Box('hand', tip - away * onward, np.full(3, 0.05), np.eye(3))

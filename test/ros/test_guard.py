@@ -12,7 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner import oracle  # noqa: E402
+from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
@@ -106,7 +106,7 @@ def in_the_way(client, ahead):
     q, _, _ = sample(motion, gaps)
     now = gaps[np.argmin(np.linalg.norm(q - client.states[-1].position, axis=1))]
     later, _, _ = sample(motion, [now + ahead])
-    tip = oracle.frames(arm, later)[0, -1]
+    tip = reference_checker.frames(arm, later)[0, -1]
     # On the ray, where the tool does not get.
     return Box('hand', tip[:3, 3] + 0.4 * tip[:3, 2], np.full(3, 0.05), np.eye(3))
 
@@ -126,7 +126,7 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     wait_until(lambda: len(client.motions) == 3 or 'holds' in client.figures.get('guard', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
-    touch = oracle.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
+    touch = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
     assert touch is None
     assert any('the wearer moved into the way' in line for line in said)
     assert not [line for line in said if 'refused' in line]
@@ -148,7 +148,7 @@ def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wai
     assert pointing_error(worlds.table_1_arm(), last, np.array(OTHER)) < 1e-6
     wait_until(lambda: client.speed() == 0.0 and np.allclose(client.states[-1].position, last))
     q = np.array([state.position for state in client.states[n:]])
-    assert oracle.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
+    assert reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
     assert not [line for line in said if 'refused' in line]
 
 

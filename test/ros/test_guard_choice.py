@@ -14,7 +14,7 @@ pytest.importorskip('fcl')
 from monitored import ARM, FAR, Monitored, PHASE  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rrth_planner import oracle  # noqa: E402
+from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
@@ -62,7 +62,7 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
 def test_how_near_a_stop_comes_that_is_not_free_is_said(watched):
     # Beside the way of the ray, within the margin.
     hand, next_hand = watched.hand(0.1, 0.0), watched.hand(0.11, 0.0)
-    ray = oracle.frames(ARM, watched.on_time(PHASE + 0.1)[0][None])[0, -1, :3, 2]
+    ray = reference_checker.frames(ARM, watched.on_time(PHASE + 0.1)[0][None])[0, -1, :3, 2]
     aside = np.cross(ray, next_hand.center - hand.center)
     center = hand.center + 0.053 * aside / np.linalg.norm(aside)
     watched.see(Box('hand', center, hand.size, hand.rotation))
@@ -70,7 +70,7 @@ def test_how_near_a_stop_comes_that_is_not_free_is_said(watched):
     q = sample(stop, np.linspace(0.0, stop.duration, 2000))[0]
     scene = scene_of(watched.heard.body.value.at(watched.now))
     parameters = watched.reporter.parameters
-    least = oracle.least_clearance(ARM, scene, q, parameters.ray_guard_length)
+    least = reference_checker.least_clearance(ARM, scene, q, parameters.ray_guard_length)
     assert 0.003 < least < parameters.margin
     said = watched.reporter.guard[1].partition('not proven safe either, least clearance ')[2]
     assert float(said.removesuffix(' m')) == pytest.approx(least, abs=2e-4)

@@ -16,7 +16,8 @@ pytest.importorskip('fcl')
 from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
-from rrth_planner import judges  # noqa: E402
+from rrth_planner.collision import trajectory_validation  # noqa: E402
+from rrth_planner.collision.violation import Touch  # noqa: E402
 from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
@@ -28,7 +29,6 @@ from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
-from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
 
@@ -77,7 +77,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     )
     say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
     with monkeypatch.context() as patch:
-        patch.setattr(judges, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
@@ -150,7 +150,7 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
-        patch.setattr(judges, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
@@ -166,7 +166,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(judges, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
@@ -237,7 +237,7 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkey
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
     answers = [stranger.answer() for _ in range(2)]
     with monkeypatch.context() as patch:
-        patch.setattr(judges, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
         answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())

@@ -15,15 +15,15 @@ from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner import oracle  # noqa: E402
 from rrth_planner.aiming import target_in_mount  # noqa: E402
-from rrth_planner.inspection import inspect_motion  # noqa: E402
+from rrth_planner.collision import reference_checker  # noqa: E402
+from rrth_planner.collision.motion_inspection import inspect_motion  # noqa: E402
+from rrth_planner.collision.world import arm_world  # noqa: E402
 from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.world import arm_world  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -71,7 +71,7 @@ def _body_message(scene):
 def _free_start(rng, arm, scene):
     """Return the folded posture where it is free, or a random free one."""
     q = np.array(samples.FOLDED)
-    while oracle.first_contact(arm, scene, q[None], RAY, MARGIN + 0.002) is not None:
+    while reference_checker.first_contact(arm, scene, q[None], RAY, MARGIN + 0.002) is not None:
         q = rng.uniform(*arm.bounds)
     return q
 
@@ -93,12 +93,14 @@ def _is_blocked_by_oracle(rng, arm, scene, target):
         if reach >= 0.0:
             postures.append(q)
             rays.append([max(RAY, reach)])
-    ends = oracle.bars(arm, np.array(postures), np.array(rays))
+    ends = reference_checker.bars(arm, np.array(postures), np.array(rays))
     is_touching = np.zeros(len(ends), dtype=bool)
     for box in scene.boxes:
         # Half a centimetre of room: what is only just free may be missed by a finite search.
         half = 0.5 * box.size + MARGIN + 0.005
-        is_touching |= oracle.bar_box_touch(ends, box.center, box.rotation, half).any(axis=1)
+        is_touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+            axis=1
+        )
     return bool(is_touching.all())
 
 

@@ -26,8 +26,9 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
-from rrth_planner import judges  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.collision import trajectory_validation  # noqa: E402
+from rrth_planner.collision.violation import Touch  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
@@ -38,7 +39,6 @@ from rrth_planner.ros.last_look import LastLook  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
-from rrth_planner.touch import Touch  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -354,12 +354,14 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
         stranger.publishers['body_boxes'].publish(array(far))
         wait_until(lambda: inputs.body.value is not body)
         for touch in touches:
-            monkeypatch.setattr(judges, 'touch_on_way_out', lambda *_, touch=touch: touch)
+            monkeypatch.setattr(
+                trajectory_validation, 'touch_on_way_out', lambda *_, touch=touch: touch
+            )
         return plan
 
     monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
     with monkeypatch.context() as patch:
-        patch.setattr(judges, 'leads_out', lambda *_: False)
+        patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     touches.append(Touch(0.001, 0.01, 'pointing ray', 'hand/0'))

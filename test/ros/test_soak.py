@@ -47,7 +47,7 @@ from benchmarks.soak_targets import guard_targets, plan_targets  # noqa: E402
 from benchmarks.standstill import StandstillWatch, united  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner import oracle  # noqa: E402
+from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
 import worlds  # noqa: E402
@@ -75,13 +75,13 @@ def motion():
 def hand_at(motion, time_share, side=0.05):
     """Return a hand at the tool of a motion."""
     q = motion.positions[0] + time_share * (motion.positions[-1] - motion.positions[0])
-    tool = oracle.frames(ARM, q[None])[0, -1, :3, 3]
+    tool = reference_checker.frames(ARM, q[None])[0, -1, :3, 3]
     return replace(BODY, hand=(*tool.tolist(), side))
 
 
 def hand_behind(motion):
     """Return a hand right beside the ray, on the side that the motion turns it away from."""
-    T = oracle.frames(ARM, motion.positions)[:, -1]
+    T = reference_checker.frames(ARM, motion.positions)[:, -1]
     now, later = T[:, :3, 3] + 0.5 * T[:, :3, 2]
     center = now + 0.045 * (now - later) / np.linalg.norm(now - later)
     return replace(BODY, hand=(*center.tolist(), 0.05))
@@ -120,7 +120,9 @@ def test_a_motion_that_touches_is_caught(motion):
 
 def test_a_motion_within_the_margin_is_caught(motion):
     away = scene_of_body(BODY)
-    clearance = oracle.least_clearance(ARM, away, judge.states_of(motion, 1e-3), judge.RAY)
+    clearance = reference_checker.least_clearance(
+        ARM, away, judge.states_of(motion, 1e-3), judge.RAY
+    )
     margin = clearance + 0.005
     assert judge.verdict_on(ARM, [away, away], motion, margin=margin) == judge.NEAR
     assert judge.verdict_on(ARM, [away, away], motion, margin=0.5 * clearance) == judge.FREE

@@ -11,7 +11,7 @@ pytest.importorskip('fcl')
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner import oracle  # noqa: E402
+from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
@@ -100,6 +100,6 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
     # Where the busy machine lost messages the steps are long; the velocity bends within them.
     assert (np.abs(jump) <= 1e-3 + limits.jerk * step**3 / 12.0).all()
     last = [t for t, (_, answer) in zip(TARGETS * ROUNDS, answers, strict=True) if answer.success]
-    tool = oracle.frames(worlds.table_1_arm(), q[-1:])[0, -1]
+    tool = reference_checker.frames(worlds.table_1_arm(), q[-1:])[0, -1]
     past = last[-1] - tool[:3, 3]
     assert np.linalg.norm(past - (past @ tool[:3, 2]) * tool[:3, 2]) < 1e-3

@@ -7,13 +7,13 @@ import functools
 import math
 
 import numpy as np
+from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision.arm_clearance import least_along
 from rrth_planner.kernels.collision.trajectory_check import prove_pieces
 from rrth_planner.kernels.trajectory.quintics import bound
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.bernstein import to_bernstein
 from rrth_planner.model.trajectory import piece_coefficients, Trajectory
-from rrth_planner.world import World
 
 # Instants at which the least clearance is looked for; a figure for people, not the proof [s].
 CLEARANCE_PERIOD = 0.01

@@ -5,12 +5,17 @@
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.collision.reference_checker import (
+    first_contact,
+    frames,
+    least_clearance,
+    quintic_states,
+)
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.oracle import first_contact, frames, least_clearance, quintic_states
 
 # Time between two instants at which a controller's states are looked at [s].
 PERIOD = 0.0005

@@ -8,7 +8,7 @@ import functools
 from typing import Any
 
 import numpy as np
-from rrth_planner.box_tree import grown_groups, pack_boxes
+from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_contacts as contacts
 from rrth_planner.kernels.collision.boxes import rows_of

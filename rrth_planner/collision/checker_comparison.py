@@ -6,17 +6,17 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from rrth_planner import oracle
-from rrth_planner.certificate import certify
-from rrth_planner.fcl_check import nearest
-from rrth_planner.judges import is_proven_free, touch_seen
+from rrth_planner.collision import reference_checker as oracle
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.fcl_checker import nearest
+from rrth_planner.collision.trajectory_validation import is_proven_free, touch_seen
+from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel, reach_to
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import positions_at, Trajectory
-from rrth_planner.touch import Touch
-from rrth_planner.world import arm_world, World
 
 # How often python-fcl's distance and the oracle's are looked at: figures for people [s].
 PERIOD = 0.002

@@ -6,12 +6,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from rrth_planner.certificate import certify
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision.penetration import depths
 from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
-from rrth_planner.world import World
 
 # Stretches of time in each of which the arm gets no deeper than it is at the beginning.
 STRETCHES = 12

@@ -9,14 +9,14 @@ from itertools import islice, pairwise
 import math
 
 import numpy as np
-from rrth_planner.fcl_shapes import Bar, boxes_of, DOUBT
+from rrth_planner.collision.displacement_bounds import travelled
+from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
+from rrth_planner.collision.violation import Touch
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
-from rrth_planner.touch import Touch
-from rrth_planner.travel import travelled
 
 # Longest time between two instants that may be looked at [s].
 PERIOD = 0.001

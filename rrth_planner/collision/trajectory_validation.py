@@ -5,14 +5,14 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from rrth_planner.certificate import certify
-from rrth_planner.fcl_check import first_touch, touch_on_way_out
-from rrth_planner.leaving import box_depths, leads_out
+from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.fcl_checker import first_touch, touch_on_way_out
+from rrth_planner.collision.penetration import box_depths, leads_out
+from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.world import World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import beyond, Trajectory
-from rrth_planner.touch import Touch
-from rrth_planner.world import World
 
 
 def is_proven_free(
