@@ -5,15 +5,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.aiming import FEW, goal_configurations, MANY, pointing_problem
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.options import RRTHOptions
-from rrth_planner.planner import plan
-from rrth_planner.result import PlanResult
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.pointing_goals import FEW, goal_configurations, MANY, pointing_problem
+from rrth_planner.planning.result import PlanResult
 
 from benchmarks.clock import timed, uncollected
 from benchmarks.draws import free_configurations, random_target, random_wearer

@@ -3,12 +3,12 @@
 """The strict judge of every path, ours and the peers': plain numpy, nothing shared with them."""
 
 import numpy as np
-from rrth_planner.box_map import BoxMap
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.shortest import enters, extended_obstacles
+from rrth_planner.planning.box_map import BoxMap
+from rrth_planner.planning.visibility_graph import enters, extended_obstacles
 
 # Between two instants at which the arm is looked at [rad].
 SPACING = 5e-4

@@ -11,10 +11,10 @@ from collections.abc import Callable
 
 from numba import njit
 import numpy as np
-from rrth_planner.checking import sampled
 from rrth_planner.collision.world import World
 from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.model.arrays import Array
+from rrth_planner.planning.edge_checks import sampled
 
 # Between two checks of an edge that is checked at a spacing [rad].
 SPACING = 0.02

@@ -16,8 +16,8 @@ from rrth_planner.blend import Blend
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.options import RRTHOptions
 from rrth_planner.pipeline import plan_motion
+from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
 from rrth_planner.timing import parameterize

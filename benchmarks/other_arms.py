@@ -3,11 +3,11 @@
 """Whether other arms are planned for: a pointing goal for each of some targets."""
 
 import numpy as np
-from rrth_planner.aiming import check_pointing_arm
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.planning.pointing_goals import check_pointing_arm
 
 from benchmarks.arms import NAMES, other_arm
 from benchmarks.draws import free_configurations, random_target

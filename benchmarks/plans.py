@@ -6,9 +6,9 @@ from dataclasses import asdict
 import json
 
 import numpy as np
-from rrth_planner.options import RRTOptions, TreeOptions
-from rrth_planner.planner import plan
-from rrth_planner.result import PlanResult
+from rrth_planner.planning.options import RRTOptions, TreeOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.result import PlanResult
 
 from benchmarks.clock import timed, uncollected
 from benchmarks.extent import Extent

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 from rrth_planner.arm_file import load_arm
-from rrth_planner.box_map import BoxMap, map_problem
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.map_file import map_from_mapping
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.options import RRTHOptions
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.box_map import BoxMap, map_problem
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.visibility_graph import shortest_path
 from rrth_planner.resources import resource_path
-from rrth_planner.shortest import shortest_path
 from rrth_planner.text_files import load_yaml
 
 from benchmarks import judge

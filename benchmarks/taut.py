@@ -4,11 +4,11 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.checking import sampled
 from rrth_planner.model.arrays import Array
-from rrth_planner.options import RRTHOptions
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.edge_checks import sampled
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
 
 from benchmarks import dense, loops
 from benchmarks.clock import repeated

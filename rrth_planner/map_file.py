@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.box_map import BoxMap
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
+from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
 

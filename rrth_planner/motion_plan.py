@@ -8,7 +8,7 @@ from rrth_planner.collision.violation import Disagreement
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.planner import PlanResult
+from rrth_planner.planning.planner import PlanResult
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -7,14 +7,20 @@ from dataclasses import replace
 import time
 
 import numpy as np
-from rrth_planner.aiming import FEW, goal_configurations, GoalSet, MANY, pointing_problem
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import TreeOptions
-from rrth_planner.planner import plan, PlanResult
+from rrth_planner.planning.options import TreeOptions
+from rrth_planner.planning.planner import plan, PlanResult
+from rrth_planner.planning.pointing_goals import (
+    FEW,
+    goal_configurations,
+    GoalSet,
+    MANY,
+    pointing_problem,
+)
 from rrth_planner.refusal import CANCELLED, goal_refusal, Refusal
 
 # Clearance that the path is planned with on top of the margin, for its rounded corners to spend;

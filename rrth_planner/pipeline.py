@@ -8,7 +8,6 @@ import functools
 import time
 
 import numpy as np
-from rrth_planner.aiming import check_pointing_arm
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.violation import Disagreement
@@ -24,10 +23,11 @@ from rrth_planner.model.start_state import Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.options import TreeOptions
 from rrth_planner.path_search import find_path, SPARES
 from rrth_planner.path_timing import time_path
-from rrth_planner.planner import PlanResult
+from rrth_planner.planning.options import TreeOptions
+from rrth_planner.planning.planner import PlanResult
+from rrth_planner.planning.pointing_goals import check_pointing_arm
 from rrth_planner.refusal import (
     CANCELLED,
     depth_sentence,

@@ -12,7 +12,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.start_state import Takeover
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.options import TreeOptions
+from rrth_planner.planning.options import TreeOptions
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

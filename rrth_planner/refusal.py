@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.aiming import GoalSet
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.world import World
@@ -16,6 +15,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.planning.pointing_goals import GoalSet
 from rrth_planner.takeover import Lead
 
 # A joint this far beyond its limit is at it [rad, m].

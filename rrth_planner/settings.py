@@ -12,7 +12,7 @@ from rrth_planner.entries import number, text, whole
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.options import ALGORITHMS, TreeOptions
+from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
 

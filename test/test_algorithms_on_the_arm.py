@@ -15,16 +15,16 @@ from rrth_planner.collision.world import arm_world  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
-from rrth_planner.options import (  # noqa: E402
+from rrth_planner.pipeline import plan_motion  # noqa: E402
+from rrth_planner.planning.options import (  # noqa: E402
     InformedRRTStarOptions,
     RRTHOptions,
     RRTOptions,
     RRTStarOptions,
     RRTStarSmartOptions,
 )
-from rrth_planner.pipeline import plan_motion  # noqa: E402
-from rrth_planner.planner import plan  # noqa: E402
-from rrth_planner.problem import PlanningProblem  # noqa: E402
+from rrth_planner.planning.planner import plan  # noqa: E402
+from rrth_planner.planning.problem import PlanningProblem  # noqa: E402
 import worlds  # noqa: E402
 
 KINDS = (RRTOptions, RRTStarOptions, InformedRRTStarOptions, RRTStarSmartOptions, RRTHOptions)

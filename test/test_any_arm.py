@@ -4,7 +4,6 @@
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import check_pointing_arm, numerical, pointing_kernels
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
@@ -13,7 +12,8 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
-from rrth_planner.options import RRTHOptions
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.pointing_goals import check_pointing_arm, numerical, pointing_kernels
 from worlds import free_configuration, limits, MARGIN, QUARTER
 
 pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)

@@ -32,7 +32,7 @@ from benchmarks.targets import TARGETS
 from benchmarks.task import figure_row, origin, path_row
 import numpy as np
 from rrth_planner.model.errors import RrthError
-from rrth_planner.shortest import shortest_path
+from rrth_planner.planning.visibility_graph import shortest_path
 
 NAMES = (*MAPS, *QUERIES)
 

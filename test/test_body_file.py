@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rrth_planner.model.errors import OptionsError, RrthError, SceneError
 from rrth_planner.model.rotation import rotation_matrix
-from rrth_planner.options import RRTOptions
+from rrth_planner.planning.options import RRTOptions
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import load_yaml

@@ -33,7 +33,7 @@ from rrth_planner.campaign.store import append_rows, finished_keys, histories, r
 from rrth_planner.campaign.table_1 import is_the_papers
 from rrth_planner.map_file import load_map
 from rrth_planner.model.errors import RrthError
-from rrth_planner.shortest import shortest_path
+from rrth_planner.planning.visibility_graph import shortest_path
 
 # Columns that differ from run to run whatever the seed.
 CLOCK = ('time_first', 'time_total', 'history_time', 'timing')

@@ -7,9 +7,6 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import goal_configurations
-from rrth_planner.box_map import map_problem
-from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world
 from rrth_planner.map_file import load_map
@@ -17,16 +14,19 @@ from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import (
+from rrth_planner.planning.box_map import map_problem
+from rrth_planner.planning.edge_checks import by_check_points, sampled
+from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     RRTHOptions,
     RRTOptions,
     RRTStarOptions,
     RRTStarSmartOptions,
 )
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.shortest import enters, extended_obstacles
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.pointing_goals import goal_configurations
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.visibility_graph import enters, extended_obstacles
 from worlds import FOLDED, MARGIN, oracle_bars, RAY, table_1_arm, wearer
 
 # Of each bar, the ray's first metre among them (section 6.2).

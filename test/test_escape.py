@@ -20,8 +20,8 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at, sample
-from rrth_planner.options import RRTHOptions
 from rrth_planner.path_search import SPARES
+from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing import parameterize
 from rrth_planner.underway import is_still_free

@@ -14,10 +14,10 @@ from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.options import RRTHOptions
 from rrth_planner.path_timing import HAIR, time_path
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import FOLDED, free_configuration, limits, MARGIN, RAY, table_1_arm, wearer
 
 ARM, WEARER = table_1_arm(), wearer()

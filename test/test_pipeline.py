@@ -7,7 +7,6 @@ import re
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import GoalSet, target_in_mount
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.violation import Touch
@@ -19,7 +18,8 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
-from rrth_planner.options import RRTHOptions
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
 from rrth_planner.refusal import goal_refusal
 from rrth_planner.takeover import lead_in
 from worlds import (

@@ -10,16 +10,16 @@ import sys
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import goal_configurations, pointing_problem
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import RRTHOptions, RRTOptions
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions, RRTOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.pointing_goals import goal_configurations, pointing_problem
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import (
     edge_touches,
     FOLDED,

@@ -7,14 +7,14 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner import star
-from rrth_planner.box_map import BoxMap, map_problem, map_world
-from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.collision import reference_checker
 from rrth_planner.collision.world import arm_world
 from rrth_planner.map_file import map_from_mapping
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import (
+from rrth_planner.planning import rrt_star
+from rrth_planner.planning.box_map import BoxMap, map_problem, map_world
+from rrth_planner.planning.edge_checks import by_check_points, sampled
+from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
     RRTHOptions,
@@ -22,10 +22,10 @@ from rrth_planner.options import (
     RRTStarOptions,
     RRTStarSmartOptions,
 )
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.visibility_graph import shortest_path
 from rrth_planner.resources import resource_path
-from rrth_planner.shortest import shortest_path
 from rrth_planner.text_files import load_yaml
 import worlds
 
@@ -198,7 +198,7 @@ def test_the_best_cost_of_a_tree_never_rises_from_draw_to_draw(algorithm, name, 
 
         return spy
 
-    for kernel in (star.rrt_star, star.informed_rrt_star, star.rrt_star_smart):
+    for kernel in (rrt_star.rrt_star, rrt_star.informed_rrt_star, rrt_star.rrt_star_smart):
         monkeypatch.setattr(kernel, 'advance', spied(kernel.advance))
     problem, _, factor = _problems()[name]
     for seed in (4, 5):

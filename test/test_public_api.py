@@ -7,7 +7,7 @@ import sys
 
 import pytest
 import rrth_planner
-from rrth_planner import options
+from rrth_planner.planning import options
 
 
 @pytest.mark.parametrize('name', rrth_planner.__all__)

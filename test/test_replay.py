@@ -19,7 +19,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.options import RRTHOptions
+from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.question import PlanQuestion
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 

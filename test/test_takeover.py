@@ -17,8 +17,8 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
-from rrth_planner.options import RRTHOptions
 from rrth_planner.pipeline import plan_motion
+from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.takeover import lead_in, reserved
 from rrth_planner.timing import limit_ratio, parameterize
 from worlds import (

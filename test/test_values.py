@@ -8,7 +8,6 @@ import warnings
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.aiming import FEW, goal_configurations
 from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.blend import round_corners
 from rrth_planner.collision.certificate import certify, least_clearance
@@ -22,8 +21,9 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.options import RRTHOptions
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.pointing_goals import FEW, goal_configurations
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import (
     examples,
     FOLDED,

@@ -17,9 +17,9 @@ from rrth_planner.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.planning.result import Tree
 from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import resource_path
-from rrth_planner.result import Tree
 from rrth_planner.settings import load_settings
 from rrth_planner.viewers.viewer import _served, main
 from rrth_planner.viewers.viewer_examples import (

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rrth_planner import aiming, growth, star, workspace
-from rrth_planner.box_map import map_problem
 from rrth_planner.kernels.search import rrt_h
 from rrth_planner.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import (
+from rrth_planner.planning import buffers, pointing_goals, rrt, rrt_star
+from rrth_planner.planning.box_map import map_problem
+from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
     RRTHOptions,
@@ -21,9 +21,9 @@ from rrth_planner.options import (
     RRTStarOptions,
     RRTStarSmartOptions,
 )
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.shortest import enters, extended_obstacles
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.visibility_graph import enters, extended_obstacles
 from worlds import blocked_pair, FOLDED, free_configuration, table_1_arm, wearer_world
 
 ALGORITHMS = (
@@ -50,17 +50,17 @@ def sizes_of(module):
 
 
 def test_every_size_of_the_arrays_of_a_plan_is_listed():
-    assert sizes_of(workspace) | sizes_of(star) | sizes_of(growth) == set(LITTLE)
+    assert sizes_of(buffers) | sizes_of(rrt_star) | sizes_of(rrt) == set(LITTLE)
 
 
 @pytest.mark.parametrize('kind', ALGORITHMS)
 @pytest.mark.parametrize('name', LITTLE)
 def test_a_plan_that_outgrows_an_array_ends_with_a_status(kind, name, monkeypatch):
     size, is_found = LITTLE[name]
-    for module in (workspace, growth, star):
+    for module in (buffers, rrt, rrt_star):
         if hasattr(module, name):
             monkeypatch.setattr(module, name, size)
-    monkeypatch.setattr(workspace, '_local', workspace.threading.local())
+    monkeypatch.setattr(buffers, '_local', buffers.threading.local())
     box_map = load_map('spiral')
     options = kind(step_size=10.0, max_samples=1500, time_limit=1000.0)
     result = plan(map_problem(box_map), options, np.random.default_rng(78))
@@ -96,13 +96,13 @@ def test_more_goals_than_a_tree_has_roots_for_are_planned_to(kind):
 
 
 def test_no_more_goals_are_kept_than_there_is_room_for(monkeypatch):
-    monkeypatch.setattr(aiming, 'MOST', 2)
-    monkeypatch.setattr(aiming, 'MOST_BLOCKED', 3)
+    monkeypatch.setattr(pointing_goals, 'MOST', 2)
+    monkeypatch.setattr(pointing_goals, 'MOST_BLOCKED', 3)
     world, rng = wearer_world(), np.random.default_rng(80)
     n_goals, n_blocked = set(), set()
     for target in rng.uniform((-1.0, -1.0, -1.0), (1.5, 1.0, 1.0), (40, 3)):
-        found = aiming.goal_configurations(
-            table_1_arm(), PointingGoal(target), world, FOLDED, aiming.MANY
+        found = pointing_goals.goal_configurations(
+            table_1_arm(), PointingGoal(target), world, FOLDED, pointing_goals.MANY
         )
         n_goals.add(len(found.q_goals))
         n_blocked.add(len(found.q_blocked))

@@ -7,7 +7,6 @@ import functools
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.aiming import target_in_mount
 from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.collision.reference_checker import bars
 from rrth_planner.collision.world import arm_world, robot_rows, World
@@ -17,10 +16,11 @@ from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.options import RRTHOptions, RRTOptions
 from rrth_planner.pipeline import plan_motion
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions, RRTOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.pointing_goals import target_in_mount
+from rrth_planner.planning.problem import PlanningProblem
 
 MARGIN, RAY = 0.02, 1.0
 # Random arms of each kind that are compiled.

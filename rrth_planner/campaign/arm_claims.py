@@ -20,7 +20,7 @@ from rrth_planner.campaign.problems import CERTIFIED
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
 from rrth_planner.map_file import load_map
 from rrth_planner.model.arrays import Array
-from rrth_planner.shortest import shortest_path
+from rrth_planner.planning.visibility_graph import shortest_path
 
 # Figure 20: mean accumulated change of each joint [deg], and its reduction [%].
 PAPER_TRAVEL = {RRT: (181.28, 172.57, 212.57, 140.38), RRT_H: (88.38, 69.16, 92.00, 93.89)}

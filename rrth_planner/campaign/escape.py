@@ -5,11 +5,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.deadline import Deadline
-from rrth_planner.growth import grow, Growth
 from rrth_planner.model.arrays import Array
-from rrth_planner.options import RRTHOptions
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.rrt import grow, Growth
 
 # Above this height a path goes round by the top of the map.
 TOP = 85.0

@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.campaign.escape import ScatterOptions
 from rrth_planner.campaign.problems import CERTIFIED, TARGETS
 from rrth_planner.campaign.runs import Run
-from rrth_planner.options import (
+from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
     RRTHOptions,

@@ -37,7 +37,7 @@ from rrth_planner.campaign.statistics import (
     spread,
 )
 from rrth_planner.map_file import load_map
-from rrth_planner.shortest import shortest_path
+from rrth_planner.planning.visibility_graph import shortest_path
 
 OTHERS = (RRT_STAR, INFORMED, SMART)
 Measure = Callable[[Rows, str, int], str]

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from rrth_planner.aiming import check_pointing_arm, goal_configurations, MANY
 from rrth_planner.arm_file import load_arm
-from rrth_planner.box_map import map_problem
-from rrth_planner.checking import by_check_points, sampled
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.map_file import load_map
@@ -20,9 +17,12 @@ from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.box_map import map_problem
+from rrth_planner.planning.edge_checks import by_check_points, sampled
+from rrth_planner.planning.pointing_goals import check_pointing_arm, goal_configurations, MANY
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.visibility_graph import enters, extended_obstacles
 from rrth_planner.resources import resource_path
-from rrth_planner.shortest import enters, extended_obstacles
 from rrth_planner.text_files import load_yaml
 
 CERTIFIED = 'certified'

@@ -19,9 +19,9 @@ from rrth_planner.campaign.escape import goes_over_the_top, scattered_growths, S
 from rrth_planner.campaign.problems import CERTIFIED, load_problem, NamedProblem
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import TreeOptions
-from rrth_planner.planner import plan
-from rrth_planner.result import PlanResult
+from rrth_planner.planning.options import TreeOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.result import PlanResult
 
 Row = dict[str, Any]
 # What decides about a row besides the run itself.

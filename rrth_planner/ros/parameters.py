@@ -13,7 +13,7 @@ from rrth_planner.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.options import ALGORITHMS, TreeOptions
+from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
 from rrth_planner.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
 

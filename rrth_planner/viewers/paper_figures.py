@@ -12,7 +12,7 @@ from rrth_planner.campaign.paper_runs import FIVE, RRT, RRT_H
 from rrth_planner.campaign.statistics import histories_on, quartiles, Rows
 from rrth_planner.map_file import load_map
 from rrth_planner.model.arrays import Array
-from rrth_planner.shortest import shortest_path
+from rrth_planner.planning.visibility_graph import shortest_path
 
 COLOURS = dict(zip(FIVE, ('#7a828c', '#1b6ca8', '#2f9e6e', '#c98a1b', '#c2185b'), strict=True))
 EXACT, GRID = '#30343b', '#e4e6ea'

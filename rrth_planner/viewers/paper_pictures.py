@@ -36,7 +36,7 @@ from rrth_planner.campaign.statistics import Rows
 from rrth_planner.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path as JointPath
-from rrth_planner.planner import plan
+from rrth_planner.planning.planner import plan
 from rrth_planner.viewers.paper_arm import joint_paths_figure, motions_figure
 from rrth_planner.viewers.paper_figures import convergence_figure, DRAWS, histogram_figure, TIME
 from rrth_planner.viewers.paper_maps import escape_figure, trees_figure

@@ -7,7 +7,7 @@ from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.result import Tree
+from rrth_planner.planning.result import Tree
 
 # Straight joint motions are curves of the tool: points of one edge of a path, and of a tree.
 PATH_PIECES, TREE_PIECES = 24, 6

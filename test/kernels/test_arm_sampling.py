@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.checking import sampled
 from rrth_planner.collision.world import arm_world
+from rrth_planner.planning.edge_checks import sampled
 from worlds import free_configuration, MARGIN, RAY, table_1_arm, varied_body, wearer_world
 
 

@@ -35,9 +35,9 @@ from rrth_planner.kernels.jit import (
     VEC,
 )
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.options import RRTHOptions
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import (
     bezier_quintic,
     compiled_chain,
@@ -419,15 +419,15 @@ from rrth_planner.collision.certificate import derivative_bounds
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
-from rrth_planner.aiming import goal_configurations, pointing_problem
+from rrth_planner.planning.pointing_goals import goal_configurations, pointing_problem
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.collision.edge_contacts import edge_contacts, SLOPES
 from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform
 from rrth_planner.kernels.search.sampling import draw_near
-from rrth_planner.options import RRTHOptions
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import FOLDED, bezier_quintic, blocked_pair, line, table_1_arm, wearer_world
 
 rng = np.random.default_rng(5)

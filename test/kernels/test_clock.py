@@ -4,8 +4,8 @@
 
 import time
 
-from rrth_planner.deadline import Deadline
 from rrth_planner.kernels.clock import now
+from rrth_planner.planning.deadline import Deadline
 
 # Both convert the same counter, by different roundings [s].
 ROUNDING = 1e-6

@@ -9,12 +9,6 @@ import re
 
 import numpy as np
 import pytest
-from rrth_planner.aiming import (
-    CLOSED_FORM,
-    numerical,
-    pointing_kernels,
-    pointing_problem,
-)
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.reference_checker import bar_box_touch
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
@@ -30,8 +24,14 @@ from rrth_planner.model.errors import ModelError, OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.options import RRTHOptions
-from rrth_planner.planner import plan
+from rrth_planner.planning.options import RRTHOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.pointing_goals import (
+    CLOSED_FORM,
+    numerical,
+    pointing_kernels,
+    pointing_problem,
+)
 from worlds import (
     edge_touches,
     free_configuration,

@@ -5,17 +5,17 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.aiming import (
+from rrth_planner.collision.world import arm_world
+from rrth_planner.model.arm import pointing_error, tool_pose
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.planning.pointing_goals import (
     _spreading_ratios,
     goal_configurations,
     MOST,
     pointing_kernels,
     target_in_mount,
 )
-from rrth_planner.collision.world import arm_world
-from rrth_planner.model.arm import pointing_error, tool_pose
-from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.scene import Scene
 from worlds import (
     compiled_chain,
     edge_touches,

@@ -5,17 +5,17 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.aiming import (
+from rrth_planner.collision.world import arm_world, robot_rows
+from rrth_planner.kernels.kinematics.pan_tilt_ik import aim, unwrap
+from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.planning.pointing_goals import (
     check_pointing_arm,
     CLOSED_FORM,
     numerical,
     pointing_kernels,
     target_in_mount,
 )
-from rrth_planner.collision.world import arm_world, robot_rows
-from rrth_planner.kernels.kinematics.pan_tilt_ik import aim, unwrap
-from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
-from rrth_planner.model.goal import PointingGoal
 from worlds import (
     aiming_candidates,
     edge_touches,

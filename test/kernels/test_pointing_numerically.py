@@ -5,13 +5,6 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.aiming import (
-    check_pointing_arm,
-    CLOSED_FORM,
-    numerical,
-    pointing_kernels,
-    target_in_mount,
-)
 from rrth_planner.collision.world import arm_world, robot_rows
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.kinematics.ik_projection import measure_aim, project, WORK_ROWS
@@ -19,6 +12,13 @@ from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
+from rrth_planner.planning.pointing_goals import (
+    check_pointing_arm,
+    CLOSED_FORM,
+    numerical,
+    pointing_kernels,
+    target_in_mount,
+)
 from worlds import (
     aiming_candidates,
     compiled_chain,

@@ -4,15 +4,15 @@
 
 import numpy as np
 import pytest
-from rrth_planner import growth, rrt_h, workspace
-from rrth_planner.box_map import BoxMap, map_problem
-from rrth_planner.deadline import Deadline
 from rrth_planner.kernels.search.random import random_state
 from rrth_planner.kernels.search.rrt import is_rejected_by_club
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import RRTHOptions, RRTOptions
-from rrth_planner.planner import plan
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning import buffers, rrt, rrt_h
+from rrth_planner.planning.box_map import BoxMap, map_problem
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import RRTHOptions, RRTOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
 from worlds import (
     blocked_pair,
     edge_touches,
@@ -31,10 +31,10 @@ def grow(world, q_start, q_goals, rng, budget, **options):
     """Return what one growth brought, and the room it grew in, which was filled with NaN."""
     problem = PlanningProblem(world=world, q_start=q_start, q_goals=q_goals)
     chosen = RRTOptions(**{'step_size': STEP, **options})
-    room = workspace.workspace(4, growth.room_for(chosen, len(q_goals), (), budget))
+    room = buffers.workspace(4, rrt.room_for(chosen, len(q_goals), (), budget))
     room.tree_q[:] = np.nan
     never = Deadline(1000.0, lambda: False)
-    return growth.grow(problem, problem.q_goals, chosen, rng, never, budget=budget), room
+    return rrt.grow(problem, problem.q_goals, chosen, rng, never, budget=budget), room
 
 
 @pytest.fixture(scope='module')
@@ -92,16 +92,16 @@ def test_growth_stops_where_the_trees_are_full(blocked_pairs, monkeypatch):
     # A step so short that nothing meets, and room for a few nodes.
     options = {'step_size': 0.01, 'goal_bias': 0.0, 'max_samples': 3000, 'time_limit': 1000.0}
     problem = PlanningProblem(world=world, q_start=q_start, q_goals=[q_goal])
-    for home, kind in ((growth, RRTOptions), (rrt_h, RRTHOptions)):
-        monkeypatch.setattr(workspace._local, 'kept', None, raising=False)
+    for home, kind in ((rrt, RRTOptions), (rrt_h, RRTHOptions)):
+        monkeypatch.setattr(buffers._local, 'kept', None, raising=False)
         monkeypatch.setattr(home, 'room_for', lambda *_: 40)
         result = plan(problem, kind(**options), rng)
-        assert workspace._local.kept.capacity == 40
+        assert buffers._local.kept.capacity == 40
         assert result.status is PlanStatus.SAMPLE_LIMIT
         assert result.path is None
         assert all(len(tree.nodes) <= 40 for tree in result.trees)
         assert max(len(tree.nodes) for tree in result.trees) >= 39
-    monkeypatch.setattr(workspace._local, 'kept', None)
+    monkeypatch.setattr(buffers._local, 'kept', None)
 
 
 @pytest.mark.parametrize('near_bias', [0.0, 0.9])

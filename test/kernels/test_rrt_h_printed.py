@@ -6,14 +6,14 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner.box_map import BoxMap, map_problem, map_world
 from rrth_planner.kernels.search.rrt_h_published import cut_corners, first_contact, pull_forward
 from rrth_planner.kernels.vectors import path_length
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import PrintedRRTHOptions, RRTOptions
-from rrth_planner.planner import plan
-from rrth_planner.printed import SHORTEN
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.box_map import BoxMap, map_problem, map_world
+from rrth_planner.planning.options import PrintedRRTHOptions, RRTOptions
+from rrth_planner.planning.planner import plan
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.rrt_h_published import SHORTEN
 from worlds import blocked_pair, wearer_world
 
 # From P_0 the points of P_1 -> P_2 are seen over a box; the line of sight to (t, 4) passes the

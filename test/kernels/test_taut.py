@@ -4,9 +4,9 @@
 
 import numpy as np
 import pytest
-from rrth_planner.box_map import BoxMap, map_world
 from rrth_planner.kernels.search.shortcut import pull_forward, pull_taut, TAUT
 from rrth_planner.kernels.vectors import path_length
+from rrth_planner.planning.box_map import BoxMap, map_world
 from worlds import (
     edge_touches,
     free_configuration,

@@ -23,7 +23,7 @@ from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
-from rrth_planner.options import RRTStarOptions  # noqa: E402
+from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros import incidents, reporter, requests, second_opinion  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402

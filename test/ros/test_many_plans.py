@@ -15,13 +15,13 @@ from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner.aiming import target_in_mount  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.collision.motion_inspection import inspect_motion  # noqa: E402
 from rrth_planner.collision.world import arm_world  # noqa: E402
 from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
+from rrth_planner.planning.pointing_goals import target_in_mount  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 import samples  # noqa: E402

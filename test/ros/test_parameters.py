@@ -12,7 +12,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.errors import ModelError, OptionsError  # noqa: E402
-from rrth_planner.options import RRTHOptions  # noqa: E402
+from rrth_planner.planning.options import RRTHOptions  # noqa: E402
 from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.declaring import ARM  # noqa: E402
 from rrth_planner.ros.parameters import (  # noqa: E402

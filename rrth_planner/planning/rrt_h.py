@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rrth_planner.deadline import Deadline
-from rrth_planner.growth import grown_trees, plant, room_for
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import elastic_band, rrt_h
 from rrth_planner.kernels.search.random import random_state
@@ -15,10 +13,12 @@ from rrth_planner.kernels.search.shortcut import TAUT
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import PrintedRRTHOptions, RRTHOptions
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import PlanResult, Tree
-from rrth_planner.workspace import Workspace, workspace
+from rrth_planner.planning.buffers import Workspace, workspace
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.result import PlanResult, Tree
+from rrth_planner.planning.rrt import grown_trees, plant, room_for
 
 TIGHTEN = jit.first_class(elastic_band.tighten)
 # Time between two looks at whether to stop [s].

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from rrth_planner import rrt_h
-from rrth_planner.deadline import Deadline
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import rrt_h_published
-from rrth_planner.options import PrintedRRTHOptions
-from rrth_planner.problem import PlanningProblem, STAY
-from rrth_planner.result import PlanResult, Tree
+from rrth_planner.planning import rrt_h
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import PrintedRRTHOptions
+from rrth_planner.planning.problem import PlanningProblem, STAY
+from rrth_planner.planning.result import PlanResult, Tree
 
 SHORTEN = jit.first_class(rrt_h_published.shorten)
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from importlib import import_module
 
 import numpy as np
-from rrth_planner.deadline import Deadline
 from rrth_planner.kernels.search import rrt, rrt_h, tree
 from rrth_planner.kernels.search.random import random_state
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import GrowthOptions, RRTHOptions
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import GrownTrees, PlanResult, Tree
-from rrth_planner.workspace import MAX_NODES, Workspace, workspace
+from rrth_planner.planning.buffers import MAX_NODES, Workspace, workspace
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import GrowthOptions, RRTHOptions
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -7,16 +7,20 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.deadline import Deadline
 from rrth_planner.kernels.search import informed_rrt_star, rrt_star, rrt_star_smart, tree_reuse
 from rrth_planner.kernels.search.random import random_state
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.options import InformedRRTStarOptions, RRTStarOptions, RRTStarSmartOptions
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import GrownTrees, PlanResult, Tree
-from rrth_planner.workspace import MAX_NODES, MAX_WAYPOINTS
+from rrth_planner.planning.buffers import MAX_NODES, MAX_WAYPOINTS
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import (
+    InformedRRTStarOptions,
+    RRTStarOptions,
+    RRTStarSmartOptions,
+)
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
 
 # Draws between two looks at the clock.
 BATCH = 500

@@ -16,7 +16,7 @@ from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.problem import PlanningProblem
 
 # Draws of joints: a few give good postures at once; many, before none is said to be free.
 FEW, MANY = 176, 4096

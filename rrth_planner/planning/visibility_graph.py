@@ -12,9 +12,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.box_map import BoxMap
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
+from rrth_planner.planning.box_map import BoxMap
 
 # How far a line may enter a rectangle and still pass for touching it, as a share of the map.
 TOUCHING = 1e-9

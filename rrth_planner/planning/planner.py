@@ -7,9 +7,9 @@ import functools
 from importlib import import_module
 
 import numpy as np
-from rrth_planner.deadline import Deadline
 from rrth_planner.model.errors import OptionsError
-from rrth_planner.options import (
+from rrth_planner.planning.deadline import Deadline
+from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
     RRTHOptions,
@@ -18,8 +18,8 @@ from rrth_planner.options import (
     RRTStarSmartOptions,
     TreeOptions,
 )
-from rrth_planner.problem import PlanningProblem
-from rrth_planner.result import PlanResult
+from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.planning.result import PlanResult
 
 # The module that searches by these options. It is imported when first needed: each compiles its
 # own kernels, and a node that plans by RRT-H need not wait for those of RRT*.

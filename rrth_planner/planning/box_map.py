@@ -12,7 +12,7 @@ from rrth_planner.kernels.kinematics import generated_fk
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import printable, SceneError
-from rrth_planner.problem import PlanningProblem
+from rrth_planner.planning.problem import PlanningProblem
 
 EDGE_CHECK = jit.first_class(map_validity.is_edge_free)
 SAMPLED_CHECK = jit.first_class(map_validity.is_edge_free_sampled)

@@ -4,10 +4,13 @@
 
 from dataclasses import replace
 
-from rrth_planner.box_map import EDGE_CHECK as MAP_CHECK, SAMPLED_CHECK as SAMPLED_MAP_CHECK
 from rrth_planner.collision.world import World
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision import arm_sampled
+from rrth_planner.planning.box_map import (
+    EDGE_CHECK as MAP_CHECK,
+    SAMPLED_CHECK as SAMPLED_MAP_CHECK,
+)
 
 SAMPLED_ARM_CHECK = jit.first_class(arm_sampled.is_edge_free_sampled)
 POINTS_ARM_CHECK = jit.first_class(arm_sampled.is_edge_free_at_points)
