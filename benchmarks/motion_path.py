@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.blend import Blend
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
+from rrth_planner.timing.corner_blends import Blend
 
 # Places on a bent piece from which the nearest is looked for, and steps of that search.
 STARTS, STEPS = 65, 5

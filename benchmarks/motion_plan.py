@@ -12,7 +12,6 @@ from unittest.mock import patch
 
 import numpy as np
 from rrth_planner import path_timing
-from rrth_planner.blend import Blend
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.motion_plan import MotionPlan
@@ -20,7 +19,8 @@ from rrth_planner.pipeline import plan_motion
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.corner_blends import Blend
+from rrth_planner.timing.parameterization import parameterize
 
 from benchmarks.clock import uncollected
 from benchmarks.full_query import Case, cases, MARGIN, RAY

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from rrth_planner.blend import Blend
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.timing.corner_blends import Blend
 import toppra
 from toppra import algorithm, constraint
 from toppra.interpolator import AbstractGeometricPath

@@ -13,8 +13,8 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
-from rrth_planner.takeover import Lead
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.lead_in import Lead
+from rrth_planner.timing.parameterization import parameterize
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
 LONGEST, N_DIRECTIONS = 1.5, 48

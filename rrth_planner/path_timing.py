@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from rrth_planner.blend import Blend, round_corners
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.trajectory_validation import touch_seen
 from rrth_planner.collision.violation import Disagreement
@@ -20,8 +19,9 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.refusal import CANCELLED, Refusal
-from rrth_planner.takeover import Lead, reserved
-from rrth_planner.timing import excess, parameterize, TooFastError
+from rrth_planner.timing.corner_blends import Blend, round_corners
+from rrth_planner.timing.lead_in import Lead, reserved
+from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
 
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
 # has other intervals, does not fail for a hair [m].

@@ -37,7 +37,7 @@ from rrth_planner.refusal import (
     target_refusal,
     within_limits,
 )
-from rrth_planner.takeover import Lead, lead_in, stop_first
+from rrth_planner.timing.lead_in import Lead, lead_in, stop_first
 
 # A wearer who holds still makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)

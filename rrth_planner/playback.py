@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
-from rrth_planner.rate import RateProfile
-from rrth_planner.running import first_rest, Running
-from rrth_planner.stopping import soonest_stop
+from rrth_planner.timing.proven_stop import soonest_stop
+from rrth_planner.timing.running import first_rest, Running
+from rrth_planner.timing.time_law import RateProfile
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,7 +16,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.pointing_goals import GoalSet
-from rrth_planner.takeover import Lead
+from rrth_planner.timing.lead_in import Lead
 
 # A joint this far beyond its limit is at it [rad, m].
 ROUNDING = 1e-6

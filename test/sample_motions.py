@@ -3,10 +3,10 @@
 """Random motions that tests share, and how far points are beside one."""
 
 import numpy as np
-from rrth_planner.blend import Blend
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.corner_blends import Blend
+from rrth_planner.timing.parameterization import parameterize
 from worlds import limits
 
 LIMITS = limits()

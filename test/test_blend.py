@@ -5,10 +5,10 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import Blend, round_corners, SHARE
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
+from rrth_planner.timing.corner_blends import Blend, round_corners, SHARE
 from worlds import (
     dense_touch,
     examples,

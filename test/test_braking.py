@@ -5,8 +5,6 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import round_corners
-from rrth_planner.braking import brake, certify_braking
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.collision.world import arm_world
@@ -15,7 +13,9 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import jerks_at, piece_coefficients, sample, Trajectory
 from rrth_planner.path_timing import first_proven, in_time
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.braking import brake, certify_braking
+from rrth_planner.timing.corner_blends import round_corners
+from rrth_planner.timing.parameterization import parameterize
 from sample_motions import any_motion, path_distance
 from worlds import (
     dense_touch,

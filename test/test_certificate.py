@@ -16,7 +16,7 @@ from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.parameterization import parameterize
 from worlds import (
     bezier_quintic,
     compiled_chain,

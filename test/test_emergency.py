@@ -5,9 +5,6 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import Blend
-from rrth_planner.braking import brake
-from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.kernels.trajectory.fast_stop import first_look, first_rest
 from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, TIME, time_after, WAY
 from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold, stop_way
@@ -19,8 +16,11 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.running import along_path, derivatives_at, Running, slowed
-from rrth_planner.timing import limit_ratio, parameterize
+from rrth_planner.timing.braking import brake
+from rrth_planner.timing.corner_blends import Blend
+from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
+from rrth_planner.timing.parameterization import limit_ratio, parameterize
+from rrth_planner.timing.running import along_path, derivatives_at, Running, slowed
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
 

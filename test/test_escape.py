@@ -23,7 +23,7 @@ from rrth_planner.model.trajectory import positions_at, sample
 from rrth_planner.path_search import SPARES
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.parameterization import parameterize
 from rrth_planner.underway import is_still_free
 from worlds import (
     examples,

@@ -14,12 +14,12 @@ from benchmarks.motion_judge import curve_of, verdict
 from benchmarks.motion_path import distances, planned_pieces
 from benchmarks.queries import wearer
 import numpy as np
-from rrth_planner.blend import Blend
 from rrth_planner.collision import reference_checker
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.corner_blends import Blend
+from rrth_planner.timing.parameterization import parameterize
 from worlds import limits, table_1_arm
 
 MARGIN, RAY = 0.02, 1.0

@@ -7,7 +7,6 @@ import functools
 
 import numpy as np
 from rrth_planner import path_timing
-from rrth_planner.blend import round_corners
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world, grown
@@ -18,6 +17,7 @@ from rrth_planner.path_timing import HAIR, time_path
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.timing.corner_blends import round_corners
 from worlds import FOLDED, free_configuration, limits, MARGIN, RAY, table_1_arm, wearer
 
 ARM, WEARER = table_1_arm(), wearer()

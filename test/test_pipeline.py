@@ -21,7 +21,7 @@ from rrth_planner.model.trajectory import sample
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
 from rrth_planner.refusal import goal_refusal
-from rrth_planner.takeover import lead_in
+from rrth_planner.timing.lead_in import lead_in
 from worlds import (
     dense_touch,
     FOLDED,

@@ -9,10 +9,10 @@ from rrth_planner.model.errors import RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import jerks_at, MotionLimits, sample, Trajectory
 from rrth_planner.playback import Playback, stop
-from rrth_planner.rate import RateProfile
-from rrth_planner.running import Running
-from rrth_planner.stopping import holds
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.parameterization import parameterize
+from rrth_planner.timing.proven_stop import holds
+from rrth_planner.timing.running import Running
+from rrth_planner.timing.time_law import RateProfile
 from sample_motions import any_motion, planned_motion
 from worlds import examples, limits
 

@@ -6,7 +6,6 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner import path_timing
-from rrth_planner.braking import brake
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.localization import sharp_phase_of, takeover
@@ -19,8 +18,9 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
 from rrth_planner.pipeline import plan_motion
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.takeover import lead_in, reserved
-from rrth_planner.timing import limit_ratio, parameterize
+from rrth_planner.timing.braking import brake
+from rrth_planner.timing.lead_in import lead_in, reserved
+from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from worlds import (
     dense_touch,
     examples,

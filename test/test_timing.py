@@ -9,14 +9,14 @@ from benchmarks.motion_path import distances, planned_pieces
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import Blend, round_corners
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
 from rrth_planner.path_timing import first_proven, in_time
-from rrth_planner.timing import limit_ratio, parameterize
+from rrth_planner.timing.corner_blends import Blend, round_corners
+from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from worlds import examples, limits, table_1_arm
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -5,7 +5,6 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import Blend
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
@@ -16,7 +15,8 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.corner_blends import Blend
+from rrth_planner.timing.parameterization import parameterize
 from worlds import examples, limits
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -11,7 +11,6 @@ from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import frames, quintic_states
 from rrth_planner.collision.world import arm_world
-from rrth_planner.emergency import emergency_stop, ON_ITS_WAY
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
     joined,
@@ -21,7 +20,8 @@ from rrth_planner.model.trajectory import (
     Trajectory,
 )
 from rrth_planner.running_motion import RunningMotion
-from rrth_planner.timing import limit_ratio
+from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
+from rrth_planner.timing.parameterization import limit_ratio
 from rrth_planner.underway import (
     is_place_free,
     is_still_free,

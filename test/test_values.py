@@ -9,7 +9,6 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.arm_file import arm_from_mapping
-from rrth_planner.blend import round_corners
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.kernels.collision import arm_validity
@@ -24,6 +23,7 @@ from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import FEW, goal_configurations
 from rrth_planner.planning.problem import PlanningProblem
+from rrth_planner.timing.corner_blends import round_corners
 from worlds import (
     examples,
     FOLDED,

@@ -19,7 +19,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
-from rrth_planner.emergency import emergency_stop
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
@@ -31,6 +30,7 @@ from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
 from rrth_planner.running_motion import RunningMotion
+from rrth_planner.timing.fast_stop import emergency_stop
 from rrth_planner.underway import is_still_free, leads_away
 
 # How often the age of the body is looked at [s].

@@ -7,13 +7,13 @@ from itertools import pairwise
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.blend import round_corners
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.trajectory import speed_profile
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.timing import parameterize
+from rrth_planner.timing.corner_blends import round_corners
+from rrth_planner.timing.parameterization import parameterize
 from ruckig import InputParameter, Result, Ruckig, Trajectory as Profile
 from worlds import examples, limits, table_1_arm
 

@@ -18,7 +18,6 @@ from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Touch  # noqa: E402
-from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.incident import IncidentKind  # noqa: E402
 from rrth_planner.incident_files import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
@@ -29,6 +28,7 @@ from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.inputs import Inputs  # noqa: E402
+from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
 

@@ -12,7 +12,6 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
-from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402
@@ -34,6 +33,7 @@ from rrth_planner.ros.trajectories import (
     joint_trajectory_to_msg,
     tool_path_to_msg,
 )
+from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
 import worlds  # noqa: E402

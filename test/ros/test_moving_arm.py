@@ -14,7 +14,6 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
-from rrth_planner.emergency import emergency_stop  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros import start  # noqa: E402
@@ -28,6 +27,7 @@ from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.requests import plan_request  # noqa: E402
 from rrth_planner.ros.start import EARLY, LEADS  # noqa: E402
 from rrth_planner.running_motion import RunningMotion  # noqa: E402
+from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')

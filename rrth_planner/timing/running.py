@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import jerks_at, piece_coefficients, sample, Trajectory
-from rrth_planner.rate import RateProfile
+from rrth_planner.timing.time_law import RateProfile
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -5,8 +5,8 @@
 import numpy as np
 from rrth_planner.collision.certificate import Certificate, certify
 from rrth_planner.collision.world import World
-from rrth_planner.emergency import emergency_stop
 from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
+from rrth_planner.timing.fast_stop import emergency_stop
 
 # What rounding leaves of an acceleration [rad/s^2].
 ROUNDING = 1e-9

@@ -5,12 +5,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.braking import brake
 from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.timing import peaks
+from rrth_planner.timing.braking import brake
+from rrth_planner.timing.parameterization import peaks
 
 # What rounding leaves of a speed where a motion ends: it has no direction [rad/s].
 RESIDUAL_SPEED = 1e-6

@@ -5,9 +5,9 @@
 import numpy as np
 from rrth_planner.model.bernstein import from_values
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.rate import RateProfile
-from rrth_planner.running import derivatives_along, derivatives_at, first_rest, Running
-from rrth_planner.stop_profiles import outlook, soonest_profiles
+from rrth_planner.timing.running import derivatives_along, derivatives_at, first_rest, Running
+from rrth_planner.timing.stop_candidates import outlook, soonest_profiles
+from rrth_planner.timing.time_law import RateProfile
 
 # A stop that saves less of the motion's own time is none.
 WORTH = 0.99

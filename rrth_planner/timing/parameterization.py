@@ -7,12 +7,12 @@ from itertools import pairwise
 import math
 
 import numpy as np
-from rrth_planner.blend import Blend
 from rrth_planner.kernels.trajectory.speed_profile import cell_speeds, knots, MOST_PHASES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
+from rrth_planner.timing.corner_blends import Blend
 
 # A motion shorter than this is none: the arm holds still for HOLD seconds.
 STILL, HOLD = 1e-9, 0.1

@@ -7,18 +7,18 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.line_stops import line_stops, LineStops
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.rate import integrated, RateProfile
-from rrth_planner.running import (
+from rrth_planner.timing.line_stops import line_stops, LineStops
+from rrth_planner.timing.running import (
     along_path,
     derivatives_around,
     derivatives_at,
     Running,
     slowed,
 )
+from rrth_planner.timing.time_law import integrated, RateProfile
 
 # What is tried: delays, in shares of the time that is looked at; in shares of the limits that are
 # left along the path, decelerations and the jerks that build them up.
