@@ -11,11 +11,11 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from rrth_planner import path_timing
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.pipeline import plan_motion
+from rrth_planner.pipeline import time_path
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.resources import resource_path
 from rrth_planner.text_files import load_yaml
@@ -114,8 +114,8 @@ def _plan(case: Case, limits: MotionLimits, seed: int) -> MotionPlan:
 def watched() -> Iterator[list[Call]]:
     """Note the calls of the steps of the pipeline while the block runs."""
     calls: list[Call] = []
-    originals = {step: getattr(path_timing, step) for step in STEPS}
-    with patch.multiple(path_timing, **{s: _noting(s, f, calls) for s, f in originals.items()}):
+    originals = {step: getattr(time_path, step) for step in STEPS}
+    with patch.multiple(time_path, **{s: _noting(s, f, calls) for s, f in originals.items()}):
         yield calls
 
 

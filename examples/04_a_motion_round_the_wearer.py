@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.arm_file import load_arm
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.pipeline import plan_motion, warm_up
+from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 from rrth_planner.settings import load_settings
 from rrth_planner.wearer_file import load_body
 

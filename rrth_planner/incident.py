@@ -18,7 +18,7 @@ from rrth_planner.entries import number, text
 from rrth_planner.model.errors import one_line, RecordError, shown
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.records import (
     fields_of,
     plain,

@@ -19,8 +19,8 @@ from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.pipeline import plan_motion, warm_up
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings, PlanSettings
 from rrth_planner.text_files import load_yaml

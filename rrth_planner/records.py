@@ -17,8 +17,8 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
-from rrth_planner.question import PlanQuestion
 
 
 def plain(value: Any) -> Any:

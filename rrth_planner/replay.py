@@ -15,8 +15,8 @@ from rrth_planner.incident import Incident, IncidentKind, versions
 from rrth_planner.incident_files import read_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.pipeline import plan_motion, warm_up
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
 DESCRIPTION = """\
 Play back an incident of the planner: a motion that its certificate had proven free and that

@@ -15,7 +15,7 @@ from rrth_planner.collision.world import arm_world  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
-from rrth_planner.pipeline import plan_motion  # noqa: E402
+from rrth_planner.pipeline.plan_motion import plan_motion  # noqa: E402
 from rrth_planner.planning.options import (  # noqa: E402
     InformedRRTStarOptions,
     RRTHOptions,

@@ -16,7 +16,7 @@ from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import check_pointing_arm, numerical, pointing_kernels
 from worlds import free_configuration, limits, MARGIN, QUARTER
 
-pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
 OPTIONS = RRTHOptions(club_attempts=2, improve_time=1000.0, time_limit=1000.0, max_samples=4000)
 RAY = 0.5
 # alpha, a, offset, d of each joint and of the tool; where a joint slides.

@@ -12,7 +12,7 @@ from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import jerks_at, piece_coefficients, sample, Trajectory
-from rrth_planner.path_timing import first_proven, in_time
+from rrth_planner.pipeline.time_path import first_proven, in_time
 from rrth_planner.timing.braking import brake, certify_braking
 from rrth_planner.timing.corner_blends import round_corners
 from rrth_planner.timing.parameterization import parameterize

@@ -52,7 +52,7 @@ def test_it_is_of_the_size_that_it_should_be():
 
 
 def test_it_plans_round_the_seated_wearer_without_a_touch():
-    pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+    pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
     arm, scene = load_arm(resource_path(ARM)), load_body(resource_path(BODY))
     settings = load_settings(arm.dof, improve_time=1000.0, time_limit=1000.0)
     ray, margin = settings.ray_guard_length, settings.margin

@@ -20,7 +20,7 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at, sample
-from rrth_planner.path_search import SPARES
+from rrth_planner.pipeline.plan_path import SPARES
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing.parameterization import parameterize
@@ -40,8 +40,8 @@ from worlds import (
 )
 
 pytest.importorskip('fcl')
-from rrth_planner import pipeline  # noqa: E402
 from rrth_planner.collision import fcl_checker, trajectory_validation  # noqa: E402
+from rrth_planner.pipeline import plan_motion  # noqa: E402
 
 ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
@@ -51,7 +51,7 @@ BODIES = [wearer(), *(varied_body(np.random.default_rng(k)) for k in range(5))]
 
 
 def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more):
-    return pipeline.plan_motion(
+    return plan_motion.plan_motion(
         arm,
         scene,
         q_start,

@@ -37,7 +37,7 @@ OWN = {
 # The report says which requirements it misses before it imports what has them.
 REPORTER = 'rrth_planner.reproduce'
 LATE = {
-    ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline'),
+    ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline.plan_motion'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.arrival'),
     ('rrth_planner.ros.point_at', 'rrth_planner.ros.bodies'),

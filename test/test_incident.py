@@ -29,8 +29,8 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
-from rrth_planner.question import PlanQuestion
 from rrth_planner.text_files import parse_yaml
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 import yaml

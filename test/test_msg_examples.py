@@ -17,7 +17,7 @@ from rrth_planner.collision.reference_checker import first_contact  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits  # noqa: E402
-from rrth_planner.pipeline import plan_motion  # noqa: E402
+from rrth_planner.pipeline.plan_motion import plan_motion  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
 from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody

@@ -6,14 +6,14 @@ from dataclasses import replace
 import functools
 
 import numpy as np
-from rrth_planner import path_timing
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.path_timing import HAIR, time_path
+from rrth_planner.pipeline import time_path as path_timing
+from rrth_planner.pipeline.time_path import HAIR, time_path
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.problem import PlanningProblem

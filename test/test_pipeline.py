@@ -18,9 +18,9 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
+from rrth_planner.pipeline.rejection import goal_refusal
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
-from rrth_planner.refusal import goal_refusal
 from rrth_planner.timing.lead_in import lead_in
 from worlds import (
     dense_touch,
@@ -36,8 +36,8 @@ from worlds import (
     wearer_world,
 )
 
-pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
-path_timing = pytest.importorskip('rrth_planner.path_timing', exc_type=ImportError)
+pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
+path_timing = pytest.importorskip('rrth_planner.pipeline.time_path', exc_type=ImportError)
 OPTIONS = RRTHOptions(club_attempts=2, improve_time=1000.0, time_limit=1000.0, max_samples=4000)
 
 

@@ -19,11 +19,11 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.question import PlanQuestion
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 
-pipeline = pytest.importorskip('rrth_planner.pipeline', exc_type=ImportError)
+pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
 from rrth_planner import replay
 from rrth_planner.collision import checker_comparison, trajectory_validation
 

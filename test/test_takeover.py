@@ -5,7 +5,6 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner import path_timing
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.localization import sharp_phase_of, takeover
@@ -16,7 +15,8 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
-from rrth_planner.pipeline import plan_motion
+from rrth_planner.pipeline import time_path
+from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.lead_in import lead_in, reserved
@@ -236,7 +236,7 @@ def test_a_motion_that_would_break_the_limits_is_none(monkeypatch):
     q = free_configuration(rng, wearer_world())
     state = MotionState(positions=q, velocities=np.full(4, 0.3), accelerations=np.zeros(4))
     assert motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state)).trajectory is not None
-    monkeypatch.setattr(path_timing, 'EXCESS', 0.5)
+    monkeypatch.setattr(time_path, 'EXCESS', 0.5)
     plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert plan.trajectory is None

@@ -14,7 +14,7 @@ from rrth_planner.collision.world import arm_world
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
-from rrth_planner.path_timing import first_proven, in_time
+from rrth_planner.pipeline.time_path import first_proven, in_time
 from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from worlds import examples, limits, table_1_arm

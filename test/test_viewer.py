@@ -17,8 +17,8 @@ from rrth_planner.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.result import Tree
-from rrth_planner.question import PlanQuestion
 from rrth_planner.resources import resource_path
 from rrth_planner.settings import load_settings
 from rrth_planner.viewers.viewer import _served, main

@@ -16,7 +16,7 @@ from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.pipeline import plan_motion
+from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.planning.options import RRTHOptions, RRTOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.pointing_goals import target_in_mount

@@ -5,7 +5,7 @@
 from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError
-from rrth_planner.pipeline import warm_up
+from rrth_planner.pipeline.plan_motion import warm_up
 from rrth_planner.ros.answers import Answer, answer_from_text
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode

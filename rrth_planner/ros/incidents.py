@@ -11,7 +11,7 @@ from rrth_planner.incident import error_incident, Incident
 from rrth_planner.incident_files import write_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.request import PlanQuestion
 
 
 class PlanError(RrthError):

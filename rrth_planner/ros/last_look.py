@@ -13,7 +13,7 @@ from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.motion_plan import MotionPlan
+from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.ros.bodies import WearerBody
 from rrth_planner.ros.error_codes import ErrorCode
 from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError

@@ -100,7 +100,7 @@ class PlannerNode(Node):
 
     def _load_planner(self) -> Callable[..., Any]:
         """Return what plans, ready for its first plan."""
-        from rrth_planner.pipeline import warm_up
+        from rrth_planner.pipeline.plan_motion import warm_up
         from rrth_planner.ros.requests import plan_request
 
         self._warm_up = warm_up

@@ -10,9 +10,9 @@ import secrets
 from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.pipeline import plan_motion
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.incidents import PlanError
 from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError

@@ -10,7 +10,7 @@ from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.parameters import PlannerParameters
 
 

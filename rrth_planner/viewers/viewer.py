@@ -20,8 +20,8 @@ from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.pipeline import warm_up
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.plan_motion import warm_up
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.settings import load_settings
 from rrth_planner.text_files import parse_yaml
 from rrth_planner.viewers.viewer_examples import example_target, start_of

@@ -14,9 +14,9 @@ from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.pipeline import plan_motion
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion
+from rrth_planner.pipeline.request import PlanQuestion
 
 # Waiting for an answer looks at the clock so often [s].
 LONGEST_NAP = 0.5

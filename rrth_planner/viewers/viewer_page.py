@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.model.trajectory import positions_at, Trajectory
-from rrth_planner.question import PlanQuestion
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.viewers.viewer_examples import example_body, example_target
 from rrth_planner.viewers.viewer_geometry import path_curve, tool_positions, trajectory_curve
 from rrth_planner.viewers.viewer_model import Answer, ViewerModel

@@ -11,14 +11,14 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.trajectory_validation import touch_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import grown, World
-from rrth_planner.escape import Escape
 from rrth_planner.model.arm import ArmModel, reach_to
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
-from rrth_planner.refusal import CANCELLED, Refusal
+from rrth_planner.pipeline.collision_escape import Escape
+from rrth_planner.pipeline.rejection import CANCELLED, Refusal
 from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.lead_in import Lead, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError

@@ -12,7 +12,6 @@ from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world, grown, World
-from rrth_planner.escape import Escape, way_out
 from rrth_planner.kernels import jit
 from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
 from rrth_planner.model.arrays import Array
@@ -22,13 +21,10 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import Takeover
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.motion_plan import MotionPlan
-from rrth_planner.path_search import find_path, SPARES
-from rrth_planner.path_timing import time_path
-from rrth_planner.planning.options import TreeOptions
-from rrth_planner.planning.planner import PlanResult
-from rrth_planner.planning.pointing_goals import check_pointing_arm
-from rrth_planner.refusal import (
+from rrth_planner.pipeline.collision_escape import Escape, way_out
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_path import find_path, SPARES
+from rrth_planner.pipeline.rejection import (
     CANCELLED,
     depth_sentence,
     lead_refusal,
@@ -37,6 +33,10 @@ from rrth_planner.refusal import (
     target_refusal,
     within_limits,
 )
+from rrth_planner.pipeline.time_path import time_path
+from rrth_planner.planning.options import TreeOptions
+from rrth_planner.planning.planner import PlanResult
+from rrth_planner.planning.pointing_goals import check_pointing_arm
 from rrth_planner.timing.lead_in import Lead, lead_in, stop_first
 
 # A wearer who holds still makes the same world from plan to plan.

@@ -12,7 +12,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.refusal import CANCELLED, depth_sentence, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Refusal
 from rrth_planner.timing.lead_in import Lead
 from rrth_planner.timing.parameterization import parameterize
 

@@ -12,6 +12,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
+from rrth_planner.pipeline.rejection import CANCELLED, goal_refusal, Refusal
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan, PlanResult
 from rrth_planner.planning.pointing_goals import (
@@ -21,7 +22,6 @@ from rrth_planner.planning.pointing_goals import (
     MANY,
     pointing_problem,
 )
-from rrth_planner.refusal import CANCELLED, goal_refusal, Refusal
 
 # Clearance that the path is planned with on top of the margin, for its rounded corners to spend;
 # in a tight place, next to none [m].
