@@ -13,6 +13,8 @@ from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
 from rrth_planner.collision.reference_checker import bar_box_touch, first_contact
 from rrth_planner.collision.violation import Touch
 from rrth_planner.collision.world import arm_world, grown
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.remaining_motion import is_still_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
@@ -22,9 +24,7 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at, sample
 from rrth_planner.pipeline.plan_path import SPARES
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing.parameterization import parameterize
-from rrth_planner.underway import is_still_free
 from worlds import (
     examples,
     FOLDED,

@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
+from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.running_motion import RunningMotion
 
 
 def _swing():

@@ -4,12 +4,12 @@
 
 import numpy as np
 import pytest
-from rrth_planner.acceptance import accept, PlaybackRules
 from rrth_planner.arm_file import load_arm
+from rrth_planner.execution.acceptance import accept, PlaybackRules
+from rrth_planner.execution.playback import Playback, standing, stop
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.playback import Playback, standing, stop
 from rrth_planner.timing.fast_stop import emergency_stop
 from rrth_planner.timing.parameterization import parameterize
 from worlds import limits

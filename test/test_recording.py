@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import least_clearance
-from rrth_planner.model.errors import RecordError
-from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.recording import (
+from rrth_planner.execution.recording import (
     at,
     brakes,
     clearances_seen,
@@ -20,6 +17,9 @@ from rrth_planner.recording import (
     Told,
     told_at,
 )
+from rrth_planner.model.errors import RecordError
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import sample, Trajectory
 
 ARM = load_arm()
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])

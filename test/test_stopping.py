@@ -5,10 +5,10 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.execution.playback import Playback, stop
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import jerks_at, MotionLimits, sample, Trajectory
-from rrth_planner.playback import Playback, stop
 from rrth_planner.timing.parameterization import parameterize
 from rrth_planner.timing.proven_stop import holds
 from rrth_planner.timing.running import Running

@@ -11,6 +11,13 @@ from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import frames, quintic_states
 from rrth_planner.collision.world import arm_world
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.remaining_motion import (
+    is_place_free,
+    is_still_free,
+    leads_away,
+    taken_over,
+)
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
     joined,
@@ -19,15 +26,8 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
 from rrth_planner.timing.parameterization import limit_ratio
-from rrth_planner.underway import (
-    is_place_free,
-    is_still_free,
-    leads_away,
-    taken_over,
-)
 from worlds import (
     dense_touch,
     examples,

@@ -3,13 +3,13 @@
 """Which motion an arm follows, of those that it was told, and how far it has come."""
 
 import numpy as np
-from rrth_planner.localization import phase_of
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.localization import phase_of
+from rrth_planner.execution.remaining_motion import taken_over
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import REST_SPEED, sample
 from rrth_planner.ros.inputs import Input
 from rrth_planner.ros.joints import JointReading
-from rrth_planner.running_motion import RunningMotion
-from rrth_planner.underway import taken_over
 
 # An arm that stands still that long after the end of its motion is taken to have arrived; where it
 # is nowhere on it for as long, it does something else [s].

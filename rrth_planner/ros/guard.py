@@ -19,6 +19,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.remaining_motion import is_still_free, leads_away
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
@@ -29,9 +31,7 @@ from rrth_planner.ros.inputs import Inputs, out_of_sight
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.publishers import PlanPublishers
 from rrth_planner.ros.reporter import Reporter
-from rrth_planner.running_motion import RunningMotion
 from rrth_planner.timing.fast_stop import emergency_stop
-from rrth_planner.underway import is_still_free, leads_away
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02

@@ -8,7 +8,8 @@ from threading import RLock
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from rrth_planner.localization import sharp_phase_of, takeover
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.localization import sharp_phase_of, takeover
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
@@ -21,7 +22,6 @@ from rrth_planner.ros.error_codes import code_of_refusal, ErrorCode
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.right_of_way import RightOfWay
-from rrth_planner.running_motion import RunningMotion
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].

@@ -12,6 +12,7 @@ from typing import Any
 from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.task import Future
+from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -28,7 +29,6 @@ from rrth_planner.ros.reporter import Reporter
 from rrth_planner.ros.resting import Rest
 from rrth_planner.ros.right_of_way import stand_back
 from rrth_planner.ros.second_opinion import incident_of_stop
-from rrth_planner.running_motion import RunningMotion
 
 # So often is a moment sought to tell a motion in.
 MOST_TRIES = 20

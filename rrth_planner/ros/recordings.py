@@ -11,10 +11,10 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
+from rrth_planner.execution.recording import Recording, Told
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
-from rrth_planner.recording import Recording, Told
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.edits import read_edits
 from rrth_planner.ros.fields import NANOSECONDS, seconds_of

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 import secrets
 
+from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
@@ -19,7 +20,6 @@ from rrth_planner.ros.inputs import ArmHasMoved, Inputs, PlanInputs, RequestErro
 from rrth_planner.ros.last_look import LastLook, require_news
 from rrth_planner.ros.parameters import PlannerParameters
 from rrth_planner.ros.start import LEADS, Start
-from rrth_planner.running_motion import RunningMotion
 
 # How often both judges are asked about a motion before it is told: the wearer may never stand
 # still.

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
+from rrth_planner.execution.executing_motion import LONGEST_LEAD, RunningMotion
 from rrth_planner.model.start_state import Takeover
-from rrth_planner.running_motion import LONGEST_LEAD, RunningMotion
 
 # How far ahead a motion begins that takes over from one that runs: that long its plan may take,
 # and once more with more time [s].

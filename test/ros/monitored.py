@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from rrth_planner.collision import reference_checker
+from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box
 from rrth_planner.model.trajectory import sample, Trajectory
@@ -17,7 +18,6 @@ from rrth_planner.ros.guard import Guard
 from rrth_planner.ros.inputs import Inputs
 from rrth_planner.ros.joints import JointReading
 from rrth_planner.ros.parameters import declare_parameters
-from rrth_planner.running_motion import RunningMotion
 import worlds
 
 ARM = worlds.table_1_arm()

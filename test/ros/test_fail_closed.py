@@ -15,6 +15,7 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
+from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros import followed, guard  # noqa: E402
 from rrth_planner.ros.bodies import WearerBody  # noqa: E402
@@ -23,7 +24,6 @@ from rrth_planner.ros.guard import Guard  # noqa: E402
 from rrth_planner.ros.inputs import Input  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.profiles import LEASE  # noqa: E402
-from rrth_planner.running_motion import RunningMotion  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 PACKAGE = str(Path(rrth_planner.__file__).parent)

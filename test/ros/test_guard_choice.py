@@ -15,12 +15,12 @@ from monitored import ARM, FAR, Monitored, PHASE  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
+from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import BodyPart  # noqa: E402
 from rrth_planner.ros.guard import Guard, Watch  # noqa: E402
-from rrth_planner.running_motion import RunningMotion  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 

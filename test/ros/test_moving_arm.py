@@ -14,6 +14,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
+from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros import start  # noqa: E402
@@ -26,7 +27,6 @@ from rrth_planner.ros.last_look import LastLook, require_news  # noqa: E402
 from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.requests import plan_request  # noqa: E402
 from rrth_planner.ros.start import EARLY, LEADS  # noqa: E402
-from rrth_planner.running_motion import RunningMotion  # noqa: E402
 from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 import worlds  # noqa: E402
 

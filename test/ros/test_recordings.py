@@ -13,10 +13,10 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.execution.recording import brakes  # noqa: E402
 from rrth_planner.model.arm import ArmModel  # noqa: E402
 from rrth_planner.model.errors import RecordError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.recording import brakes  # noqa: E402
 from rrth_planner.ros.recorder import RecordingFile  # noqa: E402
 from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402

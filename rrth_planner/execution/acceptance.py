@@ -5,12 +5,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.execution.playback import at_present, Playback
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.bernstein import first_outside, to_bernstein
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
-from rrth_planner.playback import at_present, Playback
 
 # Planned limits may be touched; a motion is refused when it goes further than this beyond them.
 EXCESS = 0.01

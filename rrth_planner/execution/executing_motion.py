@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
+from rrth_planner.execution.localization import SAME_POSITION
 from rrth_planner.kernels.trajectory.quintics import time_on
-from rrth_planner.localization import SAME_POSITION
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import (
     piece_coefficients,

@@ -9,6 +9,7 @@ from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import leads_out
 from rrth_planner.collision.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
+from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -21,7 +22,6 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.running_motion import RunningMotion
 
 # Where one motion takes over from another their states are the same: positions, velocities and
 # accelerations to rounding [rad, rad/s, rad/s^2].
