@@ -5,10 +5,10 @@
 from collections.abc import Mapping
 
 import numpy as np
-from rrth_planner.arm_file import arm_from_mapping
+from rrth_planner.io.arm_file import arm_from_mapping
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 QUARTER = 0.5 * np.pi
 # type, alpha [rad], a [m], offset [rad], d [m], lower, upper [rad or m] of each joint; then alpha

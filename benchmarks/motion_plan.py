@@ -11,14 +11,14 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline import time_path
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 from rrth_planner.timing.corner_blends import Blend
 from rrth_planner.timing.parameterization import parameterize
 

@@ -9,9 +9,11 @@ import json
 from pathlib import Path
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.world import arm_world, World
-from rrth_planner.map_file import map_from_mapping
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import map_from_mapping
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
@@ -20,8 +22,6 @@ from rrth_planner.planning.box_map import BoxMap, map_problem
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.visibility_graph import shortest_path
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 from benchmarks import judge
 

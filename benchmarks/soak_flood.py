@@ -9,7 +9,7 @@ import sys
 import time
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.ros.child_process import ChildProcess
 from tqdm import tqdm
 

@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 from rclpy.serialization import deserialize_message
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import bars
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import sample, Trajectory

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene

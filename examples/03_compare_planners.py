@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from rrth_planner.campaign.paper_runs import ALGORITHMS, FIVE
 from rrth_planner.campaign.problems import load_problem
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.visibility_graph import shortest_path

@@ -3,11 +3,11 @@
 """Plan a motion of the arm round its wearer: timed, proven and checked, as the node does."""
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-from rrth_planner.settings import load_settings
-from rrth_planner.wearer_file import load_body
 
 arm, wearer = load_arm(), load_body()
 settings = load_settings(arm.dof)

@@ -10,7 +10,12 @@ import sys
 from typing import Any
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings, PlanSettings
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.arm import ArmModel, tool_pose
@@ -18,13 +23,8 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.motion_files import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings, PlanSettings
-from rrth_planner.text_files import load_yaml
-from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 2**31

@@ -8,13 +8,13 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
+from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
+from rrth_planner.io.urdf.chain import RAYS, read_chain
+from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError, one_line, RrthError
 from rrth_planner.model.rotation import pose_matrix
 from rrth_planner.planning.pointing_goals import check_pointing_arm
-from rrth_planner.urdf_chain import RAYS, read_chain
-from rrth_planner.urdf_import import import_chain, ImportedArm
 
 # Bars this much longer than all links together are no links.
 LONG = 2.0

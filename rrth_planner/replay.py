@@ -11,8 +11,8 @@ import traceback
 
 import numpy as np
 from rrth_planner.collision.checker_comparison import Verdict, verdict_of
-from rrth_planner.incident import Incident, IncidentKind, versions
-from rrth_planner.incident_files import read_incident
+from rrth_planner.io.incident import Incident, IncidentKind, versions
+from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan

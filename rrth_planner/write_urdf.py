@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.urdf.export import arm_to_urdf
 from rrth_planner.model.errors import ModelError, RrthError
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings
-from rrth_planner.text_files import load_yaml
-from rrth_planner.urdf import arm_to_urdf
 
 DESCRIPTION = """\
 Write an arm as a URDF, from the same DH rows that the planner plans with: a link for each frame,

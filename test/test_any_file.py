@@ -11,15 +11,15 @@ import warnings
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.arm_file import load_arm
-from rrth_planner.incident_files import incident_to_yaml, read_incident
-from rrth_planner.map_file import load_map
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.incident_file import incident_to_yaml, read_incident
+from rrth_planner.io.map_file import load_map
+from rrth_planner.io.motion_file import read_motion, write_motion
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.text_file import load_yaml, parse_yaml, to_yaml
+from rrth_planner.io.wearer_file import load_body, load_wearer
 from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
-from rrth_planner.motion_files import read_motion, write_motion
-from rrth_planner.settings import load_settings
-from rrth_planner.text_files import load_yaml, parse_yaml, to_yaml
-from rrth_planner.wearer_file import load_body, load_wearer
 from test_incident import disagreement
 from test_motion_files import random_motion
 from worlds import examples
@@ -49,8 +49,8 @@ def motion(folder, suffix):
 def read_chain(path):
     """Return the arm of a URDF."""
     pytest.importorskip('yourdfpy')
-    from rrth_planner.urdf_chain import read_chain
-    from rrth_planner.urdf_import import import_chain
+    from rrth_planner.io.urdf.chain import read_chain
+    from rrth_planner.io.urdf.import_chain import import_chain
 
     return import_chain(read_chain(path, ray='+x'), np.eye(4), 0.02)
 

@@ -4,13 +4,13 @@
 
 import numpy as np
 import pytest
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import load_body, scene_from_mapping
 from rrth_planner.model.errors import OptionsError, RrthError, SceneError
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.planning.options import RRTOptions
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings
-from rrth_planner.text_files import load_yaml
-from rrth_planner.wearer_file import load_body, scene_from_mapping
 
 GOOD = {'name': 'torso', 'center': [0.0, 0.0, 0.1], 'size': [0.3, 0.4, 0.6]}
 

@@ -4,14 +4,14 @@
 
 import numpy as np
 import pytest
+from rrth_planner.io.map_file import map_from_mapping
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.kernels.layout import MAX_DOF
-from rrth_planner.map_file import map_from_mapping
 from rrth_planner.model.errors import RrthError, SceneError
 from rrth_planner.planning.box_map import BoxMap, map_problem
 from rrth_planner.planning.options import RRTHOptions, RRTOptions, RRTStarOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.visibility_graph import enters, extended_obstacles, shortest_path
-from rrth_planner.text_files import load_yaml
 
 GATE = """
 name: gate

@@ -11,7 +11,6 @@ pa = pytest.importorskip('pyarrow')
 pytest.importorskip('tqdm')
 
 import pyarrow.parquet as pq
-from rrth_planner.arm_file import load_arm
 from rrth_planner.campaign import cluster
 from rrth_planner.campaign.cluster import cluster_client, run_campaign
 from rrth_planner.campaign.escape_claims import both_ways_shares
@@ -31,7 +30,8 @@ from rrth_planner.campaign.runs import execute, Run
 from rrth_planner.campaign.statistics import histories_on, Rows
 from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
 from rrth_planner.campaign.table_1 import is_the_papers
-from rrth_planner.map_file import load_map
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.visibility_graph import shortest_path
 

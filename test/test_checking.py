@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene

@@ -4,17 +4,17 @@
 
 import numpy as np
 import pytest
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings
-from rrth_planner.wearer_file import load_body
 
 URDF, ARM, BODY = (
     f'config/examples/{name}' for name in ('chest_arm.urdf', 'chest_arm.yaml', 'seated_body.yaml')

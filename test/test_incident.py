@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.collision.violation import Disagreement, Touch
-from rrth_planner.incident import (
+from rrth_planner.io.incident import (
     disagreement_incident,
     error_incident,
     Incident,
@@ -18,12 +18,13 @@ from rrth_planner.incident import (
     incident_to_mapping,
     IncidentKind,
 )
-from rrth_planner.incident_files import (
+from rrth_planner.io.incident_file import (
     incident_to_yaml,
     MOST_FILES,
     read_incident,
     write_incident,
 )
+from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
@@ -31,7 +32,6 @@ from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
-from rrth_planner.text_files import parse_yaml
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 import yaml
 

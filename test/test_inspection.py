@@ -4,8 +4,8 @@
 
 import numpy as np
 import pytest
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.motion_inspection import inspect_motion, UnsafeMotionError
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory

@@ -28,9 +28,9 @@ from rrth_planner import (
     sample,
     Scene,
 )
+from rrth_planner.io.settings import load_settings
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.pipeline.plan_motion import plan_motion
-from rrth_planner.settings import load_settings
 
 ROOT, FILE = Path(__file__).parent.parent, Path(__file__).with_suffix('.csv')
 MARGIN, RAY = 0.02, 1.0

@@ -10,8 +10,8 @@ from types import ModuleType
 from xml.etree import ElementTree
 
 import pytest
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 import yaml
 
 ROOT = Path(__file__).parent.parent

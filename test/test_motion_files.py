@@ -6,10 +6,10 @@ import csv
 
 import numpy as np
 import pytest
+from rrth_planner.io.motion_file import JointMotion, motion_of, read_motion, sampled, write_motion
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.trajectory import positions_at, Trajectory
-from rrth_planner.motion_files import JointMotion, motion_of, read_motion, sampled, write_motion
-from rrth_planner.text_files import load_yaml
 import worlds
 
 NUMBERS = ('times', 'positions', 'velocities', 'accelerations')

@@ -11,20 +11,20 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PointStamped  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.collision.motion_inspection import inspect_motion  # noqa: E402
 from rrth_planner.collision.reference_checker import first_contact  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits  # noqa: E402
 from rrth_planner.pipeline.plan_motion import plan_motion  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.joints import configuration_from_msg
 from rrth_planner.ros.message_files import message_from_file  # noqa: E402
-from rrth_planner.text_files import load_yaml
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 

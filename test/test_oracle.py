@@ -4,8 +4,8 @@
 
 from hypothesis import assume, given, settings, strategies as st
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import bar_box_touch, bars, frames, quintic_states
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.trajectory import sample, Trajectory

@@ -10,14 +10,14 @@ import pytest
 pytest.importorskip('fcl')
 
 from rrth_planner import plan_files
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.motion_file import read_motion
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.trajectory import positions_at
-from rrth_planner.motion_files import read_motion
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
-from rrth_planner.wearer_file import load_body
 
 TARGET = ['--target', '1.5', '0.8', '0.6']
 FOLDED = load_yaml(resource_path('config/playback.yaml'))['/**']['ros__parameters'][

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from rrth_planner.collision import reference_checker
 from rrth_planner.collision.world import arm_world
-from rrth_planner.map_file import map_from_mapping
+from rrth_planner.io.map_file import map_from_mapping
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning import rrt_star
 from rrth_planner.planning.box_map import BoxMap, map_problem, map_world
@@ -25,8 +27,6 @@ from rrth_planner.planning.options import (
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.visibility_graph import shortest_path
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 import worlds
 
 COMMON = {'time_limit': 60.0, 'max_samples': 1500}

@@ -12,7 +12,7 @@ pytest.importorskip('matplotlib')
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, Trajectory  # noqa: E402

@@ -11,15 +11,15 @@ import pytest
 yourdfpy = pytest.importorskip('yourdfpy')
 
 from rrth_planner import read_urdf
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import bars, frames
-from rrth_planner.dh_rows import rows_of_axes
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.urdf.chain import RAYS, read_chain
+from rrth_planner.io.urdf.dh_parameters import rows_of_axes
+from rrth_planner.io.urdf.import_chain import import_chain
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import pose_matrix
-from rrth_planner.resources import resource_path
-from rrth_planner.urdf_chain import RAYS, read_chain
-from rrth_planner.urdf_import import import_chain
 from urdf_texts import joint, random_urdf, urdf
 
 TURN = {'axis': {'xyz': '0 0 1'}, 'limit': {'lower': '-1', 'upper': '1'}}

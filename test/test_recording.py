@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import least_clearance
 from rrth_planner.execution.recording import (
     at,
@@ -17,6 +16,7 @@ from rrth_planner.execution.recording import (
     Told,
     told_at,
 )
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import RecordError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory

@@ -7,9 +7,9 @@ import re
 from xml.etree import ElementTree
 
 import pytest
-from rrth_planner.arm_file import load_arm
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 import yaml
 
 TEXT = (Path(__file__).parent.parent / 'docs' / 'ros_control.md').read_text(encoding='utf-8')

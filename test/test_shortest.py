@@ -7,12 +7,12 @@ import math
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.map_file import map_from_mapping
+from rrth_planner.io.map_file import map_from_mapping
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import SceneError
 from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.planning.visibility_graph import enters, extended_obstacles, shortest_path
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 from worlds import examples
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from hypothesis import given, strategies as st
 import pytest
-from rrth_planner.model.errors import ModelError
-from rrth_planner.text_files import (
+from rrth_planner.io.text_file import (
     DEEPEST,
     load_xml,
     load_yaml,
@@ -19,6 +18,7 @@ from rrth_planner.text_files import (
     read_bytes,
     to_yaml,
 )
+from rrth_planner.model.errors import ModelError
 from worlds import examples
 import yaml
 

@@ -8,9 +8,9 @@ import warnings
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.world import arm_world, grown
+from rrth_planner.io.arm_file import arm_from_mapping
 from rrth_planner.kernels.collision import arm_validity
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import FARTHEST, frozen_array
@@ -423,7 +423,7 @@ def test_every_array_of_every_value_is_read_only():
 
 
 def test_the_paper_arm_is_the_one_in_the_package():
-    resources = pytest.importorskip('rrth_planner.resources', exc_type=ImportError)
+    resources = pytest.importorskip('rrth_planner.io.resources', exc_type=ImportError)
     packaged, own = resources.load_arm(), table_1_arm()
     assert packaged.joint_names == own.joint_names
     for name in ('dh', 'bounds', 'radii', 'T_base_mount'):
@@ -432,7 +432,7 @@ def test_the_paper_arm_is_the_one_in_the_package():
 
 @pytest.mark.parametrize('before', ['', '\ufeff', '\n <!-- an arm: -->\n'])
 def test_a_urdf_is_no_arm_file_and_is_sent_to_read_urdf(tmp_path, before):
-    resources = pytest.importorskip('rrth_planner.resources', exc_type=ImportError)
+    resources = pytest.importorskip('rrth_planner.io.resources', exc_type=ImportError)
     file = tmp_path / 'arm.yaml'
     file.write_text(f'{before}<robot name="a"><link name="b"/></robot>', encoding='utf-8')
     words = (f'file {file}: XML, as a URDF is', 'read_urdf writes one')

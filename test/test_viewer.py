@@ -13,14 +13,15 @@ import pytest
 pytest.importorskip('fcl')
 pytest.importorskip('viser')
 
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.result import Tree
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings
 from rrth_planner.viewers.viewer import _served, main
 from rrth_planner.viewers.viewer_examples import (
     BODIES,
@@ -33,7 +34,6 @@ from rrth_planner.viewers.viewer_geometry import along_z, path_curve, tree_segme
 from rrth_planner.viewers.viewer_model import ViewerModel
 from rrth_planner.viewers.viewer_panel import answer_html
 from rrth_planner.viewers.viewer_player import Player
-from rrth_planner.wearer_file import load_body
 
 WAIT = 120.0
 ARM = load_arm()

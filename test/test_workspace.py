@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rrth_planner.io.map_file import load_map
 from rrth_planner.kernels.search import rrt_h
-from rrth_planner.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus

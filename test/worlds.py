@@ -7,9 +7,9 @@ import functools
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.arm_file import arm_from_mapping
 from rrth_planner.collision.reference_checker import bars
 from rrth_planner.collision.world import arm_world, robot_rows, World
+from rrth_planner.io.arm_file import arm_from_mapping
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.reach import bar_ends

@@ -18,7 +18,7 @@ from rrth_planner.campaign.paper_runs import (
 )
 from rrth_planner.campaign.problems import CERTIFIED
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.visibility_graph import shortest_path
 

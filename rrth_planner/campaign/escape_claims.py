@@ -15,7 +15,7 @@ from rrth_planner.campaign.paper_runs import (
 )
 from rrth_planner.campaign.plane_claims import verdict
 from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.planning.visibility_graph import shortest_path
 
 # A path this much over the shortest one goes round the better side.

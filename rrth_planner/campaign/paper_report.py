@@ -4,7 +4,6 @@
 
 from collections.abc import Mapping, Sequence
 
-from rrth_planner.arm_file import load_arm
 from rrth_planner.campaign.arm_claims import (
     arm_table,
     long_table,
@@ -24,6 +23,7 @@ from rrth_planner.campaign.plane_claims import goal_bias_table, plane_claims, pl
 from rrth_planner.campaign.problems import MARGIN, RAY
 from rrth_planner.campaign.statistics import markdown_table, Rows
 from rrth_planner.campaign.table_1 import table_1, table_1_claim
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.kernels.collision.arm_sampled import POINTS_PER_BAR
 
 

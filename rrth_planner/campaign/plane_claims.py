@@ -36,7 +36,7 @@ from rrth_planner.campaign.statistics import (
     share_of,
     spread,
 )
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.planning.visibility_graph import shortest_path
 
 OTHERS = (RRT_STAR, INFORMED, SMART)

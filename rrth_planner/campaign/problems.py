@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world, World
-from rrth_planner.map_file import load_map
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import load_map
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError, SceneError
@@ -22,8 +24,6 @@ from rrth_planner.planning.edge_checks import by_check_points, sampled
 from rrth_planner.planning.pointing_goals import check_pointing_arm, goal_configurations, MANY
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.visibility_graph import enters, extended_obstacles
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 CERTIFIED = 'certified'
 # Eight points round the wearer [m]; from the folded state none is reached by a straight edge.

@@ -5,12 +5,12 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import scene_from_mapping
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Scene
 from rrth_planner.ros.message_files import message_from_mapping
-from rrth_planner.text_files import load_yaml
-from rrth_planner.wearer_file import scene_from_mapping
 from visualization_msgs.msg import Marker, MarkerArray
 
 COLOR = (0.85, 0.65, 0.55, 0.8)

@@ -16,19 +16,19 @@ from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.arm_file import load_arm
 from rrth_planner.collision.motion_inspection import inspect_motion
 from rrth_planner.collision.reference_checker import first_contact, least_clearance
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.resources import resource_path
 from rrth_planner.ros.bodies import scene_of, WearerBody
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.demo_client import DemoClient, DemoError
 from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.message_files import message_from_file
-from rrth_planner.text_files import load_yaml
 from rrth_planner.viewers.plots import Motion, motion_figure
 from visualization_msgs.msg import MarkerArray
 

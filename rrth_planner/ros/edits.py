@@ -8,6 +8,7 @@ import math
 from typing import Any
 
 import numpy as np
+from rrth_planner.io.wearer_file import LONGEST_TEXT
 from rrth_planner.kernels.collision.boxes import first_bad as first_bad_row, place, POSED
 from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
@@ -15,7 +16,6 @@ from rrth_planner.model.errors import MessageError, one_line, SceneError
 from rrth_planner.model.scene import Box
 from rrth_planner.ros.fields import seconds_of, triple_of, unit_quaternion_of
 from rrth_planner.ros.frames import FrameError, Lookup, pose_in_base
-from rrth_planner.wearer_file import LONGEST_TEXT
 from visualization_msgs.msg import Marker, MarkerArray
 
 # More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.

@@ -12,9 +12,9 @@ from rosidl_parser.definition import (  # type: ignore[import-untyped]
     AbstractNestedType,
     NamespacedType,
 )
-from rrth_planner.entries import sequence, text, whole
+from rrth_planner.io.entries import sequence, text, whole
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import MessageError, shown
-from rrth_planner.text_files import load_yaml
 
 Message = TypeVar('Message')
 # Of the integers of messages; rclpy itself takes any, and fails when it sends them.

@@ -9,13 +9,13 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 from rrth_planner.ros.declaring import ARM, declare, refuse_unknown, Setting
-from rrth_planner.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from rclpy.node import Node
-from rrth_planner.arm_file import load_arm
 from rrth_planner.execution.acceptance import PlaybackRules
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError

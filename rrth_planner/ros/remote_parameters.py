@@ -7,7 +7,7 @@ from typing import Any
 
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.declaring import ARM
 from rrth_planner.ros.parameters import declared, parameters_from_values, PlannerParameters

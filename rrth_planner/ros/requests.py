@@ -8,7 +8,7 @@ from functools import partial
 import secrets
 
 from rrth_planner.execution.executing_motion import RunningMotion
-from rrth_planner.incident import disagreement_incident, Incident
+from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from rrth_planner.collision.fcl_checker import first_touch
 from rrth_planner.collision.violation import Disagreement
-from rrth_planner.incident import disagreement_incident, Incident
+from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory

@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 import numpy as np
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
 from rrth_planner.model.scene import Scene
 from rrth_planner.viewers.arm_view import arm_points
-from rrth_planner.wearer_file import load_body
 
 DESCRIPTION = """\
 Draw the frames that docs/conventions.md names: left on the wearer, right along the arm.

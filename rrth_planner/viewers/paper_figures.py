@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 import numpy as np
 from rrth_planner.campaign.paper_runs import FIVE, RRT, RRT_H
 from rrth_planner.campaign.statistics import histories_on, quartiles, Rows
-from rrth_planner.map_file import load_map
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.visibility_graph import shortest_path
 

@@ -8,7 +8,6 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.campaign.escape import scattered_growths
 from rrth_planner.campaign.escape_claims import both_ways_shares
 from rrth_planner.campaign.paper_runs import (
@@ -33,7 +32,8 @@ from rrth_planner.campaign.problems import (
     TARGETS,
 )
 from rrth_planner.campaign.statistics import Rows
-from rrth_planner.map_file import load_map
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path as JointPath
 from rrth_planner.planning.planner import plan

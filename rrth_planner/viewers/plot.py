@@ -10,19 +10,19 @@ import sys
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.arm_file import load_arm
 from rrth_planner.execution.recording import section
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings, PlanSettings
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-from rrth_planner.resources import resource_path
-from rrth_planner.settings import load_settings, PlanSettings
-from rrth_planner.text_files import load_yaml
 from rrth_planner.viewers.plots import Motion, motion_figure
 from rrth_planner.viewers.recording_figure import recording_figure
-from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')

@@ -11,10 +11,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.execution.recording import at, brakes, clearances_seen, Recording, told_at
+from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.settings import PlanSettings
 from rrth_planner.viewers.arm_view import arm_points, draw_way, N_POSTURES, STOP
 from rrth_planner.viewers.line_of_sight import best_view
 from rrth_planner.viewers.plots import DASHES, draw_limits, JOINT_COLOURS, LIMIT, TIME_STEP

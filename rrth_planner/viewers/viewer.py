@@ -15,18 +15,18 @@ import sys
 from typing import Any, NoReturn
 import webbrowser
 
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.settings import load_settings
+from rrth_planner.io.text_file import parse_yaml
+from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.plan_motion import warm_up
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.settings import load_settings
-from rrth_planner.text_files import parse_yaml
 from rrth_planner.viewers.viewer_examples import example_target, start_of
 from rrth_planner.viewers.viewer_picture import save_picture
-from rrth_planner.wearer_file import load_wearer, WEARER_HELP
 
 ROS_ARGS = '--ros-args'
 PORT = 8081

@@ -3,14 +3,14 @@
 """Bodies, targets and a start from the example messages, read as plain YAML, without ROS."""
 
 import numpy as np
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.wearer_file import load_wearer
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
-from rrth_planner.wearer_file import load_wearer
 
 BODIES = ('body', 'body_arm_raised')
 TARGETS = ('front', 'left', 'high', 'behind', 'low')

@@ -11,13 +11,13 @@ pytest.importorskip('fcl')
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.collision.reference_checker import first_contact  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.wearer_file import load_body  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

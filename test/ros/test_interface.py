@@ -18,7 +18,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.ros import frames, requests  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402

@@ -13,12 +13,18 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.text_file import (  # noqa: E402
+    DEEPEST,
+    MOST_BYTES as FILE_BYTES,
+    MOST_VALUES,
+)
+from rrth_planner.io.wearer_file import LONGEST_TEXT  # noqa: E402
 from rrth_planner.model.arrays import FARTHEST  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.edits import (  # noqa: E402
@@ -37,12 +43,6 @@ from rrth_planner.ros.trajectories import (
     joint_trajectory_from_msg,
     MOST_POINTS,  # noqa: E402
 )
-from rrth_planner.text_files import (  # noqa: E402
-    DEEPEST,
-    MOST_BYTES as FILE_BYTES,
-    MOST_VALUES,
-)
-from rrth_planner.wearer_file import LONGEST_TEXT  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402

@@ -10,17 +10,17 @@ pytest.importorskip('rclpy')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import ModelError, OptionsError  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.declaring import ARM  # noqa: E402
 from rrth_planner.ros.parameters import (  # noqa: E402
     current_parameters,
     declare_parameters,
     declared,
 )
-from rrth_planner.text_files import load_yaml
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NAN = float('nan')

@@ -26,10 +26,10 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
-from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Touch  # noqa: E402
-from rrth_planner.incident_files import read_incident  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
 from rrth_planner.ros.catching_up import CatchUp  # noqa: E402

@@ -18,15 +18,15 @@ from rcl_interfaces.msg import Log  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.rotation import rotation_matrix  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 from rrth_planner.ros.playback_parameters import SETTINGS  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
-from rrth_planner.text_files import load_yaml
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402

@@ -19,11 +19,12 @@ pytest.importorskip('tqdm')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
 from rrth_planner.ros import point_at  # noqa: E402
 from rrth_planner.ros.answers import answer_from_text  # noqa: E402
 from rrth_planner.ros.arrival import announced_motion, follow  # noqa: E402
@@ -34,7 +35,6 @@ from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient  # noqa: E402
 from rrth_planner.ros.subscriptions import Arrival  # noqa: E402
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg
-from rrth_planner.wearer_file import load_body  # noqa: E402
 from samples import FOLDED, joints  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402

@@ -24,7 +24,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.definitions import definition_of, type_name  # noqa: E402
 from rrth_planner.ros.record import TOPICS  # noqa: E402

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # n
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.arm_file import load_arm  # noqa: E402
 from rrth_planner.execution.recording import brakes  # noqa: E402
+from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import ArmModel  # noqa: E402
 from rrth_planner.model.errors import RecordError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402

@@ -10,9 +10,9 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
-from rrth_planner.resources import resource_path  # noqa: E402
+from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.text_files import load_yaml
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NODE, NAMESPACE = 'rrth_planner', '/in_rviz'

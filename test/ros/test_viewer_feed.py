@@ -14,7 +14,7 @@ pytest.importorskip('fcl')
 from conftest import spinning, wait_until
 from rclpy.node import Node
 from rclpy.task import Future
-from rrth_planner.arm_file import load_arm
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.planner_node import PlannerNode

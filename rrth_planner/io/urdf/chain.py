@@ -13,9 +13,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from rrth_planner.io.text_file import load_xml
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
-from rrth_planner.text_files import load_xml
 
 # An installation by colcon does not bring them, which is said when a file is to be read.
 with suppress(ImportError):

@@ -14,12 +14,8 @@ import platform
 from typing import Any
 
 from rrth_planner.collision.violation import Disagreement, Touch
-from rrth_planner.entries import number, text
-from rrth_planner.model.errors import one_line, RecordError, shown
-from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.records import (
+from rrth_planner.io.entries import number, text
+from rrth_planner.io.serialization import (
     fields_of,
     plain,
     question_from_mapping,
@@ -27,6 +23,10 @@ from rrth_planner.records import (
     touch_from_mapping,
     trajectory_from_mapping,
 )
+from rrth_planner.model.errors import one_line, RecordError, shown
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.request import PlanQuestion
 
 # Of the layout of a record; another one is refused.
 FORMAT = 1

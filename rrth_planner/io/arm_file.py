@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.entries import mapping, number, sequence
+from rrth_planner.io.entries import mapping, number, sequence
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel, ROW
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import parse_yaml, read_text, to_yaml
 
 LAYOUT = (
     'Modified Denavit-Hartenberg parameters (Craig), '

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.collision.violation import Touch
-from rrth_planner.entries import mapping, number, sequence, whole
+from rrth_planner.io.entries import mapping, number, sequence, whole
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, RecordError, shown

@@ -5,12 +5,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from rrth_planner.dh_rows import rows_of_axes
-from rrth_planner.link_cover import cover_radii
+from rrth_planner.io.urdf.chain import UrdfChain
+from rrth_planner.io.urdf.dh_parameters import rows_of_axes
+from rrth_planner.io.urdf.link_radii import cover_radii
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
-from rrth_planner.urdf_chain import UrdfChain
 
 # Configurations at which an arm is compared with its URDF.
 N_COMPARED = 50

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.entries import mapping, sequence
+from rrth_planner.io.entries import mapping, sequence
+from rrth_planner.io.text_file import MOST_VALUES, parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import printable, RecordError, RrthError, shown
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.text_files import MOST_VALUES, parse_yaml, read_text, to_yaml
 
 SERIES = ('positions', 'velocities', 'accelerations')
 # Units of these, by that of the joint.

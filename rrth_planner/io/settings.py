@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.entries import number, text, whole
+from rrth_planner.io.entries import number, text, whole
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
 LENGTHS = ('margin', 'ray_guard_length', 'escape_depth')

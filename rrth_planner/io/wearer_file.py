@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rrth_planner.entries import mapping, sequence, text, whole
+from rrth_planner.io.entries import mapping, sequence, text, whole
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arrays import FARTHEST, frozen_array
 from rrth_planner.model.errors import one_line, printable, SceneError, shown
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 # Shorter quaternions are none.

@@ -7,9 +7,9 @@ import os
 from pathlib import Path
 import uuid
 
-from rrth_planner.incident import Incident, incident_from_mapping, incident_to_mapping
+from rrth_planner.io.incident import Incident, incident_from_mapping, incident_to_mapping
+from rrth_planner.io.text_file import load_yaml, to_yaml
 from rrth_planner.model.errors import RecordError, RrthError
-from rrth_planner.text_files import load_yaml, to_yaml
 
 MOST_FILES = 100
 PATTERN = 'incident-*.yaml'

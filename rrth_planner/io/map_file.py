@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
 from rrth_planner.planning.box_map import BoxMap
-from rrth_planner.resources import resource_path
-from rrth_planner.text_files import load_yaml
 
 # What a mapping that describes a map may say.
 ENTRIES = ('name', 'bounds', 'rectangles', 'boxes', 'start', 'goal')
