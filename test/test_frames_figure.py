@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.viewers.frames_figure import frames_figure, main
+from rrth_planner.visualization.frames_figure import frames_figure, main
 from worlds import random_chain
 
 NAMES = ['mount: frame 0', *(f'frame {i}: joint_{i}' for i in range(1, 5)), 'tool', 'pointing ray']

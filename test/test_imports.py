@@ -50,8 +50,8 @@ LATE = {
     ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
     ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
     ('rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_live'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.viewers.viewer_page'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.live_page'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.page'),
 }
 
 

@@ -13,7 +13,7 @@ from rrth_planner.io.settings import load_settings  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.viewers.plot import main  # noqa: E402
-from rrth_planner.viewers.recording_figure import recording_figure  # noqa: E402
+from rrth_planner.visualization.recording_figure import recording_figure  # noqa: E402
 
 ARM = load_arm()
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])

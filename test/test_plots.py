@@ -16,9 +16,9 @@ from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, Trajectory  # noqa: E402
-from rrth_planner.viewers import arm_view  # noqa: E402
-from rrth_planner.viewers.arm_view import arm_points, draw_way  # noqa: E402
-from rrth_planner.viewers.plots import (  # noqa: E402
+from rrth_planner.visualization import arm_view  # noqa: E402
+from rrth_planner.visualization.arm_view import arm_points, draw_way  # noqa: E402
+from rrth_planner.visualization.motion_figure import (  # noqa: E402
     draw_limits,
     JOINT_COLOURS,
     LIMIT,

@@ -23,17 +23,17 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.result import Tree
 from rrth_planner.viewers.viewer import _served, main
-from rrth_planner.viewers.viewer_examples import (
+from rrth_planner.visualization.viewer.curves import along_z, path_curve, tree_segments
+from rrth_planner.visualization.viewer.examples import (
     BODIES,
     example_body,
     example_target,
     start_of,
     TARGETS,
 )
-from rrth_planner.viewers.viewer_geometry import along_z, path_curve, tree_segments
-from rrth_planner.viewers.viewer_model import ViewerModel
-from rrth_planner.viewers.viewer_panel import answer_html
-from rrth_planner.viewers.viewer_player import Player
+from rrth_planner.visualization.viewer.panel import answer_html
+from rrth_planner.visualization.viewer.planning_worker import ViewerModel
+from rrth_planner.visualization.viewer.player import Player
 
 WAIT = 120.0
 ARM = load_arm()
@@ -261,9 +261,9 @@ def test_a_port_that_is_taken_is_one_sentence(capsys):
 
 
 def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):
-    from rrth_planner.viewers import viewer_picture
+    from rrth_planner.visualization.viewer import screenshot
 
     pytest.importorskip('playwright')
-    monkeypatch.setattr(viewer_picture, 'find_browser', lambda: None)
+    monkeypatch.setattr(screenshot, 'find_browser', lambda: None)
     with pytest.raises(OptionsError, match='no browser found'):
-        viewer_picture.save_picture('http://127.0.0.1:9', tmp_path / 'a.png')
+        screenshot.save_picture('http://127.0.0.1:9', tmp_path / 'a.png')

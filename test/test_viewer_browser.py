@@ -14,7 +14,7 @@ pytest.importorskip('viser')
 pytest.importorskip('playwright')
 image = pytest.importorskip('matplotlib.image')
 
-from rrth_planner.viewers.viewer_picture import find_browser, opened  # noqa: E402
+from rrth_planner.visualization.viewer.screenshot import find_browser, opened  # noqa: E402
 
 pytestmark = [
     pytest.mark.slow,

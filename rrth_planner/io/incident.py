@@ -202,7 +202,7 @@ def _version(package: str) -> str:
 def _digest_of_sources() -> str:
     """Return a short digest of this package: without a version, or between two."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.rglob('*.py')):
+    for file in sorted(Path(__file__).parents[1].rglob('*.py')):
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 

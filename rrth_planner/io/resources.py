@@ -23,7 +23,7 @@ def resource_path(name: str) -> Path:
         It is neither beside the package nor in the share folder of an installation.
 
     """
-    folders = [Path(__file__).parent.parent, *_share_folders()]
+    folders = [Path(__file__).parents[2], *_share_folders()]
     for folder in folders:
         if (folder / name).is_file():
             return folder / name

@@ -29,7 +29,7 @@ from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.demo_client import DemoClient, DemoError
 from rrth_planner.ros.goals import goal_from_msg
 from rrth_planner.ros.message_files import message_from_file
-from rrth_planner.viewers.plots import Motion, motion_figure
+from rrth_planner.visualization.motion_figure import Motion, motion_figure
 from visualization_msgs.msg import MarkerArray
 
 POINTING_TOLERANCE = 1e-3

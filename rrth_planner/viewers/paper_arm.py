@@ -12,8 +12,8 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.viewers.arm_view import draw_motion
-from rrth_planner.viewers.plots import JOINT_COLOURS
+from rrth_planner.visualization.arm_view import draw_motion
+from rrth_planner.visualization.motion_figure import JOINT_COLOURS
 
 Pair = tuple[Path, Path]
 NAMES = ('RRT', 'RRT-H')

@@ -21,8 +21,8 @@ from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-from rrth_planner.viewers.plots import Motion, motion_figure
-from rrth_planner.viewers.recording_figure import recording_figure
+from rrth_planner.visualization.motion_figure import Motion, motion_figure
+from rrth_planner.visualization.recording_figure import recording_figure
 
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')

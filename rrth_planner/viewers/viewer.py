@@ -25,8 +25,8 @@ from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.plan_motion import warm_up
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.viewers.viewer_examples import example_target, start_of
-from rrth_planner.viewers.viewer_picture import save_picture
+from rrth_planner.visualization.viewer.examples import example_target, start_of
+from rrth_planner.visualization.viewer.screenshot import save_picture
 
 ROS_ARGS = '--ros-args'
 PORT = 8081
@@ -106,7 +106,7 @@ def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
 
 def _run_planning(options: argparse.Namespace) -> None:
     """Serve the page that plans itself."""
-    from rrth_planner.viewers.viewer_page import ViewerPage
+    from rrth_planner.visualization.viewer.page import ViewerPage
 
     question = _question(options)
     if not is_compiled():
@@ -139,7 +139,7 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
             'nodes say what is shown'
         )
     from rrth_planner.ros.viewer_feed import following
-    from rrth_planner.viewers.viewer_live import LivePage
+    from rrth_planner.visualization.viewer.live_page import LivePage
 
     with (
         following(options.arm, options.settings, ros_args) as feed,

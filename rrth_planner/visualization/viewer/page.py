@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.viewers.viewer_examples import example_body, example_target
-from rrth_planner.viewers.viewer_geometry import path_curve, tool_positions, trajectory_curve
-from rrth_planner.viewers.viewer_model import Answer, ViewerModel
-from rrth_planner.viewers.viewer_panel import answer_html, OWN, Panel
-from rrth_planner.viewers.viewer_player import Player
-from rrth_planner.viewers.viewer_scene import SceneView
+from rrth_planner.visualization.viewer.curves import path_curve, tool_positions, trajectory_curve
+from rrth_planner.visualization.viewer.examples import example_body, example_target
+from rrth_planner.visualization.viewer.panel import answer_html, OWN, Panel
+from rrth_planner.visualization.viewer.planning_worker import Answer, ViewerModel
+from rrth_planner.visualization.viewer.player import Player
+from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
 # Pictures of a motion that plays, and how long a page at rest may sleep [s].

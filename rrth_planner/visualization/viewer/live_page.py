@@ -12,10 +12,10 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.viewers.viewer_examples import example_target
-from rrth_planner.viewers.viewer_geometry import tool_positions, trajectory_curve
-from rrth_planner.viewers.viewer_panel import OWN, Panel
-from rrth_planner.viewers.viewer_scene import SceneView
+from rrth_planner.visualization.viewer.curves import tool_positions, trajectory_curve
+from rrth_planner.visualization.viewer.examples import example_target
+from rrth_planner.visualization.viewer.panel import OWN, Panel
+from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
 FRAME = 1.0 / 30.0

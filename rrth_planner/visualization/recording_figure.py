@@ -15,9 +15,15 @@ from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.viewers.arm_view import arm_points, draw_way, N_POSTURES, STOP
-from rrth_planner.viewers.line_of_sight import best_view
-from rrth_planner.viewers.plots import DASHES, draw_limits, JOINT_COLOURS, LIMIT, TIME_STEP
+from rrth_planner.visualization.arm_view import arm_points, draw_way, N_POSTURES, STOP
+from rrth_planner.visualization.motion_figure import (
+    DASHES,
+    draw_limits,
+    JOINT_COLOURS,
+    LIMIT,
+    TIME_STEP,
+)
+from rrth_planner.visualization.occlusion import best_view
 
 SIZE = (14.0, 8.6)
 # Of the view of the arm: its width over its height.

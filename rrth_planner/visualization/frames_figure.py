@@ -20,7 +20,7 @@ from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
 from rrth_planner.model.scene import Scene
-from rrth_planner.viewers.arm_view import arm_points
+from rrth_planner.visualization.arm_view import arm_points
 
 DESCRIPTION = """\
 Draw the frames that docs/conventions.md names: left on the wearer, right along the arm.

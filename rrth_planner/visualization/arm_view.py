@@ -14,7 +14,7 @@ from rrth_planner.model.arm import ArmModel, forward_kinematics, pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.viewers.line_of_sight import best_view, cut, is_hidden
+from rrth_planner.visualization.occlusion import best_view, cut, is_hidden
 
 START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'
 CLOTH, SKIN = '#8fa3bf', '#e3b898'

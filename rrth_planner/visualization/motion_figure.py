@@ -14,7 +14,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
-from rrth_planner.viewers.arm_view import draw_motion
+from rrth_planner.visualization.arm_view import draw_motion
 
 JOINT_COLOURS = ('#1b6ca8', '#d1495b', '#2f9e6e', '#c98a1b', '#7a4fa3', '#4c5560')
 LIMIT, DASHES = '#30343b', (0, (5, 3))

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from html import escape
 from typing import Any
 
-from rrth_planner.viewers.viewer_examples import BODIES, TARGETS
-from rrth_planner.viewers.viewer_model import Answer
-from rrth_planner.viewers.viewer_scene import FIRST, LAYERS, SHORT, TIMED, TREES
+from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
+from rrth_planner.visualization.viewer.planning_worker import Answer
+from rrth_planner.visualization.viewer.scene_view import FIRST, LAYERS, SHORT, TIMED, TREES
 import viser
 
 OWN = 'own'

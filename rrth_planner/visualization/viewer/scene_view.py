@@ -10,8 +10,8 @@ from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.result import Tree
-from rrth_planner.viewers.arm_view import arm_points
-from rrth_planner.viewers.viewer_geometry import along_z, segments_of, tree_segments, wxyz
+from rrth_planner.visualization.arm_view import arm_points
+from rrth_planner.visualization.viewer.curves import along_z, segments_of, tree_segments, wxyz
 import viser
 
 Color = tuple[int, int, int]
