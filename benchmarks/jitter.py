@@ -17,10 +17,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.campaign.store import replace_file
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.reproduction.row_store import replace_file
 from rrth_planner.ros.child_process import ChildProcess
 from rrth_planner.ros.fields import nanoseconds_of
 from rrth_planner.ros.trajectories import joint_trajectory_to_msg

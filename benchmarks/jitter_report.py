@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping
 
-from rrth_planner.campaign.statistics import markdown_table
+from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks.real_time import scheduling
 from benchmarks.task import origin

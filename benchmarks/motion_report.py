@@ -5,7 +5,7 @@
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
-from rrth_planner.campaign.statistics import markdown_table
+from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks.motion_table import (
     at_random,

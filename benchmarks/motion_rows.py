@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from rrth_planner.campaign.store import replace_file
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.reproduction.row_store import replace_file
 
 from benchmarks.full_query import MARGIN, RAY
 from benchmarks.motion_curve import Curve, derivative, instants

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.campaign.statistics import NOTHING
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.status import PlanStatus
+from rrth_planner.reproduction.statistics import NOTHING
 
 from benchmarks.full_query import MARGIN
 from benchmarks.motion_rows import TOLERANCE

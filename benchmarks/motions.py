@@ -51,8 +51,8 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 
 
 def _run(options: argparse.Namespace, command: str) -> None:
-    from rrth_planner.campaign.statistics import markdown_table
-    from rrth_planner.campaign.store import replace_file
+    from rrth_planner.reproduction.row_store import replace_file
+    from rrth_planner.reproduction.statistics import markdown_table
 
     from benchmarks.motion_figures import draw_figures
     from benchmarks.motion_plan import default_limits

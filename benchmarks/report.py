@@ -4,7 +4,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from rrth_planner.campaign.statistics import markdown_table
+from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks import pace
 from benchmarks.harness import published

@@ -9,8 +9,8 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from rrth_planner.campaign.store import replace_file
 from rrth_planner.model.errors import RrthError
+from rrth_planner.reproduction.row_store import replace_file
 
 from benchmarks.task import Row
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import platform
 import sys
 
-from rrth_planner.campaign.runs import processor_name
-from rrth_planner.campaign.statistics import markdown_table
-from rrth_planner.campaign.store import replace_file
 from rrth_planner.model.errors import RrthError
+from rrth_planner.reproduction.row_store import replace_file
+from rrth_planner.reproduction.run import processor_name
+from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks.campaign import measure, section_tasks, SECTIONS
 from benchmarks.extent import Extent, QUICK

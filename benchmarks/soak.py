@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None, find: Callable[[str], object] =
 
 
 def _run(options: argparse.Namespace) -> int:
-    from rrth_planner.campaign.store import replace_file
+    from rrth_planner.reproduction.row_store import replace_file
 
     from benchmarks.processors import OnEachProcessor, stay_awake
     from benchmarks.real_time import is_real_time

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.campaign.statistics import markdown_table
-from rrth_planner.campaign.store import replace_file
+from rrth_planner.reproduction.row_store import replace_file
+from rrth_planner.reproduction.statistics import markdown_table
 
 from benchmarks.real_time import scheduling
 from benchmarks.soak_flood import FloodRecord

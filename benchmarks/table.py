@@ -5,8 +5,8 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from rrth_planner.campaign.statistics import NOTHING
 from rrth_planner.model.arrays import Array
+from rrth_planner.reproduction.statistics import NOTHING
 
 from benchmarks.harness import published
 from benchmarks.measures import gap, measured, peer_median, percentile, time_within, total_time

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 import os
 from typing import Any
 
-from rrth_planner.campaign.runs import provenance
+from rrth_planner.reproduction.run import provenance
 
 Row = dict[str, Any]
 

@@ -5,12 +5,12 @@
 import sys
 
 import numpy as np
-from rrth_planner.campaign.paper_runs import ALGORITHMS, FIVE
-from rrth_planner.campaign.problems import load_problem
 from rrth_planner.io.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.experiments import ALGORITHMS, FIVE
+from rrth_planner.reproduction.problems import load_problem
 
 name = sys.argv[1] if len(sys.argv) > 1 else 'c_shape'
 try:

@@ -10,9 +10,9 @@ from pathlib import Path
 import platform
 import sys
 
-from rrth_planner.campaign.paper_runs import Extent, QUICK, spread_runs, timed_runs
-from rrth_planner.campaign.runs import processor_name, source_digest
 from rrth_planner.model.errors import RrthError
+from rrth_planner.reproduction.experiments import Extent, QUICK, spread_runs, timed_runs
+from rrth_planner.reproduction.run import processor_name, source_digest
 
 MISSING = """{}: the reproduction needs more libraries than the planner; install them by
     pip install -r requirements/campaign.txt"""
@@ -23,11 +23,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = _parser().parse_args(arguments)
     try:
-        from rrth_planner.campaign.cluster import cluster_client, run_campaign
-        from rrth_planner.campaign.paper_report import report
-        from rrth_planner.campaign.statistics import Rows
-        from rrth_planner.campaign.store import read_rows, replace_file
-        from rrth_planner.viewers.paper_pictures import draw_pictures
+        from rrth_planner.reproduction.cluster import cluster_client, run_campaign
+        from rrth_planner.reproduction.figures.all import draw_pictures
+        from rrth_planner.reproduction.report import report
+        from rrth_planner.reproduction.row_store import read_rows, replace_file
+        from rrth_planner.reproduction.statistics import Rows
     except ImportError as problem:
         print(MISSING.format(problem), file=sys.stderr)
         return 2

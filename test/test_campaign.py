@@ -11,10 +11,15 @@ pa = pytest.importorskip('pyarrow')
 pytest.importorskip('tqdm')
 
 import pyarrow.parquet as pq
-from rrth_planner.campaign import cluster
-from rrth_planner.campaign.cluster import cluster_client, run_campaign
-from rrth_planner.campaign.escape_claims import both_ways_shares
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import load_map
+from rrth_planner.model.errors import RrthError
+from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction import cluster
+from rrth_planner.reproduction.claims.path_club import both_ways_shares
+from rrth_planner.reproduction.claims.table_1 import is_the_papers
+from rrth_planner.reproduction.cluster import cluster_client, run_campaign
+from rrth_planner.reproduction.experiments import (
     ALGORITHMS,
     PRINTED,
     RRT,
@@ -25,15 +30,10 @@ from rrth_planner.campaign.paper_runs import (
     SMART,
     TWO_WAYS,
 )
-from rrth_planner.campaign.problems import load_problem
-from rrth_planner.campaign.runs import execute, Run
-from rrth_planner.campaign.statistics import histories_on, Rows
-from rrth_planner.campaign.store import append_rows, finished_keys, histories, read_rows
-from rrth_planner.campaign.table_1 import is_the_papers
-from rrth_planner.io.arm_file import load_arm
-from rrth_planner.io.map_file import load_map
-from rrth_planner.model.errors import RrthError
-from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.problems import load_problem
+from rrth_planner.reproduction.row_store import append_rows, finished_keys, histories, read_rows
+from rrth_planner.reproduction.run import execute, Run
+from rrth_planner.reproduction.statistics import histories_on, Rows
 
 # Columns that differ from run to run whatever the seed.
 CLOCK = ('time_first', 'time_total', 'history_time', 'timing')

@@ -13,13 +13,13 @@ pytest.importorskip('matplotlib')
 pytest.importorskip('distributed')
 
 from matplotlib.image import imread
-from rrth_planner.campaign import escape, runs
-from rrth_planner.campaign.cluster import cluster_client
-from rrth_planner.campaign.paper_runs import ALGORITHMS, PRINTED_DENSE, QUICK, RRT
-from rrth_planner.campaign.plane_claims import plane_claims
-from rrth_planner.campaign.statistics import Rows
-from rrth_planner.campaign.store import read_rows
 from rrth_planner.reproduce import main
+from rrth_planner.reproduction import path_club, run
+from rrth_planner.reproduction.claims.plane import plane_claims
+from rrth_planner.reproduction.cluster import cluster_client
+from rrth_planner.reproduction.experiments import ALGORITHMS, PRINTED_DENSE, QUICK, RRT
+from rrth_planner.reproduction.row_store import read_rows
+from rrth_planner.reproduction.statistics import Rows
 
 TINY = ('--quick', '--serial', '--runs', '2', '--seeds', '2', '--maps', 'c_shape', '--targets')
 PICTURES = ('09', '10a', '10b', '11', '12', '14', '20', '21')
@@ -37,19 +37,19 @@ def test_the_scheduler_that_is_named_does_the_runs_and_a_bar_shows_how_far_they_
     tmp_path, monkeypatch, capsys
 ):
     asked = [
-        runs.Run(problem='c_shape', algorithm=RRT, options=ALGORITHMS[RRT], seed=seed)
+        run.Run(problem='c_shape', algorithm=RRT, options=ALGORITHMS[RRT], seed=seed)
         for seed in range(6)
     ]
     monkeypatch.setattr('rrth_planner.reproduce.timed_runs', lambda _: asked[:2])
     monkeypatch.setattr('rrth_planner.reproduce.spread_runs', lambda _: asked[2:])
     # Six runs fill no table.
-    monkeypatch.setattr('rrth_planner.campaign.paper_report.report', lambda *_: 'told')
-    monkeypatch.setattr('rrth_planner.viewers.paper_pictures.draw_pictures', lambda *_: {})
+    monkeypatch.setattr('rrth_planner.reproduction.report.report', lambda *_: 'told')
+    monkeypatch.setattr('rrth_planner.reproduction.figures.all.draw_pictures', lambda *_: {})
     with cluster_client(n_workers=1) as cluster:
         address = cluster.scheduler.address
         assert main(['--scheduler', address, '--output', str(tmp_path)]) == 0
         # The worker has loaded the kernels of what it ran.
-        assert list(cluster.run(lambda: len(runs._warm)).values()) == [1]
+        assert list(cluster.run(lambda: len(run._warm)).values()) == [1]
     rows = Rows(read_rows(tmp_path / 'reproduction.parquet').to_pylist())
     shown = capsys.readouterr().err
     for label, timing, n in (('one by one', 'serial', 2), ('side by side', 'cluster', 4)):
@@ -84,11 +84,11 @@ def test_a_second_time_runs_nothing_and_writes_the_same(output, monkeypatch):
     def refuse(*_):
         raise AssertionError('a run was done again')
 
-    monkeypatch.setattr('rrth_planner.campaign.cluster.execute', refuse)
+    monkeypatch.setattr('rrth_planner.reproduction.cluster.execute', refuse)
     # The two that Figure 14 shows are grown again; its shares come from rows.
     grown = []
     monkeypatch.setattr(
-        escape, 'grow', lambda *a, grow=escape.grow, **k: grown.append(a) or grow(*a, **k)
+        path_club, 'grow', lambda *a, grow=path_club.grow, **k: grown.append(a) or grow(*a, **k)
     )
     assert main([*TINY, 'low_left', '--output', str(output)]) == 0
     assert 0 < len(grown) <= 16

@@ -17,8 +17,8 @@ import uuid
 
 import pyarrow as pa
 import pyarrow.parquet as pq
-from rrth_planner.campaign.runs import Row
 from rrth_planner.model.errors import RrthError
+from rrth_planner.reproduction.run import Row
 
 # Where times were taken: alone on the machine, or beside other runs.
 SERIAL, CLUSTER = 'serial', 'cluster'

@@ -21,7 +21,7 @@ class Rows:
     Parameters
     ----------
     rows : sequence of dict
-        As `campaign.runs.execute` returns them.
+        As `reproduction.run.execute` returns them.
 
     """
 

@@ -3,7 +3,10 @@
 """What the paper says of the arm (Table 1, section 6.2) and of its collision test."""
 
 import numpy as np
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.io.map_file import load_map
+from rrth_planner.model.arrays import Array
+from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.experiments import (
     CHECK_POINTS,
     Extent,
     INFORMED,
@@ -16,11 +19,8 @@ from rrth_planner.campaign.paper_runs import (
     RRT_STAR,
     SAMPLED,
 )
-from rrth_planner.campaign.problems import CERTIFIED
-from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
-from rrth_planner.io.map_file import load_map
-from rrth_planner.model.arrays import Array
-from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.problems import CERTIFIED
+from rrth_planner.reproduction.statistics import markdown_table, number, percent, Rows
 
 # Figure 20: mean accumulated change of each joint [deg], and its reduction [%].
 PAPER_TRAVEL = {RRT: (181.28, 172.57, 212.57, 140.38), RRT_H: (88.38, 69.16, 92.00, 93.89)}

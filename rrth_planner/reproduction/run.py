@@ -15,13 +15,17 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from rrth_planner.campaign.escape import goes_over_the_top, scattered_growths, ScatterOptions
-from rrth_planner.campaign.problems import CERTIFIED, load_problem, NamedProblem
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.result import PlanResult
+from rrth_planner.reproduction.path_club import (
+    goes_over_the_top,
+    scattered_growths,
+    ScatterOptions,
+)
+from rrth_planner.reproduction.problems import CERTIFIED, load_problem, NamedProblem
 
 Row = dict[str, Any]
 # What decides about a row besides the run itself.

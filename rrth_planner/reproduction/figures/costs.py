@@ -8,11 +8,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 import numpy as np
-from rrth_planner.campaign.paper_runs import FIVE, RRT, RRT_H
-from rrth_planner.campaign.statistics import histories_on, quartiles, Rows
 from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.experiments import FIVE, RRT, RRT_H
+from rrth_planner.reproduction.statistics import histories_on, quartiles, Rows
 
 COLOURS = dict(zip(FIVE, ('#7a828c', '#1b6ca8', '#2f9e6e', '#c98a1b', '#c2185b'), strict=True))
 EXACT, GRID = '#30343b', '#e4e6ea'

@@ -7,9 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from rrth_planner.campaign.escape import ScatterOptions
-from rrth_planner.campaign.problems import CERTIFIED, TARGETS
-from rrth_planner.campaign.runs import Run
 from rrth_planner.planning.options import (
     InformedRRTStarOptions,
     PrintedRRTHOptions,
@@ -19,6 +16,9 @@ from rrth_planner.planning.options import (
     RRTStarSmartOptions,
     TreeOptions,
 )
+from rrth_planner.reproduction.path_club import ScatterOptions
+from rrth_planner.reproduction.problems import CERTIFIED, TARGETS
+from rrth_planner.reproduction.run import Run
 
 MAPS = ('c_shape', 'spiral', 'fence')
 NEAR, TWO_WAYS = 'c_shape_near', 'two_ways'

@@ -7,7 +7,9 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.io.map_file import load_map
+from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.experiments import (
     BIASED,
     DENSE,
     Extent,
@@ -27,7 +29,7 @@ from rrth_planner.campaign.paper_runs import (
     STEPS,
     with_near,
 )
-from rrth_planner.campaign.statistics import (
+from rrth_planner.reproduction.statistics import (
     markdown_table,
     NOTHING,
     number,
@@ -36,8 +38,6 @@ from rrth_planner.campaign.statistics import (
     share_of,
     spread,
 )
-from rrth_planner.io.map_file import load_map
-from rrth_planner.planning.visibility_graph import shortest_path
 
 OTHERS = (RRT_STAR, INFORMED, SMART)
 Measure = Callable[[Rows, str, int], str]

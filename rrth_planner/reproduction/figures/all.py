@@ -8,9 +8,13 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.campaign.escape import scattered_growths
-from rrth_planner.campaign.escape_claims import both_ways_shares
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.map_file import load_map
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.path import Path as JointPath
+from rrth_planner.planning.planner import plan
+from rrth_planner.reproduction.claims.path_club import both_ways_shares
+from rrth_planner.reproduction.experiments import (
     ALGORITHMS,
     ARM_ALGORITHMS,
     Extent,
@@ -24,22 +28,23 @@ from rrth_planner.campaign.paper_runs import (
     TWO_WAYS,
     with_near,
 )
-from rrth_planner.campaign.problems import (
+from rrth_planner.reproduction.figures.arm import joint_paths_figure, motions_figure
+from rrth_planner.reproduction.figures.costs import (
+    convergence_figure,
+    DRAWS,
+    histogram_figure,
+    TIME,
+)
+from rrth_planner.reproduction.figures.maps import escape_figure, trees_figure
+from rrth_planner.reproduction.path_club import scattered_growths
+from rrth_planner.reproduction.problems import (
     CERTIFIED,
     load_problem,
     load_wearer,
     RAY,
     TARGETS,
 )
-from rrth_planner.campaign.statistics import Rows
-from rrth_planner.io.arm_file import load_arm
-from rrth_planner.io.map_file import load_map
-from rrth_planner.model.arrays import Array
-from rrth_planner.model.path import Path as JointPath
-from rrth_planner.planning.planner import plan
-from rrth_planner.viewers.paper_arm import joint_paths_figure, motions_figure
-from rrth_planner.viewers.paper_figures import convergence_figure, DRAWS, histogram_figure, TIME
-from rrth_planner.viewers.paper_maps import escape_figure, trees_figure
+from rrth_planner.reproduction.statistics import Rows
 
 FOLDER = 'images/reproduction'
 SEED = 1

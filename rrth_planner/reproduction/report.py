@@ -4,14 +4,18 @@
 
 from collections.abc import Mapping, Sequence
 
-from rrth_planner.campaign.arm_claims import (
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.kernels.collision.arm_sampled import POINTS_PER_BAR
+from rrth_planner.reproduction.claims.arm import (
     arm_table,
     long_table,
     mode_table,
     target_table,
 )
-from rrth_planner.campaign.escape_claims import escape_claim, escape_table, ways_claim
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.reproduction.claims.path_club import escape_claim, escape_table, ways_claim
+from rrth_planner.reproduction.claims.plane import goal_bias_table, plane_claims, plane_table
+from rrth_planner.reproduction.claims.table_1 import table_1, table_1_claim
+from rrth_planner.reproduction.experiments import (
     ARM_STEP,
     DENSE,
     Extent,
@@ -19,12 +23,8 @@ from rrth_planner.campaign.paper_runs import (
     STEPS,
     TWO_WAYS,
 )
-from rrth_planner.campaign.plane_claims import goal_bias_table, plane_claims, plane_table
-from rrth_planner.campaign.problems import MARGIN, RAY
-from rrth_planner.campaign.statistics import markdown_table, Rows
-from rrth_planner.campaign.table_1 import table_1, table_1_claim
-from rrth_planner.io.arm_file import load_arm
-from rrth_planner.kernels.collision.arm_sampled import POINTS_PER_BAR
+from rrth_planner.reproduction.problems import MARGIN, RAY
+from rrth_planner.reproduction.statistics import markdown_table, Rows
 
 
 def report(
@@ -77,7 +77,7 @@ Written by `{command}`; do not edit.
 
 Times come from runs done one after another, those of the arm and shares over many seeds from runs
 side by side. The paper gives no coordinates, step sizes or spacings: maps, targets and options are
-ours (`config/maps`, `rrth_planner/campaign/paper_runs.py`). Where it names none, the planners have
+ours (`config/maps`, `rrth_planner/reproduction/experiments.py`). Where it names none, the planners have
 one tree, uniform draws and a step of 10 on maps of 100 by 100. "RRT-H" is the method's three steps
 as corrected, without what the planner adds to them (`near_bias`, `corner_moves`), "as printed" the
 same steps word for word. Every path is judged by code that shares nothing with the planners.

@@ -9,10 +9,10 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 import numpy as np
-from rrth_planner.campaign.escape import goes_over_the_top
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.planning.result import PlanResult, Tree
+from rrth_planner.reproduction.path_club import goes_over_the_top
 
 WALL, FRAME, TREE = '#4c5560', '#30343b', '#9fb4c9'
 FIRST, FINAL, START, GOAL = '#d9822b', '#c2185b', '#2f9e6e', '#1b6ca8'

@@ -18,8 +18,14 @@ import tempfile
 import time
 from typing import Any
 
-from rrth_planner.campaign.runs import execute, Row, Run
-from rrth_planner.campaign.store import append_rows, CLUSTER, finished_keys, SERIAL, unite_parts
+from rrth_planner.reproduction.row_store import (
+    append_rows,
+    CLUSTER,
+    finished_keys,
+    SERIAL,
+    unite_parts,
+)
+from rrth_planner.reproduction.run import execute, Row, Run
 from tqdm import tqdm
 
 # Runs in a task: tasks must take far longer than the millisecond or so that dask spends on one.

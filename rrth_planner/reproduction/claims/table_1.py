@@ -3,10 +3,10 @@
 """The paper's Table 1 beside the arm that is planned for."""
 
 import numpy as np
-from rrth_planner.campaign.plane_claims import verdict
-from rrth_planner.campaign.statistics import markdown_table, number
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
+from rrth_planner.reproduction.claims.plane import verdict
+from rrth_planner.reproduction.statistics import markdown_table, number
 
 # Of L1 to L4 and of the ray, L5, whose d varies: d and a [m], alpha and offset [pi rad].
 PAPER = (

@@ -3,7 +3,10 @@
 """What the paper's section 4 says of the escape from local traps, and what the rows say to it."""
 
 import numpy as np
-from rrth_planner.campaign.paper_runs import (
+from rrth_planner.io.map_file import load_map
+from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.claims.plane import verdict
+from rrth_planner.reproduction.experiments import (
     ATTEMPTS,
     CLUB,
     club_label,
@@ -13,10 +16,7 @@ from rrth_planner.campaign.paper_runs import (
     SCATTERED_PLAIN,
     TWO_WAYS,
 )
-from rrth_planner.campaign.plane_claims import verdict
-from rrth_planner.campaign.statistics import markdown_table, number, percent, Rows
-from rrth_planner.io.map_file import load_map
-from rrth_planner.planning.visibility_graph import shortest_path
+from rrth_planner.reproduction.statistics import markdown_table, number, percent, Rows
 
 # A path this much over the shortest one goes round the better side.
 BETTER = 1.05
