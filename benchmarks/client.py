@@ -18,7 +18,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Scene
-from rrth_planner.ros.child_process import ChildProcess
+from rrth_planner.ros.middleware.child_process import ChildProcess
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray

@@ -14,8 +14,8 @@ import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
-from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.ros.definitions import type_name, type_of_name
+from rrth_planner.ros.messages.definitions import type_name, type_of_name
+from rrth_planner.ros.middleware.child_process import ChildProcess
 
 # Messages in a second [Hz]; what could not be sent for longer than this is not made up for [s].
 RATE, LATE = 2000.0, 0.1

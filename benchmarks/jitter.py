@@ -21,9 +21,9 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.reproduction.row_store import replace_file
-from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.ros.fields import nanoseconds_of
-from rrth_planner.ros.trajectories import joint_trajectory_to_msg
+from rrth_planner.ros.messages.fields import nanoseconds_of
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
+from rrth_planner.ros.middleware.child_process import ChildProcess
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 

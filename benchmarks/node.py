@@ -12,7 +12,7 @@ import time
 
 import psutil
 from rrth_planner.model.errors import RrthError
-from rrth_planner.ros.child_process import ChildProcess
+from rrth_planner.ros.middleware.child_process import ChildProcess
 
 from benchmarks.extent import Extent
 from benchmarks.full_query import cases

@@ -16,8 +16,8 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
+from rrth_planner.ros.middleware.child_process import ChildProcess
 from tqdm import tqdm
 from trajectory_msgs.msg import JointTrajectory
 

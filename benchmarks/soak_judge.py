@@ -119,7 +119,7 @@ def judge_bytes(task: tuple[bytes, tuple, bool]) -> tuple[str, bool]:
 
     """
     from rclpy.serialization import deserialize_message
-    from rrth_planner.ros.trajectories import joint_trajectory_from_msg
+    from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
     from trajectory_msgs.msg import JointTrajectory
 
     from benchmarks.soak_body import scene_of_body

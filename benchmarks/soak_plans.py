@@ -13,7 +13,7 @@ import numpy as np
 from rrth_planner.collision.world import arm_world
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arrays import Array
-from rrth_planner.ros.child_process import ChildProcess
+from rrth_planner.ros.middleware.child_process import ChildProcess
 from tqdm import tqdm
 
 from benchmarks.client import ros_client

@@ -58,7 +58,7 @@ def read_chain(path):
 def read_message(path):
     """Return a body as messages."""
     pytest.importorskip('rclpy')
-    from rrth_planner.ros.body_messages import body_from_file
+    from rrth_planner.ros.messages.body_writer import body_from_file
 
     return body_from_file(path, 'torso')
 

@@ -38,18 +38,18 @@ OWN = {
 REPORTER = 'rrth_planner.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline.plan_motion'),
-    ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.arrival'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.bodies'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.dry_run'),
+    ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests.plan_request'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.client.follow_motion'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.messages.body'),
+    ('rrth_planner.ros.point_at', 'rrth_planner.ros.client.dry_run'),
     *(
         ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
         for name in ('inputs', 'listener', 'plan_queue', 'reporter')
     ),
     # Once it is known that what they need is installed.
-    ('rrth_planner.ros.record', 'rrth_planner.ros.recorder'),
-    ('rrth_planner.viewers.plot', 'rrth_planner.ros.recordings'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.ros.viewer_feed'),
+    ('rrth_planner.ros.record', 'rrth_planner.ros.client.recorder'),
+    ('rrth_planner.viewers.plot', 'rrth_planner.ros.client.recording_reader'),
+    ('rrth_planner.viewers.viewer', 'rrth_planner.ros.client.viewer_feed'),
     ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.live_page'),
     ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.page'),
 }

@@ -21,10 +21,10 @@ from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits  # noqa: E402
 from rrth_planner.pipeline.plan_motion import plan_motion  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.goals import goal_from_msg
-from rrth_planner.ros.joints import configuration_from_msg
-from rrth_planner.ros.message_files import message_from_file  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.messages.message_file import message_from_file  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 

@@ -126,8 +126,8 @@ def test_an_example_body_is_read_without_ros(name):
 
 def test_an_example_body_is_that_of_the_messages():
     pytest.importorskip('rclpy')
-    from rrth_planner.ros.bodies import scene_of, WearerBody
-    from rrth_planner.ros.message_files import message_from_file
+    from rrth_planner.ros.messages.body import scene_of, WearerBody
+    from rrth_planner.ros.messages.message_file import message_from_file
     from visualization_msgs.msg import MarkerArray
 
     for name in BODIES:

@@ -46,8 +46,8 @@ def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
     scene = load_wearer(file)
     assert [box.name for box in scene.boxes] == ['torso', 'arms[0]', 'arms[1]']
     pytest.importorskip('rclpy')
-    from rrth_planner.ros.bodies import scene_of, WearerBody
-    from rrth_planner.ros.message_files import message_from_file
+    from rrth_planner.ros.messages.body import scene_of, WearerBody
+    from rrth_planner.ros.messages.message_file import message_from_file
     from visualization_msgs.msg import MarkerArray
 
     body = WearerBody().apply(message_from_file(file, MarkerArray), 0.0, 'torso')

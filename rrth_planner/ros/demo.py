@@ -24,11 +24,11 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.child_process import ChildProcess
-from rrth_planner.ros.demo_client import DemoClient, DemoError
-from rrth_planner.ros.goals import goal_from_msg
-from rrth_planner.ros.message_files import message_from_file
+from rrth_planner.ros.client.demo_client import DemoClient, DemoError
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.message_file import message_from_file
+from rrth_planner.ros.middleware.child_process import ChildProcess
 from rrth_planner.visualization.motion_figure import Motion, motion_figure
 from visualization_msgs.msg import MarkerArray
 

@@ -24,10 +24,10 @@ from rclpy.signals import SignalHandlerOptions
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
-from rrth_planner.ros.catching_up import CatchUp
-from rrth_planner.ros.error_codes import answer, code_of_refusal, ErrorCode
-from rrth_planner.ros.parameters import current_parameters, declare_parameters
-from rrth_planner.ros.profiles import SERVICE
+from rrth_planner.ros.interface.parameters import current_parameters, declare_parameters
+from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
+from rrth_planner.ros.middleware.executor_barrier import CatchUp
+from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
 NAME = 'rrth_planner'
@@ -53,10 +53,10 @@ class PlannerNode(Node):
         parameters = declare_parameters(self)
         self._compile()
         # Only now: loading them compiles the kernels that nobody has compiled yet.
-        from rrth_planner.ros.inputs import Inputs
-        from rrth_planner.ros.listener import Listener
-        from rrth_planner.ros.plan_queue import PlanQueue
-        from rrth_planner.ros.reporter import Reporter
+        from rrth_planner.ros.interface.inputs import Inputs
+        from rrth_planner.ros.interface.reporter import Reporter
+        from rrth_planner.ros.interface.scene_monitor import Listener
+        from rrth_planner.ros.requests.request_queue import PlanQueue
 
         heard = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
@@ -101,7 +101,7 @@ class PlannerNode(Node):
     def _load_planner(self) -> Callable[..., Any]:
         """Return what plans, ready for its first plan."""
         from rrth_planner.pipeline.plan_motion import warm_up
-        from rrth_planner.ros.requests import plan_request
+        from rrth_planner.ros.requests.plan_request import plan_request
 
         self._warm_up = warm_up
         parameters = self._reporter.parameters

@@ -21,15 +21,15 @@ from rrth_planner.execution.acceptance import accept
 from rrth_planner.execution.playback import Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import MessageError, RrthError
-from rrth_planner.ros.fields import NANOSECONDS, seconds_of
-from rrth_planner.ros.playback_parameters import (
+from rrth_planner.ros.interface.playback_parameters import (
     declare_playback_parameters,
     initial_positions,
     playback_rules,
 )
-from rrth_planner.ros.profiles import SERVICE, SUPERVISED
-from rrth_planner.ros.subscriptions import decoded
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg, pose_to_msg
+from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg, pose_to_msg
+from rrth_planner.ros.middleware.open_subscription import decoded
+from rrth_planner.ros.middleware.qos import SERVICE, SUPERVISED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory

@@ -20,15 +20,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, RrthError
-from rrth_planner.ros.answers import Answer, answer_from_text
-from rrth_planner.ros.body_messages import body_from_file
-from rrth_planner.ros.error_codes import ErrorCode
-from rrth_planner.ros.frames import Frames
-from rrth_planner.ros.goals import goal_from_msg
-from rrth_planner.ros.parameters import PlannerParameters
-from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
+from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.client.remote_parameters import parameters_of_planner
+from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.messages.body_writer import body_from_file
+from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.ros.messages.frames import Frames
+from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.point_at_options import parser
-from rrth_planner.ros.remote_parameters import parameters_of_planner
 from visualization_msgs.msg import MarkerArray
 
 DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
@@ -116,7 +116,7 @@ def _run(options: argparse.Namespace, given: list[str], report: Report, stack: E
     target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
     if options.no_move:
         # It needs the planner itself, which takes seconds to load.
-        from rrth_planner.ros.dry_run import plan_without_moving
+        from rrth_planner.ros.client.dry_run import plan_without_moving
 
         answer, report.pointing_error = plan_without_moving(client, parameters, target, body)
         report.take(answer)
@@ -134,7 +134,7 @@ def _move(
 ) -> None:
     """Have the arm point at a target, and wait until it does."""
     # Not before it is known that its progress bar is there.
-    from rrth_planner.ros.arrival import announced_motion, follow
+    from rrth_planner.ros.client.follow_motion import announced_motion, follow
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
@@ -171,7 +171,7 @@ def _body(path: Path, frame: str) -> MarkerArray:
 def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
     """Return a body that the planner will take: it would go on with the one before, else."""
     # It loads kernels, which takes seconds that an arm need not wait for without --body.
-    from rrth_planner.ros.bodies import WearerBody
+    from rrth_planner.ros.messages.body import WearerBody
 
     try:
         taken = WearerBody().apply(body, 0.0, parameters.base_frame)

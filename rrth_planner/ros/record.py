@@ -74,7 +74,7 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
             f'{", ".join(missing)}: not installed, expected what requirements/tools.txt lists'
         )
     # Not before it is known that they are there.
-    from rrth_planner.ros.recorder import Recorder, RecordingFile, since
+    from rrth_planner.ros.client.recorder import Recorder, RecordingFile, since
     from tqdm import tqdm  # type: ignore[import-untyped]
 
     for topic in options.topics or ():

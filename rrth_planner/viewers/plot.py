@@ -101,7 +101,7 @@ def _draw_recording(options: argparse.Namespace) -> Figure:
             'requirements/tools.txt lists'
         )
     # Not before it is known that they are there; plans are drawn without.
-    from rrth_planner.ros.recordings import RecordingReader
+    from rrth_planner.ros.client.recording_reader import RecordingReader
 
     arm, settings = _arm_and_settings(options)
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)

@@ -138,7 +138,7 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
             '--live: given with --screenshot, --body, --target or --set, expected without: the '
             'nodes say what is shown'
         )
-    from rrth_planner.ros.viewer_feed import following
+    from rrth_planner.ros.client.viewer_feed import following
     from rrth_planner.visualization.viewer.live_page import LivePage
 
     with (

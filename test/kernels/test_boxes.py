@@ -10,7 +10,7 @@ from rrth_planner.kernels.layout import NUMBERS
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.ros.edits import boxes_of, first_bad
+from rrth_planner.ros.messages.marker_edits import boxes_of, first_bad
 from worlds import examples, random_boxes, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)

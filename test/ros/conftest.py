@@ -26,7 +26,7 @@ def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -
 def tell(node, publisher, message) -> None:
     """Publish a message, by a latched publisher; return once all have it who are reliable."""
     from rclpy.duration import Duration
-    from rrth_planner.ros.planner_client import is_heard
+    from rrth_planner.ros.client.planner_client import is_heard
 
     wait_until(lambda: is_heard(node, publisher))
     publisher.publish(message)

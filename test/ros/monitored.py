@@ -12,12 +12,12 @@ from rrth_planner.execution.executing_motion import RunningMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.ros.bodies import WearerBody
-from rrth_planner.ros.edits import BodyPart
-from rrth_planner.ros.guard import Guard
-from rrth_planner.ros.inputs import Inputs
-from rrth_planner.ros.joints import JointReading
-from rrth_planner.ros.parameters import declare_parameters
+from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.parameters import declare_parameters
+from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.joint_state import JointReading
+from rrth_planner.ros.messages.marker_edits import BodyPart
+from rrth_planner.ros.monitor.execution_monitor import Guard
 import worlds
 
 ARM = worlds.table_1_arm()

@@ -13,8 +13,8 @@ pytest.importorskip('rclpy')
 
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
-from rrth_planner.ros import catching_up  # noqa: E402
-from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
+from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
+from rrth_planner.ros.middleware.executor_barrier import CatchUp  # noqa: E402
 from std_msgs.msg import Int32  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -48,7 +48,7 @@ def _busy(executor):
 
 
 def test_all_that_came_is_heard(node, spinning, wait_until, monkeypatch):
-    monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     catch_up = CatchUp(node, lambda: (len(node.numbers), 0))
     with spinning(node) as executor:
         wait_until(lambda: node.out.get_subscription_count() == 1)
@@ -74,7 +74,7 @@ def test_one_quiet_round_is_enough(node, spinning):
 
 @pytest.mark.parametrize(('age', 'is_news'), [(-10.0, True), (0.001, False)])
 def test_one_that_came_later_ends_the_waiting(node, spinning, monkeypatch, age, is_news):
-    monkeypatch.setattr(catching_up, 'LONGEST', 0.3)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.3)
     rounds, came = count(), 0
     catch_up = CatchUp(node, lambda: (next(rounds), came))
     with spinning(node):
@@ -86,7 +86,7 @@ def test_one_that_came_later_ends_the_waiting(node, spinning, monkeypatch, age, 
 
 
 def test_a_node_that_stays_busy_is_not_waited_for(node, spinning, monkeypatch):
-    monkeypatch.setattr(catching_up, 'LONGEST', 0.3)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.3)
     looks = count()
     catch_up = CatchUp(node, lambda: (next(looks), 0))
     with spinning(node) as executor:
@@ -100,14 +100,14 @@ def test_a_node_that_stays_busy_is_not_waited_for(node, spinning, monkeypatch):
 
 
 def test_a_round_that_nobody_waited_for_tells_nothing(node, spinning, wait_until, monkeypatch):
-    monkeypatch.setattr(catching_up, 'LONGEST', 0.3)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.3)
     handled = []
     catch_up = CatchUp(node, lambda: (len(node.numbers), handled.append(0) or 0))
     with spinning(node) as executor:
         wait_until(lambda: node.out.get_subscription_count() == 1)
         end = _busy(executor)
         assert not catch_up()
-        monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
+        monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
         handled.clear()
         Timer(0.1, end.set).start()
         assert catch_up()
@@ -126,7 +126,7 @@ def test_a_wake_up_that_got_lost_is_made_up_for(node, spinning, monkeypatch):
 
 
 def test_nobody_waits_for_ever_for_an_executor_that_is_gone(node, monkeypatch):
-    monkeypatch.setattr(catching_up, 'LONGEST', 0.1)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.1)
     catch_up = CatchUp(node, lambda: (0, 0))
     # It was never there.
     assert catch_up()

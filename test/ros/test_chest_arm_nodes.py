@@ -17,7 +17,7 @@ from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

@@ -17,13 +17,13 @@ from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
 from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
-from rrth_planner.ros import followed, guard  # noqa: E402
-from rrth_planner.ros.bodies import WearerBody  # noqa: E402
-from rrth_planner.ros.followed import Followed  # noqa: E402
-from rrth_planner.ros.guard import Guard  # noqa: E402
-from rrth_planner.ros.inputs import Input  # noqa: E402
-from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
-from rrth_planner.ros.profiles import LEASE  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input  # noqa: E402
+from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
+from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
+from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import Guard  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import Followed  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 PACKAGE = str(Path(rrth_planner.__file__).parent)
@@ -151,8 +151,10 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 def places():
     """Return what the monitor calls, as (owner, name)."""
     names = 'scene_of out_of_sight is_still_free leads_away emergency_stop arm_world'
-    found = [(guard, name) for name in names.split()]
-    found += [(followed, name) for name in ('phase_of', 'sample', 'goes_on', 'is_on_other')]
+    found = [(execution_monitor, name) for name in names.split()]
+    found += [
+        (execution_tracker, name) for name in ('phase_of', 'sample', 'goes_on', 'is_on_other')
+    ]
     for owner in (Guard, Followed, Input, WearerBody, RunningMotion):
         found += [
             (owner, name)
@@ -245,7 +247,7 @@ def test_after_an_error_nothing_is_planned_by_itself(
     arm.guard.plan_again = lambda *arguments: asked.append(arguments)
     arm.late = late
     if not late:
-        monkeypatch.setattr(guard, 'is_still_free', lambda *_, **__: 1 / 0)
+        monkeypatch.setattr(execution_monitor, 'is_still_free', lambda *_, **__: 1 / 0)
     arm.see(FAR)
     assert len(arm.published) == 1
     assert len(asked) == n_again * replan

@@ -10,8 +10,8 @@ pytest.importorskip('rclpy')
 
 from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
-from rrth_planner.ros.followed import ASIDE, goes_on, LATE  # noqa: E402
-from rrth_planner.ros.joints import JointReading  # noqa: E402
+from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import ASIDE, goes_on, LATE  # noqa: E402
 from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402
 from worlds import examples, limits  # noqa: E402

@@ -17,8 +17,8 @@ from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

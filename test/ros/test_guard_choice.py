@@ -18,9 +18,9 @@ from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.edits import BodyPart  # noqa: E402
-from rrth_planner.ros.guard import Guard, Watch  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import Guard, Watch  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 

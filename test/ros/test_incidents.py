@@ -23,11 +23,12 @@ from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
-from rrth_planner.ros import incidents, reporter, requests, second_opinion  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
-from rrth_planner.ros.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
-from rrth_planner.ros.inputs import Inputs  # noqa: E402
+from rrth_planner.ros.interface import reporter  # noqa: E402
+from rrth_planner.ros.interface.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
+from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
+from rrth_planner.ros.requests import incidents, plan_request, stop_validation  # noqa: E402
 from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
@@ -132,7 +133,7 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
         # What agrees leaves nothing behind.
         planner._queue._worker.submit(lambda: None).result(30.0)
         assert not list(tmp_path.iterdir())
-        patch.setattr(second_opinion, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(stop_validation, 'first_touch', lambda *_: TOUCH)
         guard.judge(stop, scene, goal, planner._reporter.parameters)
         planner._queue._worker.submit(lambda: None).result(30.0)
     (file,) = tmp_path.iterdir()
@@ -222,7 +223,7 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
         raise ValueError('of a test')
 
     with monkeypatch.context() as patch:
-        patch.setattr(requests, '_question', fail)
+        patch.setattr(plan_request, '_question', fail)
         message = stranger.answer().message
     assert message == 'FAILURE (99999): planning failed unexpectedly: ValueError: of a test'
     assert not list(tmp_path.iterdir())

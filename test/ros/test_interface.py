@@ -20,10 +20,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
-from rrth_planner.ros import frames, requests  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.messages import frames  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from rrth_planner.ros.requests import plan_request  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -295,7 +296,7 @@ def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_ba
 def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     planner, stranger = start(seed=5)
     say_all(planner, stranger)
-    jerks, plan_motion = [], requests.plan_motion
+    jerks, plan_motion = [], plan_request.plan_motion
 
     def plan_while_it_is_set(*args, **kwargs):
         if not jerks:
@@ -309,7 +310,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
         jerks.append(kwargs['limits'].jerk[0])
         return plan_motion(*args, **kwargs)
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_it_is_set)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_it_is_set)
     # The motion is watched by them too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.endswith(f'seed {seed}')

@@ -25,24 +25,24 @@ from rrth_planner.model.arrays import FARTHEST  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE, MessageError, one_line  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
-from rrth_planner.ros.answers import answer_from_text  # noqa: E402
-from rrth_planner.ros.bodies import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.edits import (  # noqa: E402
+from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, PlanInputs, RequestError  # noqa: E402
+from rrth_planner.ros.messages.body import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.error_codes import answer, ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import joint_reading
+from rrth_planner.ros.messages.marker_edits import (  # noqa: E402
     LONGEST_NAMESPACE,
     MOST_BOXES,
     read_edits,
 )
-from rrth_planner.ros.error_codes import answer, ErrorCode  # noqa: E402
-from rrth_planner.ros.goals import goal_from_msg
-from rrth_planner.ros.inputs import Input, PlanInputs, RequestError  # noqa: E402
-from rrth_planner.ros.joints import joint_reading
-from rrth_planner.ros.message_files import message_from_file  # noqa: E402
-from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  # noqa: E402
-from rrth_planner.ros.subscriptions import decoded, MOST_BYTES  # noqa: E402
-from rrth_planner.ros.trajectories import (
+from rrth_planner.ros.messages.message_file import message_from_file  # noqa: E402
+from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_from_msg,
     MOST_POINTS,  # noqa: E402
 )
+from rrth_planner.ros.middleware.open_subscription import decoded, MOST_BYTES  # noqa: E402
+from rrth_planner.ros.playback_node import MOST_BYTES as MOST_BYTES_OF_MOTION  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402

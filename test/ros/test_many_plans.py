@@ -22,8 +22,8 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.planning.pointing_goals import target_in_mount  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

@@ -17,18 +17,18 @@ from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.ros import bodies, edits  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.error_codes import (  # noqa: E402
+from rrth_planner.ros.messages import body as bodies, marker_edits  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.error_codes import (  # noqa: E402
     answer,
     code_of_refusal,
     CODE_OF_STATUS,
     ErrorCode,
 )
-from rrth_planner.ros.frames import FrameError
-from rrth_planner.ros.goals import goal_from_msg
-from rrth_planner.ros.joints import configuration_from_msg, has_joint_of
-from rrth_planner.ros.trajectories import (
+from rrth_planner.ros.messages.frames import FrameError
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import configuration_from_msg, has_joint_of
+from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_from_msg,
     joint_trajectory_to_msg,
     tool_path_to_msg,
@@ -170,7 +170,7 @@ def test_an_unknown_frame_is_an_error_of_its_own():
 
 
 def test_more_boxes_than_the_limit_are_refused(monkeypatch):
-    for module in (bodies, edits):
+    for module in (bodies, marker_edits):
         monkeypatch.setattr(module, 'MOST_BOXES', 3)
     body = body_of(*(box(index=i) for i in range(3)))
     with pytest.raises(MessageError, match='4 boxes, expected at most 3 in all'):

@@ -17,16 +17,16 @@ from rclpy.node import Node  # noqa: E402
 from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.ros import start  # noqa: E402
-from rrth_planner.ros.bodies import WearerBody  # noqa: E402
-from rrth_planner.ros.edits import BodyPart  # noqa: E402
-from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
-from rrth_planner.ros.inputs import Input, Inputs, PlanInputs  # noqa: E402
-from rrth_planner.ros.joints import JointReading  # noqa: E402
-from rrth_planner.ros.last_look import LastLook, require_news  # noqa: E402
-from rrth_planner.ros.parameters import declare_parameters  # noqa: E402
-from rrth_planner.ros.requests import plan_request  # noqa: E402
-from rrth_planner.ros.start import EARLY, LEADS  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, Inputs, PlanInputs  # noqa: E402
+from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
+from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
+from rrth_planner.ros.requests import handover as start  # noqa: E402
+from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402
+from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
+from rrth_planner.ros.requests.revalidation import LastLook, require_news  # noqa: E402
 from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
 import worlds  # noqa: E402
 

@@ -15,12 +15,12 @@ from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.errors import ModelError, OptionsError  # noqa: E402
 from rrth_planner.planning.options import RRTHOptions  # noqa: E402
-from rrth_planner.ros.declaring import ARM  # noqa: E402
-from rrth_planner.ros.parameters import (  # noqa: E402
+from rrth_planner.ros.interface.parameters import (  # noqa: E402
     current_parameters,
     declare_parameters,
     declared,
 )
+from rrth_planner.ros.middleware.parameter_declaration import ARM  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NAN = float('nan')

@@ -31,14 +31,15 @@ from rrth_planner.collision.violation import Touch  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
-from rrth_planner.ros import catching_up, last_look, requests, resting  # noqa: E402
-from rrth_planner.ros.catching_up import CatchUp  # noqa: E402
-from rrth_planner.ros.diagnostics import PlanReport  # noqa: E402
-from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
-from rrth_planner.ros.last_look import LastLook  # noqa: E402
+from rrth_planner.ros.interface.diagnostics import PlanReport  # noqa: E402
+from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
+from rrth_planner.ros.middleware.executor_barrier import CatchUp  # noqa: E402
+from rrth_planner.ros.middleware.thread_priority import RightOfWay  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.requests import plan_request, revalidation, wait_for_rest  # noqa: E402
+from rrth_planner.ros.requests.revalidation import LastLook  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -304,7 +305,7 @@ def test_deeper_than_escape_depth_is_refused(start):
 def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
     moves = iter((leaned(), fenced()))
 
     def plan_while_the_body_changes(*args, **kwargs):
@@ -315,7 +316,7 @@ def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wai
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_body_changes)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_the_body_changes)
     assert stranger.answer().success
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
@@ -328,7 +329,7 @@ def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
     # It is 0.0275 m deep at first.
     planner, stranger = start(escape_depth=depth)
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
 
     def plan_while_the_wearer_leans(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
@@ -336,7 +337,7 @@ def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_the_wearer_leans)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_the_wearer_leans)
     assert stranger.answer().message.startswith(answer)
 
 
@@ -345,7 +346,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion, touches = inputs_of(planner), requests.plan_motion, []
+    inputs, plan_motion, touches = inputs_of(planner), plan_request.plan_motion, []
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -359,7 +360,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
             )
         return plan
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_a_box_comes)
     with monkeypatch.context() as patch:
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
@@ -433,7 +434,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
         raise ZeroDivisionError('of a test')
 
     with monkeypatch.context() as patch:
-        patch.setattr(requests, 'plan_motion', fail)
+        patch.setattr(plan_request, 'plan_motion', fail)
         message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
@@ -459,7 +460,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
 
     def plan_while_things_move(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -468,7 +469,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
         wait_until(lambda: inputs.body.value is not body or inputs.joints.value is not positions)
         return plan
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_things_move)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_things_move)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
     assert sentence in message
@@ -510,7 +511,7 @@ def test_an_arm_that_moves_faster_than_it_may_is_not_taken_over(start):
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    heard, plan_motion = inputs_of(planner).joints, requests.plan_motion
+    heard, plan_motion = inputs_of(planner).joints, plan_request.plan_motion
 
     def plan_while_it_starts(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -518,7 +519,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
         wait_until(lambda: heard.value.velocities[1] == 0.3)
         return plan
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_it_starts)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_it_starts)
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
     assert not stranger.heard['joint_trajectory']
@@ -527,7 +528,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
 @pytest.mark.parametrize(
     ('owner', 'step', 'topic', 'msg', 'answer'),
     [
-        (requests, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
+        (plan_request, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
         (LastLook, 'take', 'body_boxes', fenced(), 'the wearer moved'),
         (LastLook, 'take', 'body_boxes', array(command(Marker.DELETEALL)), 'is empty: every box'),
         (LastLook, 'take', 'joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000'),
@@ -537,7 +538,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
 def test_what_came_but_was_not_read_yet_counts(
     start, monkeypatch, owner, step, topic, msg, answer
 ):
-    monkeypatch.setattr(catching_up, 'LONGEST', 30.0)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     planner, stranger = start()
     say_all(planner, stranger)
     original = getattr(owner, step)
@@ -578,7 +579,7 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
     monkeypatch.setattr(LastLook, 'take', check_while_a_body_comes)
     message = stranger.answer().message
     # Not for ever: the guard holds the motion against the bodies that follow.
-    assert len(checked) == (1 if is_in_the_way else requests.MOST_LOOKS)
+    assert len(checked) == (1 if is_in_the_way else plan_request.MOST_LOOKS)
     assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
 
 
@@ -593,7 +594,7 @@ def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
         seen, body = take(look), inputs.body.value
         looks.append(seen)
         far = box('far', len(looks), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
-        is_last = len(looks) == requests.MOST_LOOKS
+        is_last = len(looks) == plan_request.MOST_LOOKS
         stranger.publishers['body_boxes'].publish(fenced() if is_last else array(far))
         wait_until(lambda: inputs.body.value is not body)
         return seen
@@ -602,7 +603,7 @@ def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     assert not stranger.heard['joint_trajectory']
-    assert len(looks) == requests.MOST_LOOKS
+    assert len(looks) == plan_request.MOST_LOOKS
 
 
 def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
@@ -626,7 +627,7 @@ def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
 
 
 def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
-    monkeypatch.setattr(catching_up, 'LONGEST', 0.2)
+    monkeypatch.setattr(executor_barrier, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
     take, end, catch_up = LastLook.take, Event(), CatchUp.__call__
@@ -672,7 +673,7 @@ def test_a_motion_is_not_told_where_the_machine_stood_still_before(start, monkey
 
 
 def test_a_motion_is_not_told_where_the_machine_stands_still_again_and_again(start, monkeypatch):
-    monkeypatch.setattr(catching_up, 'NEWS', -1.0)
+    monkeypatch.setattr(executor_barrier, 'NEWS', -1.0)
     planner, stranger = start()
     say_all(planner, stranger)
     message = stranger.answer().message
@@ -681,7 +682,7 @@ def test_a_motion_is_not_told_where_the_machine_stands_still_again_and_again(sta
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
-    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
@@ -699,14 +700,14 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
 def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    plan_motion = requests.plan_motion
+    plan_motion = plan_request.plan_motion
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
         planner._queue.guard.n_brakes += 1
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
-        patch.setattr(requests, 'plan_motion', plan_while_the_arm_is_stopped)
+        patch.setattr(plan_request, 'plan_motion', plan_while_the_arm_is_stopped)
         message = stranger.answer().message
     assert message.startswith(
         'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
@@ -716,7 +717,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
 
 
 def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
-    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
@@ -728,7 +729,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
 
 
 def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, monkeypatch):
-    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 300.0)
+    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 300.0)
     planner, stranger = start()
     say_all(planner, stranger)
     # No joint position comes that would say that it rests.
@@ -740,7 +741,7 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
 
 
 def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(start, monkeypatch):
-    monkeypatch.setattr(resting, 'LONGEST_SETTLING', 300.0)
+    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 300.0)
     planner, stranger = start()
     say_all(planner, stranger)
     queue = planner._queue
@@ -787,7 +788,7 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
 def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), requests.plan_motion
+    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
     asked = []
 
     def plan_while_a_box_comes(*args, **kwargs):
@@ -802,8 +803,8 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
         asked.append(args)
         return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
-    monkeypatch.setattr(requests, 'plan_motion', plan_while_a_box_comes)
-    monkeypatch.setattr(last_look, 'touch_seen', disagree)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(revalidation, 'touch_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
@@ -938,7 +939,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
 def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    order, plan_motion = [], requests.plan_motion
+    order, plan_motion = [], plan_request.plan_motion
 
     def warm_up(_, options):
         time.sleep(0.2)
@@ -949,7 +950,7 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(planner, '_warm_up', warm_up)
-    monkeypatch.setattr(requests, 'plan_motion', plan_in_turn)
+    monkeypatch.setattr(plan_request, 'plan_motion', plan_in_turn)
     planner.set_parameters([Parameter(name='margin', value=0.03)])
     planner.set_parameters([Parameter(name='algorithm', value='rrt')])
     assert stranger.answer().success

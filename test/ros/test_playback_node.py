@@ -24,9 +24,9 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.rotation import rotation_matrix  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.ros.interface.playback_parameters import SETTINGS  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
-from rrth_planner.ros.playback_parameters import SETTINGS  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402

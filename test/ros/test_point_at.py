@@ -26,15 +26,15 @@ from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros import point_at  # noqa: E402
-from rrth_planner.ros.answers import answer_from_text  # noqa: E402
-from rrth_planner.ros.arrival import announced_motion, follow  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody
-from rrth_planner.ros.body_messages import body_from_file, body_to_msg  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.error_codes import ErrorCode  # noqa: E402
-from rrth_planner.ros.planner_client import NotInTimeError, PlannerClient  # noqa: E402
-from rrth_planner.ros.subscriptions import Arrival  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_to_msg
+from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
+from rrth_planner.ros.client.follow_motion import announced_motion, follow  # noqa: E402
+from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.body_writer import body_from_file, body_to_msg  # noqa: E402
+from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.middleware.open_subscription import Arrival  # noqa: E402
 from samples import FOLDED, joints  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402

@@ -25,11 +25,11 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.definitions import definition_of, type_name  # noqa: E402
+from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
+from rrth_planner.ros.messages.definitions import definition_of, type_name  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.record import TOPICS  # noqa: E402
-from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.viewers.plot import main as plot  # noqa: E402
 from samples import target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -339,7 +339,7 @@ from pathlib import Path
 from sensor_msgs.msg import JointState
 import os
 from rrth_planner.model.errors import RrthError
-from rrth_planner.ros.recorder import RecordingFile
+from rrth_planner.ros.client.recorder import RecordingFile
 path = Path(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 try:

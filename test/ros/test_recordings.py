@@ -17,9 +17,9 @@ from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import ArmModel  # noqa: E402
 from rrth_planner.model.errors import RecordError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.ros.recorder import RecordingFile  # noqa: E402
-from rrth_planner.ros.recordings import RecordingReader  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
+from rrth_planner.ros.client.recorder import RecordingFile  # noqa: E402
+from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.viewers import plot  # noqa: E402
 from rrth_planner.viewers.plot import main  # noqa: E402
 from samples import array, box, FOLDED, joints, target, wearer  # noqa: E402

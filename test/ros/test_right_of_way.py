@@ -12,10 +12,11 @@ pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.ros import plan_queue, right_of_way  # noqa: E402
+from rrth_planner.ros.middleware import thread_priority  # noqa: E402
+from rrth_planner.ros.middleware.open_subscription import OpenSubscription  # noqa: E402
+from rrth_planner.ros.middleware.thread_priority import RightOfWay  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.ros.right_of_way import RightOfWay  # noqa: E402
-from rrth_planner.ros.subscriptions import OpenSubscription  # noqa: E402
+from rrth_planner.ros.requests import request_queue  # noqa: E402
 from std_msgs.msg import Int32  # noqa: E402
 
 # What waits is seen to wait for this long [s].
@@ -25,8 +26,8 @@ SOON = 0.1
 @pytest.fixture(name='patient')
 def _patient(monkeypatch):
     """Have nobody give up waiting within a test, nor wait seldom."""
-    monkeypatch.setattr(right_of_way, 'LONGEST', 60.0)
-    monkeypatch.setattr(right_of_way, 'APART', -1.0)
+    monkeypatch.setattr(thread_priority, 'LONGEST', 60.0)
+    monkeypatch.setattr(thread_priority, 'APART', -1.0)
 
 
 def giving(way):
@@ -59,7 +60,7 @@ def test_a_way_is_left_whatever_goes_wrong_in_it(patient):
 
 
 def test_nobody_waits_long(monkeypatch, patient):
-    monkeypatch.setattr(right_of_way, 'LONGEST', 1e-3)
+    monkeypatch.setattr(thread_priority, 'LONGEST', 1e-3)
     way = RightOfWay()
     with way:
         assert giving(way).wait(30.0)
@@ -71,7 +72,7 @@ def test_nobody_waits_again_and_again(monkeypatch, patient):
         given = giving(way)
         assert not given.wait(SOON)
     assert given.wait(30.0)
-    monkeypatch.setattr(right_of_way, 'APART', 1e6)
+    monkeypatch.setattr(thread_priority, 'APART', 1e6)
     with way:
         assert giving(way).wait(30.0)
 
@@ -100,7 +101,7 @@ def test_who_plans_stands_back_where_threads_run_in_real_time(monkeypatch, prior
     told = []
     monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(priority))
     monkeypatch.setattr(os, 'sched_setparam', lambda k, p: told.append((k, p.sched_priority)))
-    right_of_way.stand_back()
+    thread_priority.stand_back()
     assert told == ([] if put is None else [(0, put)])
 
 
@@ -127,12 +128,12 @@ def test_who_may_not_stand_back_plans_all_the_same(monkeypatch):
 
     monkeypatch.setattr(os, 'sched_getparam', lambda _: os.sched_param(10))
     monkeypatch.setattr(os, 'sched_setparam', refuse)
-    right_of_way.stand_back()
+    thread_priority.stand_back()
 
 
 def test_the_planner_stands_back(monkeypatch):
     stood = []
-    monkeypatch.setattr(plan_queue, 'stand_back', lambda: stood.append(get_ident()))
+    monkeypatch.setattr(request_queue, 'stand_back', lambda: stood.append(get_ident()))
     node = PlannerNode(namespace='/standing_back')
     try:
         ran = []
@@ -165,8 +166,8 @@ def test_who_hears_rests_where_messages_come_without_end(monkeypatch, spacing, w
         ('thread_time', lambda: ran[0]),
         ('sleep', sleep),
     ):
-        monkeypatch.setattr(right_of_way.time, name, function)
-    rest = right_of_way.Breather()
+        monkeypatch.setattr(thread_priority.time, name, function)
+    rest = thread_priority.Breather()
     for k in range(2000):
         now[0], ran[0] = now[0] + spacing, ran[0] + works[k % len(works)]
         rest()

@@ -49,7 +49,7 @@ import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.ros.trajectories import joint_trajectory_to_msg  # noqa: E402
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
 import worlds  # noqa: E402
 
 ARM = worlds.table_1_arm()

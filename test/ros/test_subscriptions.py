@@ -13,13 +13,13 @@ from hypothesis import given, settings, strategies as st  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
-from rrth_planner.ros import marker_order  # noqa: E402
-from rrth_planner.ros.bodies import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.edits import read_edits  # noqa: E402
-from rrth_planner.ros.inputs import Input  # noqa: E402
-from rrth_planner.ros.joints import joint_reading  # noqa: E402
-from rrth_planner.ros.marker_order import MarkerOrder  # noqa: E402
-from rrth_planner.ros.subscriptions import (  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input  # noqa: E402
+from rrth_planner.ros.messages import marker_order  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.joint_state import joint_reading  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import read_edits  # noqa: E402
+from rrth_planner.ros.messages.marker_order import MarkerOrder  # noqa: E402
+from rrth_planner.ros.middleware.open_subscription import (  # noqa: E402
     Copies,
     OpenSubscription,
     REMEMBERED,

@@ -13,7 +13,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
-from rrth_planner.ros.child_process import ChildProcess  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402

@@ -17,10 +17,10 @@ from rclpy.task import Future
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
+from rrth_planner.ros.client.viewer_feed import following, SERVICE, ViewerFeed
+from rrth_planner.ros.middleware.qos import LATCHED
 from rrth_planner.ros.planner_node import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode
-from rrth_planner.ros.profiles import LATCHED
-from rrth_planner.ros.viewer_feed import following, SERVICE, ViewerFeed
 from samples import wearer
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray

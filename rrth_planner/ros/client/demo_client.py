@@ -1,0 +1,100 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node of the demo: what a program that uses planner and playback has to do."""
+
+from collections.abc import Callable
+import time
+
+import numpy as np
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.ros.client.answer_parser import answer_from_text
+from rrth_planner.ros.client.planner_client import PlannerClient
+from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
+from visualization_msgs.msg import MarkerArray
+
+ARRIVED = 1e-3
+STILL = 1e-6
+
+
+class DemoError(RrthError):
+    """Something that ends the demo."""
+
+
+class DemoClient(PlannerClient):
+    """
+    Tells the planner body and target, asks for motions, and follows the arm.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    timeout : float
+        Longest wait for anything [s].
+    check : callable
+        Raises when going on waiting makes no sense.
+
+    """
+
+    def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
+        """Create publishers, subscriptions and the client of the planner."""
+        super().__init__('rrth_demo', timeout, check)
+        self._joints_of_arm = arm.joint_names
+
+    def wait_for_nodes(self) -> None:
+        """Wait until the planner can be asked, and the arm can be seen and listens."""
+        self.wait_for_state(self._joints_of_arm)
+        self.wait_for_planner()
+        self.wait_for(lambda: self.count_arms() > 0, 'an arm that listens to joint_trajectory')
+
+    def present(self) -> Array:
+        """Return the latest joint positions, (dof,) [rad]."""
+        return self.positions(self._joints_of_arm)
+
+    def ask_for_motion(self) -> tuple[Trajectory, float]:
+        """Return the motion that the planner publishes, and its planning time [ms]."""
+        self.watch()
+        response = self.ask(self.timeout)
+        if not response.success:
+            raise DemoError(f'the planner refused: {response.message}')
+        self.wait_for(lambda: bool(self.told), 'joint_trajectory')
+        figures = answer_from_text(response.message).figures
+        if 'planning_time_ms' not in figures:
+            raise DemoError(f'no planning time in the answer "{response.message}"')
+        trajectory = joint_trajectory_from_msg(self.told[-1], self._joints_of_arm)
+        return trajectory, figures['planning_time_ms']
+
+    def wait_for_arrival(self, trajectory: Trajectory) -> None:
+        """Wait until the arm stands still at the end of a motion."""
+        q_end = trajectory.positions[-1]
+        self.wait_for(
+            lambda: self.is_still_at(q_end, self._joints_of_arm, ARRIVED, STILL),
+            f'the arm at the end of its motion of {trajectory.duration:.2f} s',
+            trajectory.duration + self.timeout,
+        )
+
+    def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
+        """
+        Publish another body so long after the arm set off [s]; return where the arm was from then.
+
+        Waits until the arm has left where it starts, (dof,) [rad], and then until it has been
+        stopped, has been told how to go on, and has arrived there.
+        """
+        self.wait_for(
+            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm on its way'
+        )
+        end = time.monotonic() + after
+        while time.monotonic() < end:
+            self.take_messages(0.005)
+        n = len(self.told)
+        self.seen = []
+        self.tell_body(body)
+        # The stop begins in motion, what comes after it at rest.
+        self.wait_for(
+            lambda: len(self.told) > n + 1 and not any(self.told[-1].points[0].velocities),
+            'a stop and a way round',
+        )
+        self.wait_for_arrival(joint_trajectory_from_msg(self.told[-1], self._joints_of_arm))
+        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.seen])

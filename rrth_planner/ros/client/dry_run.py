@@ -1,0 +1,73 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plan as the planner would, with its parameters and what it hears, and publish nothing."""
+
+from geometry_msgs.msg import PointStamped
+from rrth_planner.model.arm import pointing_error
+from rrth_planner.model.errors import MessageError
+from rrth_planner.pipeline.plan_motion import warm_up
+from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
+from rrth_planner.ros.client.planner_client import PlannerClient
+from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.scene_monitor import Listener
+from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
+from rrth_planner.ros.requests.plan_request import plan_request
+from visualization_msgs.msg import MarkerArray
+
+
+def plan_without_moving(
+    client: PlannerClient,
+    parameters: PlannerParameters,
+    target: PointStamped,
+    body: MarkerArray | None,
+) -> tuple[Answer, float | None]:
+    """
+    Return what the planner would answer, and by how much the motion would aim past the target [m].
+
+    Parameters
+    ----------
+    client : PlannerClient
+        Hears where the arm is.
+    parameters : PlannerParameters
+        Of the planner.
+    target : PointStamped
+    body : MarkerArray or None
+        None: what is heard on `body_boxes`.
+
+    Raises
+    ------
+    NotInTimeError
+        No joint positions, or no body.
+
+    """
+    heard = Inputs(
+        *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+    )
+    listener = Listener(client, parameters, heard, lambda: None)
+    client.wait_for(lambda: heard.joints.received is not None, heard.joints.topic)
+    if body is None:
+        client.wait_for(
+            lambda: heard.body.received is not None or heard.body.refusal is not None,
+            f'a body on {heard.body.topic}, and none is given by --body',
+        )
+    warm_up(parameters.arm, parameters.options)
+    # Compiling or loading may have taken a while; the arm may have moved.
+    client.wait_for_state(parameters.arm.joint_names)
+    try:
+        goal = listener.goal(target)
+    except MessageError as problem:
+        code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+        return Answer(code, str(problem), {}), None
+
+    def now() -> float:
+        return client.get_clock().now().nanoseconds * 1e-9
+
+    if body is not None:
+        heard.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
+    outcome = plan_request(heard, parameters, now, lambda: False, goal)
+    error = None
+    if outcome.trajectory is not None:
+        error = pointing_error(parameters.arm, outcome.trajectory.positions[-1], goal.target)
+    return answer_from_text(answer(outcome.code, outcome.sentence)), error

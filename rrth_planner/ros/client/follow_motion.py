@@ -1,0 +1,156 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Follow an arm to the end of what it was told, with a bar that shows how far it is."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+import time
+from typing import Any
+
+import numpy as np
+from rrth_planner.model.arm import ArmModel, pointing_error
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError
+from rrth_planner.model.trajectory import positions_at, Trajectory
+from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
+from tqdm import tqdm  # type: ignore[import-untyped]
+from trajectory_msgs.msg import JointTrajectory
+
+# A motion that ends so far past its target was planned for another one [m].
+AIMS_ELSEWHERE = 1e-3
+# Durations of a motion in an answer and in its message are as close as that [s].
+SAME_DURATION = 2e-3
+# An arm that has arrived stays there for so long [s].
+SETTLED = 0.1
+# And moves no faster [rad/s].
+REST_SPEED = 0.01
+SPACING = 0.01
+
+
+def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> Trajectory:
+    """Return the motion of an answer, which says its duration [s], once it has been heard."""
+    found: list[Trajectory] = []
+
+    def is_heard() -> bool:
+        # What an earlier request left on the latched topic may come first.
+        motions = _motions_of(client.told, arm)
+        found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
+        return bool(found)
+
+    client.wait_for(is_heard, f'{client.resolve_topic_name("joint_trajectory")}')
+    return found[-1]
+
+
+def follow(
+    client: PlannerClient,
+    arm: ArmModel,
+    motion: Trajectory,
+    target: Array | None,
+    tolerance: float,
+) -> None:
+    """
+    Return once the arm stands at the end of its motion, or of one that has replaced it.
+
+    Parameters
+    ----------
+    client : PlannerClient
+    arm : ArmModel
+    motion : Trajectory
+        What the arm was told.
+    target : ndarray, shape (3,), or None
+        A motion that aims elsewhere, as a stop, is not the last one [m].
+    tolerance : float
+        Greatest distance of a joint from the end [rad].
+
+    Raises
+    ------
+    NotInTimeError
+        Its end does not come within the duration of the motion and the client's timeout.
+
+    """
+    with tqdm(
+        total=round(motion.duration, 2),
+        desc='the arm moves',
+        unit='s',
+        bar_format='{desc}: {percentage:3.0f}% |{bar}| {n:.1f} of {total:.1f} s',
+        leave=False,
+        # Only where somebody looks.
+        disable=None,
+    ) as bar:
+        _follow(client, arm, motion, target, tolerance, bar)
+
+
+def _follow(
+    client: PlannerClient,
+    arm: ArmModel,
+    motion: Trajectory,
+    target: Array | None,
+    tolerance: float,
+    bar: Any,
+) -> None:
+    n_told = len(client.told)
+    begin = present = time.monotonic()
+    arrived_at: float | None = None
+    while present - begin <= motion.duration + client.timeout:
+        client.take_messages(0.02)
+        present = time.monotonic()
+        newer, n_told = _motions_of(client.told[n_told:], arm), len(client.told)
+        if newer:
+            # The wearer moved, and the planner stopped the arm or sent it another way.
+            motion, begin, arrived_at = newer[-1], present, None
+            bar.reset(total=round(motion.duration, 2))
+        q = client.positions(arm.joint_names)
+        bar.n = max(bar.n, _time_along(motion, q))
+        bar.refresh()
+        is_there = client.is_still_at(motion.positions[-1], arm.joint_names, tolerance, REST_SPEED)
+        if not is_there or present - begin < motion.duration:
+            arrived_at = None
+            continue
+        arrived_at = present if arrived_at is None else arrived_at
+        if present - arrived_at >= SETTLED and _aims_at(arm, motion, target):
+            return
+    raise NotInTimeError(_why(client, arm, motion, target, tolerance))
+
+
+def _motions_of(told: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
+    """Return the motions of this arm; the topic may carry another machine's, or nonsense."""
+    motions = []
+    for msg in told:
+        with suppress(MessageError):
+            motions.append(joint_trajectory_from_msg(msg, arm.joint_names))
+    return motions
+
+
+def _time_along(motion: Trajectory, q: Array) -> float:
+    """Return when the motion is closest to where the arm is [s]."""
+    times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
+    gaps = np.linalg.norm(positions_at(motion, times) - q, axis=1)
+    return round(float(times[int(np.argmin(gaps))]), 2)
+
+
+def _aims_at(arm: ArmModel, motion: Trajectory, target: Array | None) -> bool:
+    return target is None or pointing_error(arm, motion.positions[-1], target) <= AIMS_ELSEWHERE
+
+
+def _why(
+    client: PlannerClient,
+    arm: ArmModel,
+    motion: Trajectory,
+    target: Array | None,
+    tolerance: float,
+) -> str:
+    topic = client.resolve_topic_name('joint_trajectory')
+    if not _aims_at(arm, motion, target):
+        return (
+            'the arm was stopped on its way, and nothing that leads to the target came on '
+            f'{topic} within {client.timeout:g} s'
+        )
+    gaps = np.abs(client.positions(arm.joint_names) - motion.positions[-1])
+    k = int(np.argmax(gaps))
+    listener = '' if client.count_arms() > 0 else f'; nobody else listens to {topic}'
+    return (
+        f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
+        f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
+        f'{client.timeout:g} s more{listener}'
+    )

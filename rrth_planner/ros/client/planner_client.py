@@ -1,0 +1,196 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A node that tells a planner body and target, asks it, and sees how the arm moves."""
+
+from collections.abc import Callable, Sequence
+import time
+from typing import Any
+import warnings
+
+from geometry_msgs.msg import PointStamped
+import numpy as np
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import ReliabilityPolicy
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
+from rrth_planner.ros.middleware.qos import LATCHED
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
+# Between two requests of a planner that has not heard everything yet [s].
+PAUSE = 0.3
+
+
+class NotInTimeError(RrthError):
+    """Something that was waited for did not come."""
+
+
+class PlannerClient(Node):
+    """
+    What every program that has a planner move an arm needs.
+
+    Messages are taken while something is waited for, and only then.
+
+    Parameters
+    ----------
+    name : str
+    timeout : float
+        Longest wait for anything [s].
+    check : callable
+        Raises when going on waiting makes no sense.
+
+    """
+
+    def __init__(
+        self, name: str, timeout: float, check: Callable[[], None] = lambda: None
+    ) -> None:
+        """Create publishers, subscriptions and the client of the planner."""
+        super().__init__(name)
+        self.timeout, self._check = timeout, check
+        # The joints that count; empty: those of whatever message comes.
+        self._joint_names: tuple[str, ...] = ()
+        self.state: JointState | None = None
+        # All that the arm was told, and where it was, since `watch` was called.
+        self.told: list[JointTrajectory] = []
+        self.seen: list[JointState] = []
+        self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
+        self._target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
+        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_motion, LATCHED)
+        self._plan = self.create_client(Trigger, 'rrth_planner/plan')
+        self._spinner = SingleThreadedExecutor()
+        self._spinner.add_node(self)
+
+    def wait_for(
+        self, condition: Callable[[], bool], what: str, timeout: float | None = None
+    ) -> None:
+        """Take messages until a condition holds, or raise NotInTimeError after a time [s]."""
+        timeout = self.timeout if timeout is None else timeout
+        end = time.monotonic() + timeout
+        while not condition():
+            self.take_messages()
+            if time.monotonic() > end:
+                raise NotInTimeError(f'{what}: nothing for {timeout:g} s')
+
+    def take_messages(self, longest: float = 0.05) -> None:
+        """Take a message, if one comes within a time [s]."""
+        try:
+            self._spinner.spin_once(timeout_sec=longest)
+        except KeyboardInterrupt:
+            # What is cut off in mid-step would warn of that when Python ends.
+            warnings.simplefilter('ignore', RuntimeWarning)
+            raise
+        self._check()
+
+    def wait_for_planner(self) -> None:
+        """Wait until the planner can be asked."""
+        service = self.resolve_service_name('rrth_planner/plan')
+        self.wait_for(self._plan.service_is_ready, f'service {service}')
+
+    def wait_for_state(self, joint_names: Sequence[str] = ()) -> None:
+        """Wait until the arm has been seen; messages without all of these joints are none."""
+        self._joint_names, self.state = tuple(joint_names), None
+        joints = f' of {", ".join(joint_names)}' if joint_names else ''
+        self.wait_for(lambda: self.state is not None, f'{self._joints.topic_name}{joints}')
+
+    def positions(self, joint_names: Sequence[str]) -> Array:
+        """Return the latest positions of these joints, (dof,) [rad]."""
+        if self.state is None:
+            raise NotInTimeError('joint_states: none yet')
+        return configuration_from_msg(self.state, joint_names)
+
+    def is_still_at(
+        self, q: Array, joint_names: Sequence[str], tolerance: float, speed: float
+    ) -> bool:
+        """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
+        if np.abs(self.positions(joint_names) - q).max() > tolerance:
+            return False
+        assert self.state is not None
+        names = list(self.state.name)
+        if len(self.state.velocity) != len(names):
+            # Not every arm says how fast it is.
+            return True
+        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in joint_names)
+
+    def tell_body(self, body: MarkerArray) -> None:
+        """Publish the wearer's body; return once the planner has it."""
+        self._tell(self._body, body)
+
+    def tell_target(self, target: PointStamped) -> None:
+        """Publish a target; return once the planner has it."""
+        self._tell(self._target, target)
+
+    def ask(self, patience: float) -> Trigger.Response:
+        """Return the planner's answer; ask it again while it has not heard everything [s]."""
+        end = time.monotonic() + patience
+        answer = self._call()
+        while answer.message.startswith(NO_INPUT_YET) and time.monotonic() < end:
+            self._pause()
+            answer = self._call()
+        return answer
+
+    def watch(self) -> None:
+        """Begin to write down what the arm is told and where it is."""
+        self.told, self.seen = [], []
+
+    def count_arms(self) -> int:
+        """Return how many others hear what an arm is told."""
+        return self.count_subscribers('joint_trajectory') - 1
+
+    def _tell(self, publisher: Any, message: Any) -> None:
+        self.wait_for(
+            lambda: is_heard(self, publisher), f'a reliable subscription of {publisher.topic}'
+        )
+        publisher.publish(message)
+        # The request that follows takes another way, and must not overtake the message.
+        if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
+            raise NotInTimeError(f'{publisher.topic}: not taken within {self.timeout:g} s')
+
+    def _call(self) -> Trigger.Response:
+        future = self._plan.call_async(Trigger.Request())
+        self.wait_for(future.done, 'an answer of rrth_planner/plan')
+        return future.result()
+
+    def _pause(self) -> None:
+        """Let a while pass, taking messages."""
+        end = time.monotonic() + PAUSE
+        while time.monotonic() < end:
+            self.take_messages()
+
+    def _on_state(self, msg: JointState, _: Arrival) -> None:
+        try:
+            configuration_from_msg(msg, self._joint_names)
+        except MessageError:
+            # Of other joints, or nonsense: the arm is where it was seen last.
+            return
+        self.state = msg
+        self.seen.append(msg)
+
+    def _on_motion(self, msg: JointTrajectory) -> None:
+        self.told.append(msg)
+
+
+def is_heard(node: Node, publisher: Publisher) -> bool:
+    """
+    Return whether all who listen are connected, one of them so that it acknowledges.
+
+    Before that, `wait_for_all_acked` may wait for nobody.
+
+    Parameters
+    ----------
+    node : Node
+        Of the publisher.
+    publisher : Publisher
+
+    """
+    infos = node.get_subscriptions_info_by_topic(publisher.topic)
+    is_reliable = any(info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos)
+    return is_reliable and publisher.get_subscription_count() >= len(infos)

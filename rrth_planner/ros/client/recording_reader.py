@@ -1,0 +1,250 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Read a recording of a run from an MCAP file, whichever recorder wrote it."""
+
+from collections.abc import Callable
+from pathlib import Path
+import struct
+from typing import Any, NamedTuple
+
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader
+from mcap_ros2.decoder import DecoderFactory
+import numpy as np
+from rrth_planner.execution.recording import Recording, Told
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.errors import MessageError, RecordError
+from rrth_planner.model.scene import Scene
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading, JointReading
+from rrth_planner.ros.messages.marker_edits import read_edits
+from rrth_planner.ros.messages.marker_order import MarkerOrder
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
+
+# The topics of a run, below whatever namespace, and their types.
+TYPES = {
+    'body_boxes': 'visualization_msgs/msg/MarkerArray',
+    'target': 'geometry_msgs/msg/PointStamped',
+    'joint_states': 'sensor_msgs/msg/JointState',
+    'joint_trajectory': 'trajectory_msgs/msg/JointTrajectory',
+    'diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+}
+# A stamp that is further from when the message was sent is of another clock [s].
+SAME_CLOCK = 1.0
+
+
+class Heard(NamedTuple):
+    """A message of a file, when it was sent and when it came [ns]."""
+
+    msg: Any
+    sent: int
+    received: int
+
+
+class RecordingReader:
+    """
+    The messages of a file, read as the nodes read them.
+
+    Parameters
+    ----------
+    path : Path
+    arm : ArmModel
+        Whose joints are looked for.
+    base_frame : str
+        Of the planner; messages in other frames are refused.
+    namespace : str, optional
+        Of the run; without, there must be one only.
+
+    Attributes
+    ----------
+    refused : dict
+        By topic, why its last bad message was refused; bad messages are left out.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be read, or holds no run, or several.
+
+    """
+
+    def __init__(
+        self, path: Path, arm: ArmModel, base_frame: str, namespace: str | None = None
+    ) -> None:
+        """Read the file."""
+        self._path, self._arm, self._base_frame = path, arm, base_frame
+        topics, self._begin, self.refused = _read(path)
+        self._topics = {role: self._topic(topics, role, namespace) for role in TYPES}
+        self._heard = {
+            role: [] if topic is None else sorted(topics[topic], key=lambda heard: heard.received)
+            for role, topic in self._topics.items()
+        }
+
+    def recording(self) -> Recording:
+        """Return the run."""
+        readings = self._readings()
+        if not readings:
+            raise RecordError(
+                f'{self._path}: no joint_states of {list(self._arm.joint_names)}, expected a run '
+                'of this arm'
+            )
+        # Stamps of several publishers may cross.
+        times, order = np.unique(
+            [reading.taken - self._begin / NANOSECONDS for reading in readings], return_index=True
+        )
+        positions = np.array([readings[i].positions for i in order])
+        velocities = np.array([readings[i].velocities for i in order])
+        if not np.isfinite(velocities).all():
+            # What a driver does not know: then as the positions change.
+            changes = np.gradient(positions, times, axis=0) if len(times) > 1 else 0.0 * positions
+            velocities = np.where(np.isfinite(velocities), velocities, changes)
+        return Recording(
+            times=times,
+            positions=positions,
+            velocities=velocities,
+            told=tuple(sorted(self._told(), key=lambda told: told.begin)),
+            bodies=tuple(self._bodies()),
+            targets=tuple(self._good('target', lambda h: (self._when(h), self._target_of(h.msg)))),
+            guard=tuple(self._guard()),
+        )
+
+    def _topic(
+        self, topics: dict[str, list[Heard]], role: str, namespace: str | None
+    ) -> str | None:
+        # Diagnostics have one topic for all namespaces.
+        if role == 'diagnostics' and '/diagnostics' in topics:
+            return '/diagnostics'
+        found = sorted(name for name in topics if name.rsplit('/', 1)[-1] == role)
+        if namespace is not None:
+            wanted = f'/{namespace.strip("/")}/{role}'.replace('//', '/')
+            found = [name for name in found if name == wanted]
+        if len(found) > 1:
+            spaces = ', '.join(name.rsplit('/', 1)[0] or '/' for name in found)
+            raise RecordError(
+                f'{self._path}: {role} of several runs, expected --namespace with one of {spaces}'
+            )
+        return found[0] if found else None
+
+    def _good(self, role: str, read: Callable[[Heard], Any]) -> list[Any]:
+        """Return what is read of each message that the nodes would not refuse."""
+        result = []
+        for heard in self._heard[role]:
+            try:
+                result.append(read(heard))
+            except MessageError as problem:
+                self.refused[str(self._topics[role])] = str(problem)
+        return result
+
+    def _when(self, heard: Heard) -> float:
+        """Return when a message was sent, on the clock of the recording [s]."""
+        return (heard.sent - self._begin) / NANOSECONDS
+
+    def _readings(self) -> list[JointReading]:
+        before: JointReading | None = None
+
+        def read(heard: Heard) -> JointReading:
+            nonlocal before
+            names = self._arm.joint_names
+            before = joint_reading(heard.msg, names, heard.received / NANOSECONDS, before)
+            return before
+
+        names = self._arm.joint_names
+        self._heard['joint_states'] = [
+            heard for heard in self._heard['joint_states'] if has_joint_of(heard.msg, names)
+        ]
+        return self._good('joint_states', read)
+
+    def _told(self) -> list[Told]:
+        def read(heard: Heard) -> Told:
+            trajectory = joint_trajectory_from_msg(heard.msg, self._arm.joint_names)
+            sent = self._when(heard)
+            stamped = seconds_of(heard.msg.header.stamp) - self._begin / NANOSECONDS
+            return Told(stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory)
+
+        return self._good('joint_trajectory', read)
+
+    def _target_of(self, msg: Any) -> Any:
+        return goal_from_msg(msg, self._base_frame).target
+
+    def _bodies(self) -> list[tuple[float, Scene]]:
+        order, body = MarkerOrder(), WearerBody()
+
+        def read(heard: Heard) -> tuple[float, WearerBody]:
+            nonlocal body
+            now = self._when(heard)
+            edits = read_edits(heard.msg, now, self._base_frame)
+            body = order.apply(
+                body, edits, (heard.sent, 0), now, lambda other: other[0] > heard.sent
+            )
+            return now, body
+
+        bodies = self._good('body_boxes', read)
+        result = []
+        for i, (begin, present) in enumerate(bodies):
+            result.append((begin, scene_of(present)))
+            end = bodies[i + 1][0] if i + 1 < len(bodies) else float('inf')
+            lifetimes = sorted({part.expires for _, part in present.parts})
+            result += [(t, scene_of(present.at(t))) for t in lifetimes if begin < t < end]
+        return sorted(result, key=lambda item: item[0])
+
+    def _guard(self) -> list[tuple[float, str]]:
+        """Return what the guard of this run did, from when on."""
+        said: dict[str, list[tuple[float, str]]] = {}
+        for heard in self._heard['diagnostics']:
+            for status in heard.msg.status:
+                values = {item.key: item.value for item in status.values}
+                if status.hardware_id == 'rrth_planner' and 'guard' in values:
+                    item = (self._when(heard), values['guard'])
+                    said.setdefault(status.name.split(':')[0], []).append(item)
+        # All planners of a network share the topic.
+        topic = self._topics['joint_trajectory'] or self._topics['joint_states'] or ''
+        space = topic.rsplit('/', 1)[0].lstrip('/')
+        ours = [name for name in said if name.rpartition('/')[0] == space]
+        if len(ours) != 1:
+            ours = list(said) if len(said) == 1 else []
+        return sorted(said[ours[0]]) if ours else []
+
+
+def _read(path: Path) -> tuple[dict[str, list[Heard]], int, dict[str, str]]:
+    """Return a run by topic, when its first message came [ns], and why messages are left out."""
+    topics: dict[str, list[Heard]] = {}
+    refused: dict[str, str] = {}
+    factory, begin = DecoderFactory(), 0
+    try:
+        with path.open('rb') as file:
+            # From front to back, since a recorder that was killed has written no index.
+            for schema, channel, message in NonSeekingReader(file).iter_messages(
+                log_time_order=False
+            ):
+                begin = min(begin or message.log_time, message.log_time)
+                role = channel.topic.rsplit('/', 1)[-1]
+                decode = factory.decoder_for(channel.message_encoding, schema)
+                if schema is None or decode is None or TYPES.get(role) != schema.name:
+                    continue
+                heard = topics.setdefault(channel.topic, [])
+                try:
+                    msg = decode(message.data)
+                except Exception as problem:
+                    # Whoever published it may have sent anything: those after it count.
+                    refused[channel.topic] = (
+                        f'{len(message.data)} bytes ({problem or type(problem).__name__}), '
+                        f'expected a {schema.name}'
+                    )
+                    continue
+                heard.append(Heard(msg, message.publish_time, message.log_time))
+    except OSError as problem:
+        raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
+    except (EndOfFile, struct.error):
+        # Cut short: what is there counts.
+        pass
+    except Exception as problem:
+        # Whoever made the file may have written anything.
+        raise RecordError(
+            f'{path}: {problem or type(problem).__name__}, expected an MCAP file of ROS 2 messages'
+        ) from problem
+    if not topics:
+        raise RecordError(
+            f'{path}: none of {", ".join(TYPES)} in it, expected an MCAP file of a run'
+        )
+    return topics, begin, refused

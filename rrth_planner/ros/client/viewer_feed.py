@@ -1,0 +1,239 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the viewer hears of the running nodes, and what it asks of the planner."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from threading import Lock, Thread
+import time
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+import numpy as np
+import rclpy
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, one_line, OptionsError, RrthError
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.ros.interface.inputs import Inputs
+from rrth_planner.ros.interface.parameters import declare_parameters
+from rrth_planner.ros.interface.scene_monitor import Listener
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
+from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
+from rrth_planner.ros.middleware.qos import LATCHED
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
+# A target that is not taken after this time is not waited for [s].
+LONGEST_WAY = 1.0
+# From an answer to the next request, so that the arm is well under way; how often it is looked
+# whether a plan is wanted [s].
+PAUSE, PERIOD = 0.3, 0.02
+
+
+class ViewerFeed(Node):
+    """
+    Hear body, target, joints and motions; publish targets and call the planner's service.
+
+    Its parameters are those of the planner: arm, base frame, margin and the length of the guarded
+    ray are taken from them.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        """
+        Begin to listen.
+
+        Raises
+        ------
+        RrthError, ParameterException
+            A parameter that is refused.
+
+        """
+        super().__init__(NAME, **kwargs)
+        parameters = declare_parameters(self)
+        self.arm, self.margin = parameters.arm, parameters.margin
+        self.ray_guard_length = parameters.ray_guard_length
+        self._frame = parameters.base_frame
+        self._heard = Inputs(
+            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        )
+        self._listener = Listener(self, parameters, self._heard, lambda: None)
+        self._motions = OpenSubscription(
+            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._refuse
+        )
+        self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
+        self._client = self.create_client(Trigger, SERVICE)
+        self._motion: Trajectory | None = None
+        self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
+        # Of what the page's threads ask for and the executor's takes: never half of it.
+        self._lock = Lock()
+        self._is_asking, self._is_wanted = False, False
+        self._newest: Array | None = None
+        self._asked: Future | None = None
+        self._answer, self._answered = '', -PAUSE
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(PERIOD, self._on_timer, clock=steady)
+
+    @property
+    def scene(self) -> Scene:
+        """The wearer in the base frame."""
+        now = self.get_clock().now().nanoseconds * 1e-9
+        body = self._heard.body.value.at(now)
+        if body is not self._shown[0]:
+            self._shown = (body, scene_of(body))
+        return self._shown[1]
+
+    @property
+    def target(self) -> Array | None:
+        """In the base frame, (3,) [m]."""
+        goal = self._heard.target.value
+        return None if goal is None else goal.target
+
+    @property
+    def positions(self) -> Array | None:
+        """Of the joints, (dof,) [rad]."""
+        reading = self._heard.joints.value
+        return None if reading is None else reading.positions
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """The last motion that was published."""
+        return self._motion
+
+    @property
+    def said(self) -> str:
+        """The last answer of the planner, or what is still missing."""
+        heard = self._heard
+        missing = [
+            topic.topic for topic in (heard.body, heard.target, heard.joints) if not topic.n_good
+        ]
+        if not self._client.service_is_ready():
+            missing.append(f'service {self._client.srv_name}')
+        waiting = f'waiting for {", ".join(missing)}' if missing else ''
+        return '; '.join(filter(None, (self._answer, waiting))) or 'drag the target, or press Plan'
+
+    @property
+    def is_asking(self) -> bool:
+        """Whether an answer is still to come."""
+        with self._lock:
+            return self._is_wanted or self._is_asking
+
+    def ask(self, target: Array | None = None) -> None:
+        """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
+        # Not published at once: a request would overtake a queue of targets.
+        newest = None if target is None else np.array(target, dtype=np.float64)
+        with self._lock:
+            self._newest = self._newest if newest is None else newest
+            self._is_wanted = True
+
+    def _on_timer(self) -> None:
+        """Ask for the plan that is wanted, one at a time, and none of an arm about to set off."""
+        is_ready = self._client.service_is_ready()
+        if self._asked is not None and not is_ready:
+            # Of a planner that is gone no answer will come.
+            self._client.remove_pending_request(self._asked)
+            self._conclude('the planner has ended without an answer')
+        is_soon = time.monotonic() < self._answered + PAUSE
+        with self._lock:
+            if not self._is_wanted or self._is_asking or is_soon or not is_ready:
+                return
+            self._is_asking, self._is_wanted = True, False
+            target, self._newest = self._newest, None
+        if target is not None:
+            self._publish(target)
+        # The request takes another way than the target, and must not overtake it.
+        self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
+        self._asked = self._client.call_async(Trigger.Request())
+        self._asked.add_done_callback(self._on_answer)
+
+    def _publish(self, target: Array) -> None:
+        msg = PointStamped()
+        msg.header.frame_id = self._frame
+        msg.header.stamp = self.get_clock().now().to_msg()
+        msg.point.x, msg.point.y, msg.point.z = target.tolist()
+        self._targets.publish(msg)
+
+    def _on_answer(self, future: Future) -> None:
+        problem = future.exception()
+        if problem is None:
+            self._conclude(one_line(str(future.result().message)))
+        else:
+            self._conclude(f'no answer of the planner: {one_line(str(problem))}')
+
+    def _conclude(self, answer: str) -> None:
+        """Keep what came of a request; the next one may follow."""
+        self._answer, self._answered, self._asked = answer, time.monotonic(), None
+        with self._lock:
+            self._is_asking = False
+
+    def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
+        try:
+            self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
+        except MessageError as problem:
+            self._refuse(problem)
+
+    def _refuse(self, problem: MessageError) -> None:
+        self.get_logger().warning(f'joint_trajectory refused: {problem}')
+
+
+@contextmanager
+def following(
+    arm: Path | None, settings: Path | None, ros_args: Sequence[str] = ()
+) -> Iterator[ViewerFeed]:
+    """
+    Give a feed that listens in a thread of its own while the block runs.
+
+    Parameters
+    ----------
+    arm : Path or None
+        File of the arm, laid out as `config/arm.yaml`; None: as the settings or `ros_args` say.
+    settings : Path or None
+        Parameters, laid out as `config/planner.yaml`.
+    ros_args : sequence of str
+        From `--ros-args` on: remaps and parameters.
+
+    Raises
+    ------
+    RrthError
+        An argument or a parameter that is refused.
+
+    """
+    own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []
+    try:
+        rclpy.init(args=[*own, *ros_args], signal_handler_options=SignalHandlerOptions.NO)
+        overrides = [Parameter('arm', value=str(arm))] if arm else []
+        node = ViewerFeed(parameter_overrides=overrides)
+    except (ParameterException, RuntimeError) as problem:
+        rclpy.try_shutdown()
+        raise OptionsError(f'--live: {problem}') from problem
+    except RrthError:
+        rclpy.try_shutdown()
+        raise
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = Thread(target=_spin, args=(executor,), name='viewer feed', daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        executor.shutdown()
+        thread.join()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    with suppress(ExternalShutdownException):
+        executor.spin()

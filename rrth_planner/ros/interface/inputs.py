@@ -1,0 +1,337 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner has heard: the last good body, target and joint positions, and refusals."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import RLock
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.localization import sharp_phase_of, takeover
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.trajectory import REST_SPEED
+from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.error_codes import code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.joint_state import JointReading
+from rrth_planner.ros.middleware.thread_priority import RightOfWay
+
+T = TypeVar('T')
+# A message from further ahead was heard before the clock was set back: nobody knows when [s].
+CLOCK_STEP = 0.1
+
+
+class RequestError(RrthError):
+    """A request that ends without a motion, with the code of its answer."""
+
+    def __init__(self, code: ErrorCode, sentence: str) -> None:
+        """Keep the code beside the sentence."""
+        super().__init__(sentence)
+        self.code = code
+
+
+class ArmHasMoved(RequestError):
+    """The arm is not where a motion needs it."""
+
+
+class Input(Generic[T]):
+    """
+    The last good value of one topic; a refused message changes nothing but the counts.
+
+    Parameters
+    ----------
+    topic : str
+        Its resolved name, for sentences.
+    empty : object
+        The value before the first message.
+
+    """
+
+    def __init__(self, topic: str, empty: T) -> None:
+        """Begin with nothing heard."""
+        self.topic = topic
+        self.value = empty
+        self.received: float | None = None
+        self.n_good, self.n_refused = 0, 0
+        self.refusal: MessageError | None = None
+        self.is_last_refused = False
+
+    def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
+        """
+        Take what `read` returns, heard at a time [s]; return False when it refuses.
+
+        is_news: False where something newer has come before; then it is no younger for this, and a
+        refusal of that newer one stands.
+        """
+        try:
+            self.value = read()
+        except MessageError as problem:
+            self._refuse(problem)
+            return False
+        except Exception as problem:
+            self._refuse(
+                MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
+            )
+            raise
+        self.n_good += 1
+        if is_news or self.received is None:
+            self.received = now
+        if is_news:
+            self.is_last_refused = False
+        return not self.is_last_refused
+
+    def _refuse(self, problem: MessageError) -> None:
+        self.n_refused += 1
+        self.refusal, self.is_last_refused = problem, True
+
+    def age(self, now: float) -> float:
+        """Return the time since the last good message; inf before it, or where unknown [s]."""
+        if self.received is None or now < self.received - CLOCK_STEP:
+            return float('inf')
+        return max(0.0, now - self.received)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanInputs:
+    """What one plan begins with: copies, which later messages do not change."""
+
+    scene: Scene
+    goal: PointingGoal
+    joints: JointReading
+
+    @property
+    def q_start(self) -> Array:
+        """Where the arm is, shape (dof,) [rad]."""
+        return self.joints.positions
+
+    def is_moving(self, now: float) -> bool:
+        """Return whether the arm moves at a time [s]."""
+        joints = self.joints
+        return now <= joints.velocities_expire and not bool(
+            (np.abs(joints.velocities) <= REST_SPEED).all()
+        )
+
+    def require_rest(self, now: float, arm: ArmModel) -> None:
+        """Raise ArmHasMoved where the arm moves at a time [s]."""
+        if self.is_moving(now):
+            raise ArmHasMoved(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
+            )
+
+    def pauses(self, running: RunningMotion | None, now: float, span: float) -> bool:
+        """Return whether the arm rests within its motion, to go on in less than a span [s]."""
+        if running is None or self.is_moving(now):
+            return False
+        followed = self._followed(running)
+        if followed is None:
+            return False
+        phase, rate = followed
+        then = running.start_time + phase + rate * (now - self.joints.taken)
+        return running.will_move(then, rate * span)
+
+    def ahead(self, running: RunningMotion | None, time: float, arm: ArmModel) -> Takeover:
+        """Return what an arm that moves will do at a time [s], or raise RequestError."""
+        joints = self.joints
+        if not np.isfinite(joints.velocities).all():
+            raise RequestError(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected a velocity for every joint',
+            )
+        known = None
+        if running is not None and joints.taken < running.start_time <= time:
+            # The arm was not on it yet: a stop, for one, may just have been told.
+            known = joints.taken - running.start_time, 1.0
+        elif running is not None and not self.is_moving(joints.taken):
+            known = self._followed(running)
+        # Speeds that overflow belong to no motion.
+        with np.errstate(all='ignore'):
+            found = takeover(
+                joints.positions,
+                joints.velocities,
+                None if running is None else running.trajectory,
+                time - joints.taken,
+                known,
+            )
+        if not np.isfinite(found.state.positions).all():
+            raise RequestError(
+                ErrorCode.START_STATE_INVALID,
+                f'{self._fastest(arm)}, expected a speed at which it is somewhere '
+                f'{time - joints.taken:.3f} s later',
+            )
+        return found
+
+    def _followed(self, running: RunningMotion) -> tuple[float, float] | None:
+        """Return the time within a motion where an arm hardly moves [s], and its rate."""
+        joints = self.joints
+        q, v = joints.positions, joints.velocities
+        # An arm that follows its motion slowly hardly moves for long: it only seems on time.
+        with np.errstate(all='ignore'):
+            found = sharp_phase_of(q, v, running.trajectory)
+        if found is None and running.is_on_time(q, v, joints.taken):
+            # No velocity tells how far an arm has come that rests for a moment.
+            found = joints.taken - running.start_time, 1.0
+        return found
+
+    def _fastest(self, arm: ArmModel) -> str:
+        speeds = np.abs(self.joints.velocities)
+        k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
+        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
+        return f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}'
+
+
+class Inputs:
+    """The three topics that a plan needs."""
+
+    def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
+        """Begin with nothing heard."""
+        # Held while a message is taken, and while a motion is told that fits what was heard.
+        self.lock = RLock()
+        # Taken while a body is read and held against the motion that runs.
+        self.way = RightOfWay()
+        self.body = Input(body_topic, WearerBody())
+        self.target: Input[PointingGoal | None] = Input(target_topic, None)
+        self.joints: Input[JointReading | None] = Input(joint_topic, None)
+        # Why the last message with all joints was refused; None: it was good.
+        self.joint_refusal: MessageError | None = None
+
+    @property
+    def all(self) -> dict[str, Input[Any]]:
+        """The topics by the names that diagnostics give them."""
+        return {'body': self.body, 'target': self.target, 'joints': self.joints}
+
+    def at(
+        self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
+    ) -> PlanInputs:
+        """
+        Return what a plan that begins now goes by.
+
+        Parameters
+        ----------
+        now : float
+            [s].
+        parameters : PlannerParameters
+            For their timeouts.
+        goal : PointingGoal, optional
+            Of the request; without, the last target.
+
+        Raises
+        ------
+        RequestError
+            Something is missing, too old or, as the last target or joint positions, refused.
+
+        """
+        scene = self._scene(now, parameters)
+        if goal is None:
+            goal = self._goal()
+        refusal = self.joint_refusal
+        if refusal is not None:
+            # Where the arm was before says nothing of where it is.
+            raise RequestError(
+                ErrorCode.ROBOT_STATE_STALE,
+                f'the last message on {self.joints.topic} was refused: {refusal}',
+            )
+        joints = _require(
+            self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
+        )
+        _require_fresh(
+            self.joints,
+            now,
+            parameters.joint_timeout,
+            'joint_timeout',
+            ErrorCode.ROBOT_STATE_STALE,
+        )
+        return PlanInputs(scene, goal, joints)
+
+    def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
+        _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
+        if self.body.is_last_refused:
+            # Where the wearer was before says nothing of where he is.
+            raise RequestError(
+                ErrorCode.SENSOR_INFO_STALE,
+                f'the last message on {self.body.topic} was refused: {self.body.refusal}',
+            )
+        body = self.body.value.at(now)
+        if body.expired:
+            raise RequestError(
+                ErrorCode.SENSOR_INFO_STALE,
+                f'lost parts of the body on {self.body.topic}, whose lifetime has passed: '
+                f'{body.expired_names}; expected each of them again, or its DELETE',
+            )
+        if body.n_boxes == 0:
+            raise RequestError(
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+                f'the body on {self.body.topic} is empty: every box was deleted; expected at '
+                'least one box of the wearer, since no motion is planned blindly',
+            )
+        _require_fresh(
+            self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE
+        )
+        return scene_of(body)
+
+    def _goal(self) -> PointingGoal:
+        refusal = self.target.refusal
+        if self.target.is_last_refused and refusal is not None:
+            # Pointing at the target before it is not what was asked for.
+            raise RequestError(
+                code_of_refusal(refusal, ErrorCode.INVALID_GOAL_CONSTRAINTS),
+                f'the last message on {self.target.topic} was refused: {refusal}',
+            )
+        return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
+
+
+def _require(heard: Input[Any], what: str, expected: str) -> Any:
+    if heard.received is not None:
+        return heard.value
+    if heard.refusal is None:
+        raise RequestError(
+            ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+            f'no {what} yet on {heard.topic}, expected {expected}',
+        )
+    raise RequestError(
+        code_of_refusal(heard.refusal, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
+        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} refused messages: '
+        f'{heard.refusal}',
+    )
+
+
+def _require_fresh(
+    heard: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
+) -> None:
+    age = heard.age(now)
+    if timeout > 0.0 and age > timeout:
+        raise RequestError(
+            code,
+            f'the last good message on {heard.topic} is {age:.3f} s old, expected at most '
+            f'{timeout:g} s ({name})',
+        )
+
+
+def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:
+    """Return why nobody knows any more how arm and wearer are; empty: it is known."""
+    if heard.body.is_last_refused:
+        return f'the last body was refused, {heard.body.refusal}'
+    if heard.joint_refusal is not None:
+        return f'the last joint positions were refused, {heard.joint_refusal}'
+    body = heard.body.value.at(now)
+    if body.expired:
+        return f'lost parts of the body, whose lifetime has passed: {body.expired_names}'
+    if not body.n_boxes:
+        return 'the body is empty'
+    age, most = heard.body.age(now), parameters.body_timeout
+    if 0.0 < most < age:
+        return f'the body is {age:.3f} s old, expected at most {most:g} s (body_timeout)'
+    age, most = heard.joints.age(now), parameters.joint_timeout
+    if 0.0 < most < age:
+        return (
+            f'the last joint positions are {age:.3f} s old, expected at most {most:g} s '
+            '(joint_timeout)'
+        )
+    return ''

@@ -1,0 +1,171 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner may be told: fields of the core's options as ROS parameters, and back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.planning.options import ALGORITHMS, TreeOptions
+from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, refuse_unknown, Setting
+
+# The options of all algorithms by name; the same name means the same in each.
+OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
+LONGEST_TIMEOUT = 86400.0
+
+
+def declared(dof: int) -> tuple[Setting, ...]:
+    """Return all parameters but `arm`, for an arm of so many joints."""
+    each = f'of each of the {dof} joints, or one value for all'
+    limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
+    timeout = (0.0, LONGEST_TIMEOUT, 's')
+    return (
+        Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the wearer', True),
+        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'how to search'),
+        Setting('seed', -1, -1, 2**31 - 1, '-', 'of the random draws; -1: fresh each time'),
+        Setting('margin', 0.02, 0.0, 1.0, 'm', 'clearance kept from every box'),
+        Setting(
+            'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
+        ),
+        Setting(
+            'escape_depth',
+            0.05,
+            0.0,
+            1.0,
+            'm',
+            'an arm at rest less deep in the boxes with their margin first leaves them; 0: never',
+        ),
+        Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
+        Setting(
+            'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
+        ),
+        Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
+        Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting(
+            'incident_folder',
+            '',
+            None,
+            None,
+            'path',
+            'for files about what never should happen; empty: rrth_planner/ of the ROS logs',
+        ),
+        Setting('replan', True, None, None, '-', 'plan again after a stop for the wearer'),
+        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
+        *(
+            Setting(
+                f.name,
+                f.default,
+                f.metadata['low'],
+                f.metadata['high'],
+                f.metadata['unit'],
+                f.metadata['description'],
+            )
+            for f in OPTIONS.values()
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlannerParameters:
+    """
+    All parameters as the core wants them, checked; a plan keeps the ones that it began with.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    base_frame : str
+    seed : int
+        -1: fresh each time.
+    margin, ray_guard_length, escape_depth : float
+        [m].
+    body_timeout, joint_timeout : float
+        [s]; 0: never.
+    replan : bool
+    incident_folder : str
+        Empty: a folder of the ROS logs.
+    limits : MotionLimits
+    options : TreeOptions
+        Their class is the algorithm.
+
+    """
+
+    arm: ArmModel
+    base_frame: str
+    seed: int
+    margin: float
+    ray_guard_length: float
+    escape_depth: float
+    body_timeout: float
+    joint_timeout: float
+    replan: bool
+    incident_folder: str
+    limits: MotionLimits
+    options: TreeOptions
+
+
+def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
+    """
+    Return the parameters that values by name describe.
+
+    Raises
+    ------
+    OptionsError
+        The first value that is refused: its name, what was given, what is expected, the unit.
+
+    """
+    settings = settings_from_values(values, arm.dof)
+    if not values['base_frame']:
+        raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
+    return PlannerParameters(
+        arm=arm,
+        base_frame=values['base_frame'],
+        body_timeout=values['body_timeout'],
+        joint_timeout=values['joint_timeout'],
+        replan=values['replan'],
+        incident_folder=values['incident_folder'],
+        **{field.name: getattr(settings, field.name) for field in fields(settings)},
+    )
+
+
+def declare_parameters(node: Node) -> PlannerParameters:
+    """
+    Declare all parameters on a node, and let it refuse bad values from now on.
+
+    Raises
+    ------
+    RrthError
+        A value that the node was started with is refused, or describes no arm.
+
+    """
+    declare(node, (ARM,))
+    arm = load_arm(node.get_parameter(ARM.name).value)
+    refuse_unknown(node, (ARM, *declared(arm.dof)))
+    declare(node, declared(arm.dof))
+
+    def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
+        values = _values(node, arm) | {change.name: change.value for change in changes}
+        try:
+            parameters_from_values(values, arm)
+        except RrthError as problem:
+            return SetParametersResult(successful=False, reason=str(problem))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(refuse_bad)
+    return current_parameters(node, arm)
+
+
+def current_parameters(node: Node, arm: ArmModel) -> PlannerParameters:
+    """Return what the parameters of a node are now."""
+    return parameters_from_values(_values(node, arm), arm)
+
+
+def _values(node: Node, arm: ArmModel) -> dict[str, Any]:
+    return {setting.name: node.get_parameter(setting.name).value for setting in declared(arm.dof)}

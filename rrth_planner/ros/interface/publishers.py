@@ -1,0 +1,78 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner publishes: the motion first, then what shows it."""
+
+from collections.abc import Callable
+
+from nav_msgs.msg import Path
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.messages.plan_markers import plan_markers
+from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
+from rrth_planner.ros.middleware.qos import COMMANDED, LATCHED
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+TOOL_PATH_POSES = 25
+LONGEST_FLUSH = 0.5
+
+
+class PlanPublishers:
+    """The topics that the planner publishes; late subscribers get the last plan too."""
+
+    def __init__(self, node: Node) -> None:
+        """Advertise them."""
+        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', COMMANDED)
+        self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
+        self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
+
+    def publish_motion(
+        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+    ) -> None:
+        """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
+        self.tell(self.motion(trajectory, parameters, begin))
+
+    def motion(
+        self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
+    ) -> JointTrajectory:
+        """Return the message of such a motion."""
+        return joint_trajectory_to_msg(
+            trajectory, parameters.arm.joint_names, parameters.base_frame, begin
+        )
+
+    def tell(self, msg: JointTrajectory) -> None:
+        """Publish the message of a motion."""
+        self._trajectory.publish(msg)
+
+    def assert_liveliness(self) -> None:
+        """Say that the motion that runs is watched."""
+        self._trajectory.assert_liveliness()
+
+    def flush(self) -> None:
+        """Wait, but not for long, until everybody has the last motion."""
+        self._trajectory.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
+
+    def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
+        """Return the tool's path along a motion."""
+        return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
+
+    def publish_view(
+        self,
+        trajectory: Trajectory,
+        parameters: PlannerParameters,
+        scene: Scene,
+        target: Array,
+        pause: Callable[[], None],
+    ) -> None:
+        """Publish what shows a motion, with pauses: nothing waits for it."""
+        path = self.tool_path(trajectory, parameters)
+        pause()
+        self._tool_path.publish(path)
+        pause()
+        markers = plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
+        pause()
+        self._markers.publish(markers)

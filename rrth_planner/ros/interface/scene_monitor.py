@@ -1,0 +1,184 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Keep the planner's inputs up to date with the three topics that it hears."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+import time
+from typing import Any
+
+from geometry_msgs.msg import PointStamped
+from rclpy.node import Node
+from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.ros.interface.inputs import Input, Inputs
+from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.fast_decoding import quick_decoder
+from rrth_planner.ros.messages.frames import Frames
+from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
+from rrth_planner.ros.messages.marker_edits import read_edits
+from rrth_planner.ros.messages.marker_order import MarkerOrder
+from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
+from rrth_planner.ros.middleware.thread_priority import Breather
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker, MarkerArray
+
+# Refusals of one topic are warned about at most this often [s].
+WARNING_PERIOD = 5.0
+
+
+class Listener:
+    """
+    Read messages into the inputs; a refused one changes nothing, and is warned about.
+
+    Parameters
+    ----------
+    node : Node
+    parameters : PlannerParameters
+        For what never changes: the arm and the base frame.
+    inputs : Inputs
+        Kept up to date.
+    on_change : callable
+        Called when a topic is heard for the first time, is refused, or is good again.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        parameters: PlannerParameters,
+        inputs: Inputs,
+        on_change: Callable[[], None],
+    ) -> None:
+        """Begin to listen."""
+        self._node = node
+        self._joint_names = parameters.arm.joint_names
+        self._base_frame = parameters.base_frame
+        self._on_change = on_change
+        self._frames = Frames(node, parameters.base_frame)
+        self._warned: dict[str, float] = {}
+        self._has_warned_of_empty_frame: set[str] = set()
+        self._inputs = inputs
+        # Called after each body, good or refused, with when it came [ns], and after an error that
+        # nobody expected with what it is; set once there is somebody to tell.
+        self.on_body: Callable[[int], None] = lambda arrived: None
+        self.on_error: Callable[[str], None] = lambda what: None
+        self._order, self._rest = MarkerOrder(), Breather()
+        self._subscriptions = [
+            self._subscribe(
+                MarkerArray,
+                'body_boxes',
+                inputs.body,
+                self._on_body,
+                on_late=self._on_body,
+                way=inputs.way,
+                # A person waits for it.
+                decode=quick_decoder(MarkerArray),
+            ),
+            self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
+            self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
+        ]
+
+    def _subscribe(
+        self,
+        kind: type,
+        topic: str,
+        heard: Input[Any],
+        on_message: Callable[[Any, Arrival], None],
+        on_late: Callable[[Any, Arrival], None] | None = None,
+        way: AbstractContextManager[None] | None = None,
+        decode: Callable[[bytes], Any] | None = None,
+    ) -> OpenSubscription:
+        def supervised(take: Callable[..., None]) -> Callable[..., None]:
+            def supervise(*arguments: Any) -> None:
+                try:
+                    take(*arguments)
+                except Exception as problem:
+                    self.on_error(one_line(f'{topic}: {type(problem).__name__}: {problem}'))
+                    raise
+
+            return supervise
+
+        def refuse(problem: MessageError) -> None:
+            def read() -> Any:
+                raise problem
+
+            self._take(heard, read, self._now())
+            if heard is self._inputs.body:
+                self.on_body(time.time_ns())
+
+        return OpenSubscription(
+            self._node,
+            kind,
+            topic,
+            supervised(on_message),
+            None if on_late is None else supervised(on_late),
+            supervised(refuse),
+            way,
+            decode,
+            self._rest,
+        )
+
+    def body_progress(self) -> tuple[int, int]:
+        """Return what `OpenSubscription.progress` says of the bodies."""
+        return self._subscriptions[0].progress()
+
+    def goal(self, msg: PointStamped) -> PointingGoal:
+        """Return the goal of a request's own target, or raise MessageError."""
+        return goal_from_msg(msg, self._base_frame, self._frames.lookup)
+
+    def _on_body(self, msg: MarkerArray, arrival: Arrival) -> None:
+        now, body = self._now(), self._inputs.body
+        if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
+            self._warn_of_empty_frame(body)
+
+        def read() -> WearerBody:
+            edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
+            return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
+
+        self._take(body, read, now, is_news=arrival.is_newer is None)
+        self.on_body(arrival.received)
+
+    def _on_target(self, msg: PointStamped, _: Arrival) -> None:
+        if not msg.header.frame_id:
+            self._warn_of_empty_frame(self._inputs.target)
+        self._take(self._inputs.target, lambda: self.goal(msg), self._now())
+
+    def _on_joints(self, msg: JointState, _: Arrival) -> None:
+        # Other machines share this topic; a message without any joint of ours is none of ours.
+        if not has_joint_of(msg, self._joint_names):
+            return
+        now, heard = self._now(), self._inputs.joints
+        self._take(heard, lambda: joint_reading(msg, self._joint_names, now, heard.value), now)
+        if set(self._joint_names) <= set(msg.name):
+            self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
+
+    def _take(
+        self, heard: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
+    ) -> bool:
+        was_good = heard.received is not None and not heard.is_last_refused
+        with self._inputs.lock:
+            is_good = heard.accept(read, now, is_news)
+        if not is_good:
+            self._warn(heard)
+        if is_good != was_good:
+            self._on_change()
+        return is_good
+
+    def _warn(self, heard: Input[Any]) -> None:
+        present = time.monotonic()
+        if present - self._warned.get(heard.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[heard.topic] = present
+            self._node.get_logger().warning(f'{heard.topic} refused: {heard.refusal}')
+
+    def _warn_of_empty_frame(self, heard: Input[Any]) -> None:
+        if heard.topic not in self._has_warned_of_empty_frame:
+            self._has_warned_of_empty_frame.add(heard.topic)
+            self._node.get_logger().warning(
+                f'{heard.topic}: empty frame, taken as "{self._base_frame}"'
+            )
+
+    def _now(self) -> float:
+        return self._node.get_clock().now().nanoseconds * 1e-9

@@ -1,0 +1,123 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The wearer as visualization markers: which boxes there are, and until when."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.scene import Scene
+from rrth_planner.ros.messages.frames import Lookup
+from rrth_planner.ros.messages.marker_edits import BodyPart, Edit, Key, MOST_BOXES, read_edits
+from visualization_msgs.msg import Marker, MarkerArray
+
+# So many markers whose lifetime has passed are remembered, to be named.
+MOST_EXPIRED = 100
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WearerBody:
+    """
+    The wearer's boxes by namespace and id, as RViz would show them; a value, never changed.
+
+    Parameters
+    ----------
+    parts : tuple of ((str, int), BodyPart)
+        Keys (ns, id), each once.
+    expired : tuple of ((str, int), BodyPart)
+        Those that were neither deleted nor added again since their lifetime passed: nobody knows
+        where they are. At most 100.
+
+    """
+
+    parts: tuple[tuple[Key, BodyPart], ...] = ()
+    expired: tuple[tuple[Key, BodyPart], ...] = ()
+
+    @property
+    def n_boxes(self) -> int:
+        """Number of boxes."""
+        return sum(len(part.boxes) for _, part in self.parts)
+
+    @property
+    def expired_names(self) -> str:
+        """What sentences call the parts whose lifetime has passed."""
+        return one_line(', '.join(f'"{box.name}"' for _, p in self.expired for box in p.boxes))
+
+    def at(self, now: float) -> 'WearerBody':
+        """Return the body without the parts whose lifetime has passed at a time [s]."""
+        if all(part.expires > now for _, part in self.parts):
+            return self
+        # Their first box is enough to name them.
+        gone = dict(self.expired) | {
+            k: BodyPart(part.boxes[:1], part.expires)
+            for k, part in self.parts
+            if part.expires <= now
+        }
+        return WearerBody(
+            tuple(item for item in self.parts if item[1].expires > now),
+            tuple(gone.items())[-MOST_EXPIRED:],
+        )
+
+    def apply(
+        self, msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
+    ) -> 'WearerBody':
+        """
+        Return the body after an array: all of its markers in their order, or none of them.
+
+        CUBE and CUBE_LIST markers are added or replace the one of the same ns and id; DELETE
+        removes one, DELETEALL all of its ns, or all when its ns is empty. A lifetime counts from
+        `now`. Colours are ignored: an invisible box is still an obstacle.
+
+        Parameters
+        ----------
+        msg : MarkerArray
+        now : float
+            Time of reception [s].
+        base_frame : str
+            Frame of the boxes of this body; an empty frame of a marker is taken as it.
+        lookup : callable, optional
+            frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
+
+        Raises
+        ------
+        MessageError
+            A bad marker; a FrameError when its frame is the reason.
+
+        """
+        return self.edited(read_edits(msg, now, base_frame, lookup), now)
+
+    def edited(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
+        """Return the body after the edits of one array, heard at a time [s], or raise."""
+        present = self.at(now)
+        parts, expired = dict(present.parts), dict(present.expired)
+        for edit in edits:
+            if edit.action == Marker.DELETEALL:
+                ns = edit.key[0]
+                parts = {k: part for k, part in parts.items() if ns not in ('', k[0])}
+                expired = {k: part for k, part in expired.items() if ns not in ('', k[0])}
+                continue
+            expired.pop(edit.key, None)
+            if edit.part is None:
+                parts.pop(edit.key, None)
+            else:
+                parts[edit.key] = edit.part
+        body = WearerBody(tuple(parts.items()), tuple(expired.items()))
+        if body.n_boxes > MOST_BOXES:
+            raise MessageError(f'{body.n_boxes} boxes, expected at most {MOST_BOXES} in all')
+        return body
+
+    def with_older(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
+        """
+        Return the body with what an array adds where nothing is, heard at a time [s].
+
+        For an array that is older than the body: it takes nothing away and changes nothing.
+        """
+        older = {e.key: e.part for e in edits if e.part is not None and e.part.expires > now}
+        present = dict(self.parts)
+        missing = [Edit(Marker.ADD, k, part) for k, part in older.items() if k not in present]
+        return self.edited(missing, now)
+
+
+def scene_of(body: WearerBody) -> Scene:
+    """Return the boxes of a body as a scene; take `body.at(now)` first where time matters."""
+    return Scene(tuple(box for _, part in body.parts for box in part.boxes))

@@ -1,0 +1,40 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Targets as messages, in whatever frame is known."""
+
+from geometry_msgs.msg import PointStamped
+import numpy as np
+from rrth_planner.model.errors import MessageError, SceneError
+from rrth_planner.model.goal import PointingGoal
+from rrth_planner.ros.messages.fields import position_of
+from rrth_planner.ros.messages.frames import Lookup, pose_in_base
+
+
+def goal_from_msg(
+    msg: PointStamped, base_frame: str, lookup: Lookup | None = None
+) -> PointingGoal:
+    """
+    Return the goal to point at a point.
+
+    Parameters
+    ----------
+    msg : PointStamped
+    base_frame : str
+        Frame of the goal; an empty frame of the message is taken as it.
+    lookup : callable, optional
+        frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
+
+    Raises
+    ------
+    MessageError
+        A bad point; a FrameError when its frame is the reason.
+
+    """
+    point = position_of(msg.point, 'point')
+    T = pose_in_base(msg.header.frame_id, base_frame, lookup)
+    try:
+        # What overflows is infinite, which a goal refuses.
+        with np.errstate(over='ignore', invalid='ignore'):
+            return PointingGoal(T[:3, :3] @ point + T[:3, 3])
+    except SceneError as problem:
+        raise MessageError(str(problem)) from problem

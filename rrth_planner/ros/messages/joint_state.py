@@ -1,0 +1,120 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where an arm is and how fast it moves, from messages that may speak of other machines too."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
+from rrth_planner.model.errors import MessageError
+from rrth_planner.ros.messages.fields import seconds_of
+from sensor_msgs.msg import JointState
+
+# A message may be so long on its way; its stamp is of another clock if it seems longer [s].
+LONGEST_WAY = 1.0
+# Positions that are older than this say nothing about the present velocity [s].
+DIFFERENCE_AGE = 0.5
+
+
+def has_joint_of(msg: JointState, joint_names: Sequence[str]) -> bool:
+    """Return whether a message speaks of any of these joints."""
+    return not set(joint_names).isdisjoint(msg.name)
+
+
+def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array:
+    """
+    Return the positions of these joints, by name, shape (dof,) [rad]; others are ignored.
+
+    Raises
+    ------
+    MessageError
+        A joint that is missing or there twice, a position that is missing, not finite or beyond
+        1e4.
+
+    """
+    names = list(msg.name)
+    missing = [name for name in joint_names if name not in names]
+    if missing:
+        raise MessageError(f'name: no {missing} in {names}, expected all of {list(joint_names)}')
+    twice = [name for name in joint_names if names.count(name) > 1]
+    if twice:
+        raise MessageError(f'name: {twice} twice in {names}, expected each joint once')
+    if len(msg.position) != len(names):
+        raise MessageError(
+            f'position: {len(msg.position)} values for {len(names)} names, expected one a name '
+            '[rad]'
+        )
+    q = [msg.position[names.index(name)] for name in joint_names]
+    label = f'position of {list(joint_names)}'
+    return frozen_array(q, (len(q),), label, 'rad', MessageError, FARTHEST)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointReading:
+    """
+    What one message says of the arm.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (dof,)
+        [rad].
+    velocities : ndarray, shape (dof,)
+        As they were given, NaN included, or how the positions changed [rad/s].
+    taken : float
+        When the arm was there: the stamp of the message if it is a little older than its
+        reception, else that [s].
+    received : float
+        [s].
+    velocities_expire : float
+        Until when the velocities count; inf: as long as the positions [s].
+
+    """
+
+    positions: Array
+    velocities: Array
+    taken: float
+    received: float
+    velocities_expire: float
+
+
+def joint_reading(
+    msg: JointState, joint_names: Sequence[str], received: float, before: JointReading | None
+) -> JointReading:
+    """
+    Return the positions and velocities of these joints, by name; others are ignored.
+
+    Parameters
+    ----------
+    msg : JointState
+        Without velocities, these are the change since the reading before.
+    joint_names : sequence of str
+    received : float
+        When it came [s].
+    before : JointReading or None
+
+    Raises
+    ------
+    MessageError
+        As `configuration_from_msg`, or velocities of only some of the names.
+
+    """
+    q = configuration_from_msg(msg, joint_names)
+    names, stamp = list(msg.name), seconds_of(msg.header.stamp)
+    taken = stamp if 0.0 <= received - stamp <= LONGEST_WAY else received
+    if len(msg.velocity):
+        if len(msg.velocity) != len(names):
+            raise MessageError(
+                f'velocity: {len(msg.velocity)} values for {len(names)} names, expected none or '
+                'one a name [rad/s]'
+            )
+        v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
+        return JointReading(q, v, taken, received, float('inf'))
+    if before is None or received < before.received:
+        # A clock that was set back tells no time that passed.
+        return JointReading(q, np.zeros_like(q), taken, received, received)
+    step = max(received - before.received, 1e-9)
+    # What overflows is infinite, and never at rest.
+    with np.errstate(over='ignore'):
+        v = (q - before.positions) / step
+    return JointReading(q, v, taken, received, before.received + DIFFERENCE_AGE)

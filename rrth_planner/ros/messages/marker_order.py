@@ -1,0 +1,112 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which edit of each marker was sent last, so that an array that comes late undoes nothing."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.marker_edits import Edit, Key
+from visualization_msgs.msg import Marker
+
+# When a message was sent: source timestamp [ns] and sequence number.
+Stamp = tuple[int, int]
+
+# So many deleted markers, and so many namespaces, are remembered; of one that is forgotten a late
+# array may add the box once more.
+REMEMBERED = 10_000
+
+
+class MarkerOrder:
+    """
+    Applies arrays of markers, to each marker in the order in which its edits were sent.
+
+    The clocks of two publishers may differ, so their arrays have no common order; but nearly
+    always one publisher alone sends a marker.
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing remembered."""
+        # By marker, and by namespace whose markers were all deleted ('': those of all).
+        self._markers: dict[Key, Stamp] = {}
+        self._namespaces: dict[str, Stamp] = {}
+
+    def apply(
+        self,
+        body: WearerBody,
+        edits: Sequence[Edit],
+        sent: Stamp,
+        received: float,
+        is_newer: Callable[[Stamp], bool] | None = None,
+    ) -> WearerBody:
+        """
+        Return the body after an array, and remember it.
+
+        Parameters
+        ----------
+        body : WearerBody
+            As it is.
+        edits : sequence of Edit
+            Of the array.
+        sent : (int, int)
+            When it was sent.
+        received : float
+            When it came [s].
+        is_newer : callable, optional
+            Of an array that comes late: whether what was sent then was sent after it.
+
+        Raises
+        ------
+        MessageError
+            Too many boxes; nothing is remembered then.
+
+        """
+        kept = edits if is_newer is None else list(self._kept(body, edits, is_newer))
+        after = body.edited(kept, received).at(received)
+        for edit in edits:
+            if edit.action == Marker.DELETEALL:
+                self._remember_all(edit.key[0], sent, is_newer)
+            elif not self._is_overtaken(edit.key, is_newer):
+                self._markers[edit.key] = sent
+        self._forget(after)
+        return after
+
+    def _kept(
+        self, body: WearerBody, edits: Sequence[Edit], is_newer: Callable[[Stamp], bool]
+    ) -> Iterator[Edit]:
+        """Yield what a late array does to markers to which nothing newer has been done."""
+        keys = [key for key, _ in (*body.parts, *body.expired)]
+        for edit in edits:
+            if edit.action == Marker.DELETEALL:
+                of_all = [key for key in keys if edit.key[0] in ('', key[0])]
+                changes = [Edit(Marker.DELETE, key) for key in of_all]
+            else:
+                changes = [edit]
+            yield from (one for one in changes if not self._is_overtaken(one.key, is_newer))
+
+    def _is_overtaken(self, key: Key, is_newer: Callable[[Stamp], bool] | None) -> bool:
+        """Return whether something newer has been done to a marker."""
+        if is_newer is None:
+            return False
+        done = (self._markers.get(key), *map(self._namespaces.get, ('', key[0])))
+        return any(stamp is not None and is_newer(stamp) for stamp in done)
+
+    def _remember_all(
+        self, ns: str, sent: Stamp, is_newer: Callable[[Stamp], bool] | None
+    ) -> None:
+        """Remember that all markers of a namespace were deleted."""
+        before = self._namespaces.get(ns)
+        if before is None or is_newer is None or not is_newer(before):
+            self._namespaces[ns] = sent
+        self._markers = {
+            key: stamp
+            for key, stamp in self._markers.items()
+            if ns not in ('', key[0]) or (is_newer is not None and is_newer(stamp))
+        }
+
+    def _forget(self, body: WearerBody) -> None:
+        """Forget deleted markers and namespaces where they have become too many."""
+        if len(self._markers) > REMEMBERED + len(body.parts):
+            present = {key for key, _ in body.parts}
+            self._markers = {k: stamp for k, stamp in self._markers.items() if k in present}
+        while len(self._namespaces) > REMEMBERED:
+            del self._namespaces[next(iter(self._namespaces))]

@@ -1,0 +1,261 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""A subscription that hears every publisher: best effort, reliable, or latched before it began."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+import time
+import traceback
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
+from rrth_planner.model.errors import MessageError
+from rrth_planner.ros.messages.marker_order import Stamp
+
+DEPTH = 50
+# Longer messages are not decoded, which would hold up everything else: half a second for a
+# megabyte of markers.
+MOST_BYTES = 512 * 1024
+# Copies of a message arrive within milliseconds of each other; so many are remembered.
+REMEMBERED = 1024
+# How often publishers are looked at where the middleware does not announce them [s].
+POLL_PERIOD = 0.2
+
+
+def decoded(
+    data: bytes,
+    msg_type: type,
+    most_bytes: int = MOST_BYTES,
+    decode: Callable[[bytes], Any] | None = None,
+) -> Any:
+    """Return a message as it came from the wire, or raise MessageError."""
+    name = msg_type.__name__
+    if len(data) > most_bytes:
+        raise MessageError(f'{len(data)} bytes, expected a {name} of at most {most_bytes}')
+    try:
+        return deserialize_message(data, msg_type) if decode is None else decode(data)
+    except Exception as problem:
+        # Whoever may write to a topic may write anything.
+        raise MessageError(f'{len(data)} bytes that are no {name}: {problem}') from problem
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """
+    When a message was sent and came, and what had come before it.
+
+    Parameters
+    ----------
+    sent : (int, int)
+        Source timestamp [ns] and sequence number.
+    received : int
+        [ns].
+    is_newer : callable or None
+        Of a message that comes late, after one that was sent later: whether what was sent then was
+        sent after it. None: nothing was, as far as is known.
+
+    """
+
+    sent: Stamp
+    received: int
+    is_newer: Callable[[Stamp], bool] | None = None
+
+
+class Copies:
+    """
+    Which of the copies of messages count, and which of those come late.
+
+    No single quality of service hears everybody, so a message may come by several readers. The
+    first copy counts. It is late when another message came before it that was sent after it. By
+    what clock, if publishers have several? A reader hands over what one publisher sends in the
+    order in which it was sent, though it may lose some: so what this reader has handed over before
+    was not sent later by the same publisher, whatever the clocks say. Of what it has not handed
+    over before the stamps decide: those of one publisher are of one clock.
+
+    Parameters
+    ----------
+    takes_late : bool
+        Whether a copy that comes late counts; without, the next copy may.
+
+    """
+
+    def __init__(self, takes_late: bool) -> None:
+        """Start with nothing seen."""
+        self._takes_late = takes_late
+        # By which readers each message has come, and whether it has counted.
+        self._readers: dict[Stamp, set[Any]] = {}
+        self._counted: dict[Stamp, None] = {}
+        self._newest = 0
+
+    def take(self, sent: Stamp, received: int, reader: Any) -> Arrival | None:
+        """Return the arrival of a copy that counts, and remember it; None: it does not."""
+        readers = self._readers.setdefault(sent, set())
+        if sent in self._counted:
+            readers.add(reader)
+            return None
+        is_newer = self._newer_than(sent, reader)
+        readers.add(reader)
+        if len(self._readers) > REMEMBERED:
+            del self._readers[next(iter(self._readers))]
+        if is_newer is not None and not self._takes_late:
+            return None
+        self._newest = max(self._newest, sent[0])
+        self._counted[sent] = None
+        if len(self._counted) > REMEMBERED:
+            oldest = next(iter(self._counted))
+            del self._counted[oldest]
+            if oldest[0] == self._newest:
+                self._newest = max(stamp for stamp, _ in self._counted)
+        return Arrival(sent, received, is_newer)
+
+    def _newer_than(self, sent: Stamp, reader: Any) -> Callable[[Stamp], bool] | None:
+        """Return what tells what was sent after a message that came by a reader; None: nothing."""
+
+        def is_newer(other: Stamp) -> bool:
+            # What is forgotten has come long ago: stamps are all there is to go by.
+            return other[0] > sent[0] and reader not in self._readers.get(other, ())
+
+        # Nearly always it is the newest of all.
+        if self._newest <= sent[0] or not any(map(is_newer, self._counted)):
+            return None
+        return is_newer
+
+
+class OpenSubscription:
+    """
+    Hear a topic from publishers of any quality of service, each message once.
+
+    A best-effort, volatile reader matches everybody and is always there. For publishers that are
+    reliable another reader asks for reliability, and for what was latched before it began.
+
+    Parameters
+    ----------
+    node : Node
+    msg_type : type
+    topic : str
+    on_message : callable
+        Gets each message and its Arrival.
+    on_late : callable, optional
+        Gets each message that comes late, and its Arrival; without, these are dropped, since the
+        last one wins.
+    on_refusal : callable, optional
+        Gets the MessageError of each message that is too long, or is none of this type.
+    way : context manager, optional
+        Entered while a message is read and dealt with, again for each.
+    decode : callable, optional
+        Turns the bytes of a message into one; without, rclpy does.
+    rest : callable, optional
+        Called after each copy of a message.
+
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        msg_type: type,
+        topic: str,
+        on_message: Callable[[Any, Arrival], None],
+        on_late: Callable[[Any, Arrival], None] | None = None,
+        on_refusal: Callable[[MessageError], None] = lambda problem: None,
+        way: AbstractContextManager[None] | None = None,
+        decode: Callable[[bytes], Any] | None = None,
+        rest: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Begin to listen."""
+        self._on_refusal, self._way = on_refusal, way or nullcontext()
+        self._decode, self._rest = decode, rest
+        self._node, self._msg_type, self._topic = node, msg_type, topic
+        self._on_message, self._on_late = on_message, on_late
+        self._copies = Copies(on_late is not None)
+        self._n_read = self._live_came = 0
+        self._reliable: dict[DurabilityPolicy, Subscription] = {}
+        profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+        try:
+            self._live = self._subscribe(
+                profile,
+                self._on_live,
+                SubscriptionEventCallbacks(
+                    matched=lambda _: self.look_at_publishers(), use_default_callbacks=False
+                ),
+            )
+        except UnsupportedEventTypeError:
+            self._live = self._subscribe(profile, self._on_live, None)
+            self._timer = node.create_timer(
+                POLL_PERIOD, self.look_at_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
+            )
+        self.topic_name = self._live.topic_name
+
+    def progress(self) -> tuple[int, int]:
+        """
+        Return how many copies were read, and when the one came that was read last [ns].
+
+        Of the reader that hears everybody; 0 where its middleware does not say.
+        """
+        return self._n_read, self._live_came
+
+    def look_at_publishers(self) -> None:
+        """Add the reliable readers that the present publishers can serve."""
+        for info in self._node.get_publishers_info_by_topic(self.topic_name):
+            durability = info.qos_profile.durability
+            if (
+                info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+                and durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
+                and durability not in self._reliable
+            ):
+                profile = QoSProfile(
+                    depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability
+                )
+                self._reliable[durability] = self._subscribe(
+                    profile,
+                    partial(self._on_copy, reader=durability),
+                    SubscriptionEventCallbacks(use_default_callbacks=False),
+                )
+
+    def _subscribe(
+        self, profile: QoSProfile, callback: Any, events: SubscriptionEventCallbacks | None
+    ) -> Subscription:
+        # Raw, so that the copies that do not count are not even decoded.
+        return self._node.create_subscription(
+            self._msg_type, self._topic, callback, profile, event_callbacks=events, raw=True
+        )
+
+    def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
+        self._live_came = info.get('received_timestamp') or 0
+        self._on_copy(data, info, None)
+
+    def _on_copy(self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None) -> None:
+        """Hand on a message that came by a reader; None: by the one that hears everybody."""
+        self._n_read += 1
+        sent = info['source_timestamp'], info['publication_sequence_number']
+        # Not every middleware says when it came.
+        received = info.get('received_timestamp') or time.time_ns()
+        arrival = self._copies.take(sent, received, reader)
+        if arrival is not None:
+            hearer = self._on_message if arrival.is_newer is None else self._on_late
+            assert hearer is not None
+            self._hand_on(data, hearer, arrival)
+        self._rest()
+
+    def _hand_on(
+        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
+    ) -> None:
+        """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
+        with self._way:
+            try:
+                msg = decoded(data, self._msg_type, decode=self._decode)
+            except MessageError as problem:
+                self._on_refusal(problem)
+                return
+            try:
+                hearer(msg, arrival)
+            except Exception:
+                self._node.get_logger().error(
+                    f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+                )

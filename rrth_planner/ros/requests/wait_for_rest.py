@@ -1,0 +1,56 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Wait for an arm that brakes."""
+
+from collections.abc import Callable
+import time
+
+import numpy as np
+from rrth_planner.model.trajectory import REST_SPEED
+from rrth_planner.ros.interface.inputs import Input
+from rrth_planner.ros.messages.joint_state import JointReading
+
+# So much longer than its brake an arm may need to come to rest [s].
+LONGEST_SETTLING = 1.0
+# How often the arm is looked at [s].
+PERIOD = 5e-3
+
+
+class Rest:
+    """
+    The rest that an arm comes to when it has braked.
+
+    Parameters
+    ----------
+    joints : Input
+        Where the arm is.
+    clock : callable
+        Returns the time by which its readings are dated [s].
+    brake : float
+        How long it brakes from now on; what was read before says nothing of its rest [s].
+
+    """
+
+    def __init__(
+        self, joints: Input[JointReading | None], clock: Callable[[], float], brake: float
+    ) -> None:
+        """Begin to brake."""
+        self._joints, self._begin = joints, clock() + brake
+        # A simulated clock may stand still.
+        self._end = time.monotonic() + brake + LONGEST_SETTLING
+
+    def wait(self, should_stop: Callable[[], bool]) -> bool:
+        """Return whether the arm is at rest or the time for that is over; else it should stop."""
+        while not (is_over := self._is_over()) and not should_stop():
+            time.sleep(PERIOD)
+        return is_over
+
+    def _is_over(self) -> bool:
+        if time.monotonic() >= self._end:
+            return True
+        reading = self._joints.value
+        return (
+            reading is not None
+            and reading.received >= self._begin
+            and bool((np.abs(reading.velocities) <= REST_SPEED).all())
+        )
