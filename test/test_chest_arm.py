@@ -35,7 +35,7 @@ SEED = 0
 
 def test_the_file_is_what_read_urdf_makes_of_the_urdf(tmp_path):
     pytest.importorskip('yourdfpy')
-    from rrth_planner import read_urdf
+    from rrth_planner.cli import read_urdf
 
     made, there = tmp_path / 'arm.yaml', resource_path(ARM)
     options = ['--ray', '+x', '--radius', '0.025', '--output', str(made)]

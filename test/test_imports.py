@@ -35,23 +35,23 @@ OWN = {
 # The node says that it compiles before it imports what has to be compiled; what only one option of
 # a command needs takes seconds to load.
 # The report says which requirements it misses before it imports what has them.
-REPORTER = 'rrth_planner.reproduce'
+REPORTER = 'rrth_planner.cli.reproduce'
 LATE = {
     ('rrth_planner.ros.planner_node', 'rrth_planner.pipeline.plan_motion'),
     ('rrth_planner.ros.planner_node', 'rrth_planner.ros.requests.plan_request'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.client.follow_motion'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.messages.body'),
-    ('rrth_planner.ros.point_at', 'rrth_planner.ros.client.dry_run'),
+    ('rrth_planner.cli.point_at', 'rrth_planner.ros.client.follow_motion'),
+    ('rrth_planner.cli.point_at', 'rrth_planner.ros.messages.body'),
+    ('rrth_planner.cli.point_at', 'rrth_planner.ros.client.dry_run'),
     *(
         ('rrth_planner.ros.planner_node', f'rrth_planner.ros.{name}')
         for name in ('inputs', 'listener', 'plan_queue', 'reporter')
     ),
     # Once it is known that what they need is installed.
-    ('rrth_planner.ros.record', 'rrth_planner.ros.client.recorder'),
-    ('rrth_planner.viewers.plot', 'rrth_planner.ros.client.recording_reader'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.ros.client.viewer_feed'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.live_page'),
-    ('rrth_planner.viewers.viewer', 'rrth_planner.visualization.viewer.page'),
+    ('rrth_planner.cli.record', 'rrth_planner.ros.client.recorder'),
+    ('rrth_planner.cli.plot', 'rrth_planner.ros.client.recording_reader'),
+    ('rrth_planner.cli.viewer', 'rrth_planner.ros.client.viewer_feed'),
+    ('rrth_planner.cli.viewer', 'rrth_planner.visualization.viewer.live_page'),
+    ('rrth_planner.cli.viewer', 'rrth_planner.visualization.viewer.page'),
 }
 
 

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from rrth_planner import plan_files
+from rrth_planner.cli import plan
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import read_motion
@@ -33,7 +33,7 @@ def sentence(said):
 
 def test_a_motion_is_printed_and_written(tmp_path, capsys):
     exact, table = tmp_path / 'motion.yaml', tmp_path / 'motion.csv'
-    assert plan_files.main([*TARGET, '--seed', '5', '--output', str(exact)]) == 0
+    assert plan.main([*TARGET, '--seed', '5', '--output', str(exact)]) == 0
     said = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
     assert said['seed'] == '5'
     assert said['written'] == str(exact)
@@ -46,20 +46,20 @@ def test_a_motion_is_printed_and_written(tmp_path, capsys):
     assert pointing_error(arm, q[-1], np.array([1.5, 0.8, 0.6])) < 1e-6
     assert first_contact(arm, scene, q, 1.0, 0.02) is None
     again = [*TARGET, '--seed', '5', '--output', str(table), '--period', '0.05']
-    assert plan_files.main(again) == 0
+    assert plan.main(again) == 0
     rows = read_motion(table).trajectory
     assert np.array_equal(rows.positions, positions_at(motion.trajectory, rows.times))
 
 
 def test_figures_as_json(capsys):
     start = ['--from', '0', '-0.35', '1.5', '1.5', '--margin', '0.03', '--json']
-    assert plan_files.main([*TARGET, *start]) == 0
+    assert plan.main([*TARGET, *start]) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures['status'] == 'solved'
     assert figures['clearance_m'] >= 0.03
     assert figures['seed'] >= 0
     # Inside the torso no target can be.
-    assert plan_files.main(['--target', '0', '0', '0', '--json']) == 1
+    assert plan.main(['--target', '0', '0', '0', '--json']) == 1
     streams = capsys.readouterr()
     assert json.loads(streams.out)['status'] == 'goal in collision'
     assert sentence(streams.err).startswith('plan: goal in collision: ')
@@ -71,11 +71,11 @@ def test_the_ray_is_printed_from_where_it_begins(capsys):
     arm = ['--arm', str(resource_path('config/examples/chest_arm.yaml'))]
     body = ['--body', str(resource_path('config/examples/seated_body.yaml'))]
     asked = [*arm, *body, '--target', '1', '0.5', '0', '--seed', '1']
-    assert plan_files.main(asked) == 0
+    assert plan.main(asked) == 0
     said = capsys.readouterr().out
     assert '\n  ray from     0.6700 0.0000 0.1200 m along 1.0000 0.0000 0.0000\n' in said
     assert 'tool at' not in said
-    assert plan_files.main([*asked, '--json']) == 0
+    assert plan.main([*asked, '--json']) == 0
     start = json.loads(capsys.readouterr().out)['start']
     np.testing.assert_allclose(start['ray_from_m'], (0.67, 0.0, 0.12), atol=1e-5)
     np.testing.assert_allclose(start['ray'], (1.0, 0.0, 0.0), atol=1e-5)
@@ -83,7 +83,7 @@ def test_the_ray_is_printed_from_where_it_begins(capsys):
 
 def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
     file = tmp_path / 'motion.csv'
-    assert plan_files.main(['--target', '0', '0', '0.1', '--output', str(file)]) == 1
+    assert plan.main(['--target', '0', '0', '0.1', '--output', str(file)]) == 1
     streams = capsys.readouterr()
     assert streams.out == ''
     assert 'torso' in streams.err
@@ -110,7 +110,7 @@ def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
 )
 def test_wrong_input_is_a_sentence(tmp_path, monkeypatch, capsys, arguments, words):
     monkeypatch.chdir(tmp_path)
-    assert plan_files.main([*TARGET, *arguments]) == 2
+    assert plan.main([*TARGET, *arguments]) == 2
     assert words in sentence(capsys.readouterr().err)
     assert not list(tmp_path.iterdir())
 
@@ -131,7 +131,7 @@ def test_wrong_input_is_a_sentence(tmp_path, monkeypatch, capsys, arguments, wor
 def test_settings_that_are_none_are_a_sentence(tmp_path, capsys, line):
     file = tmp_path / 'mine.yaml'
     file.write_text(f'/**: {{ros__parameters: {{{line}}}}}\n')
-    assert plan_files.main([*TARGET, '--settings', str(file)]) == 2
+    assert plan.main([*TARGET, '--settings', str(file)]) == 2
     said = sentence(capsys.readouterr().err)
     assert line.split(':')[0] in said or 'settings' in said
 
@@ -139,7 +139,7 @@ def test_settings_that_are_none_are_a_sentence(tmp_path, capsys, line):
 @pytest.mark.parametrize('arguments', [[], ['--target', '1', '2'], [*TARGET, '--fast']])
 def test_wrong_usage_ends_with_2(arguments, capsys):
     with pytest.raises(SystemExit) as end:
-        plan_files.main(arguments)
+        plan.main(arguments)
     assert end.value.code == 2
     assert 'usage: plan' in capsys.readouterr().err
 
@@ -148,6 +148,6 @@ def test_an_interrupt_is_a_sentence(monkeypatch, capsys):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan_files, 'plan_motion', interrupted)
-    assert plan_files.main(TARGET) == 130
+    monkeypatch.setattr(plan, 'plan_motion', interrupted)
+    assert plan.main(TARGET) == 130
     assert sentence(capsys.readouterr().err) == 'plan: interrupted'

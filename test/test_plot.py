@@ -7,12 +7,12 @@ import pytest
 
 image = pytest.importorskip('matplotlib.image')
 
+from rrth_planner.cli.plot import main  # noqa: E402
 from rrth_planner.execution.recording import Recording, Told  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.settings import load_settings  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.viewers.plot import main  # noqa: E402
 from rrth_planner.visualization.recording_figure import recording_figure  # noqa: E402
 
 ARM = load_arm()

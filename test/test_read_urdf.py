@@ -10,7 +10,7 @@ import pytest
 
 yourdfpy = pytest.importorskip('yourdfpy')
 
-from rrth_planner import read_urdf
+from rrth_planner.cli import read_urdf
 from rrth_planner.collision.reference_checker import bars, frames
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
@@ -265,7 +265,7 @@ WITHOUT = """
 import sys
 for name in {names}:
     sys.modules[name] = None
-from rrth_planner.read_urdf import main
+from rrth_planner.cli.read_urdf import main
 sys.exit(main(['arm.urdf', '--output', 'arm.yaml']))
 """
 

@@ -24,7 +24,7 @@ from rrth_planner.planning.options import RRTHOptions
 from worlds import FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
 
 pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
-from rrth_planner import replay
+from rrth_planner.cli import replay
 from rrth_planner.collision import checker_comparison, trajectory_validation
 
 ROOT = Path(__file__).parent.parent
@@ -66,7 +66,7 @@ def play(path):
     """Run the command in a process of its own; return exit code, output and errors."""
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
     found = subprocess.run(
-        [sys.executable, '-m', 'rrth_planner.replay', str(path)],
+        [sys.executable, '-m', 'rrth_planner.cli.replay', str(path)],
         env={**os.environ, 'PYTHONPATH': paths},
         capture_output=True,
         text=True,
@@ -261,7 +261,7 @@ BLOCKED = """
 import sys
 for name in ('rclpy', 'ament_index_python', 'tf2_ros', 'matplotlib'):
     sys.modules[name] = None
-from rrth_planner.replay import main
+from rrth_planner.cli.replay import main
 sys.exit(main(['/no/such/file']))
 """
 

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.cli.write_urdf import main, urdf_of_file
 from rrth_planner.collision.reference_checker import bars
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
@@ -17,7 +18,6 @@ from rrth_planner.io.urdf.export import arm_to_urdf, RAY_LENGTH
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import roll_pitch_yaw
-from rrth_planner.write_urdf import main, urdf_of_file
 from worlds import examples, QUARTER, random_chain, random_rotation
 
 yourdfpy = pytest.importorskip('yourdfpy')

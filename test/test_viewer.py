@@ -13,6 +13,7 @@ import pytest
 pytest.importorskip('fcl')
 pytest.importorskip('viser')
 
+from rrth_planner.cli.viewer import _served, main
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
@@ -22,7 +23,6 @@ from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.result import Tree
-from rrth_planner.viewers.viewer import _served, main
 from rrth_planner.visualization.viewer.curves import along_z, path_curve, tree_segments
 from rrth_planner.visualization.viewer.examples import (
     BODIES,

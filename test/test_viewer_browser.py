@@ -28,7 +28,7 @@ SENTENCE = 'waypoints, duration'
 @pytest.fixture(name='page', scope='module')
 def _page():
     process = subprocess.Popen(
-        [sys.executable, '-u', '-m', 'rrth_planner.viewers.viewer', '--no-open', '--port', '0'],
+        [sys.executable, '-u', '-m', 'rrth_planner.cli.viewer', '--no-open', '--port', '0'],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -4,10 +4,10 @@
 
 import numpy as np
 import pytest
+from rrth_planner.cli.plan import main as plan
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.wearer_file import load_body, load_wearer
 from rrth_planner.model.errors import SceneError
-from rrth_planner.plan_files import main as plan
 
 MARKERS = """
 markers:

@@ -14,7 +14,7 @@ image = pytest.importorskip('matplotlib.image')
 
 # Cold, the planner is compiled first [s].
 LONGEST_RUN = 400.0
-MODULE = [sys.executable, '-m', 'rrth_planner.ros.demo']
+MODULE = [sys.executable, '-m', 'rrth_planner.cli.demo']
 
 
 def run(*arguments):

@@ -49,7 +49,7 @@ def replayed(file):
     """Replay a file in a process of its own; return its exit code and the last line."""
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
     found = subprocess.run(
-        [sys.executable, '-m', 'rrth_planner.replay', str(file)],
+        [sys.executable, '-m', 'rrth_planner.cli.replay', str(file)],
         env={**os.environ, 'PYTHONPATH': paths},
         capture_output=True,
         text=True,

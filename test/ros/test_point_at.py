@@ -19,13 +19,13 @@ pytest.importorskip('tqdm')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rrth_planner.cli import point_at  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
-from rrth_planner.ros import point_at  # noqa: E402
 from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
 from rrth_planner.ros.client.follow_motion import announced_motion, follow  # noqa: E402
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
@@ -46,7 +46,7 @@ LONGEST_RUN = 280.0
 START, ARRIVAL = 250.0, Arrival((1, 1), 1)
 BOXES = resource_path('config/body.yaml')
 MARKERS = resource_path('msg_examples/body.yaml')
-COMMAND = [sys.executable, '-m', 'rrth_planner.ros.point_at']
+COMMAND = [sys.executable, '-m', 'rrth_planner.cli.point_at']
 
 
 def run(*arguments):

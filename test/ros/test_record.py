@@ -24,13 +24,13 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
+from rrth_planner.cli.plot import main as plot  # noqa: E402
+from rrth_planner.cli.record import TOPICS  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
 from rrth_planner.ros.messages.definitions import definition_of, type_name  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.record import TOPICS  # noqa: E402
-from rrth_planner.viewers.plot import main as plot  # noqa: E402
 from samples import target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -38,7 +38,7 @@ from std_srvs.srv import Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
-MODULE = [sys.executable, '-m', 'rrth_planner.ros.record']
+MODULE = [sys.executable, '-m', 'rrth_planner.cli.record']
 # Cold, the planner is compiled first [s].
 LONGEST_WAIT = 240.0
 LATCHED = QoSProfile(

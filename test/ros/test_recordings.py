@@ -12,6 +12,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # n
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
+from rrth_planner.cli import plot  # noqa: E402
+from rrth_planner.cli.plot import main  # noqa: E402
 from rrth_planner.execution.recording import brakes  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import ArmModel  # noqa: E402
@@ -20,8 +22,6 @@ from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.client.recorder import RecordingFile  # noqa: E402
 from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
-from rrth_planner.viewers import plot  # noqa: E402
-from rrth_planner.viewers.plot import main  # noqa: E402
 from samples import array, box, FOLDED, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402

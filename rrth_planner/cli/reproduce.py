@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rows = Rows([row for row in read_rows(data).to_pylist() if row['key'] in wanted])
         output.mkdir(parents=True, exist_ok=True)
         pictures = draw_pictures(rows, extent, output)
-        command = ' '.join(['python -m rrth_planner.reproduce', *_portable(arguments)])
+        command = ' '.join(['python -m rrth_planner.cli.reproduce', *_portable(arguments)])
         machine = f'{processor_name()} ({os.cpu_count()} cores, {platform.system()})'
         text = report(rows, extent, command, machine, pictures)
         target = output / 'reproduction.md'

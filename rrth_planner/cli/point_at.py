@@ -18,6 +18,7 @@ import rclpy
 from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
+from rrth_planner.cli.point_at_options import parser
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
@@ -28,7 +29,6 @@ from rrth_planner.ros.messages.body_writer import body_from_file
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
-from rrth_planner.ros.point_at_options import parser
 from visualization_msgs.msg import MarkerArray
 
 DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
