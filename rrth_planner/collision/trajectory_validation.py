@@ -64,7 +64,7 @@ def touch_seen(
     reach, escape_time : float
         As in `is_proven_free`.
     pause : callable
-        As in `fcl_check.first_touch`.
+        As in `fcl_checker.first_touch`.
 
     """
     ray = world.ray_length

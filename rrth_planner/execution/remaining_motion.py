@@ -119,7 +119,7 @@ def leads_away(
     Return whether the arm is too near to the wearer now, and proven to get away by going on.
 
     Then it gets no nearer to any box than it is, comes near no other, and ends clear of all of
-    them (`leaving.leads_out`), while an arm that brakes stays. Of a motion whose trouble lies
+    them (`penetration.leads_out`), while an arm that brakes stays. Of a motion whose trouble lies
     ahead this is False: a stop follows its path, and is never nearer than going on.
 
     Parameters

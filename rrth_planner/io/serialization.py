@@ -72,7 +72,7 @@ def question_from_mapping(data: Any) -> PlanQuestion:
 
 
 def arm_from_mapping(data: Any) -> ArmModel:
-    """Return the arm that `plain` wrote; `arm.arm_from_mapping` reads what people write."""
+    """Return the arm that `plain` wrote; `arm_file.arm_from_mapping` reads what people write."""
     given = fields_of(data, ArmModel, 'arm')
     for name, kind in (('joint_names', str), ('is_prismatic', bool)):
         values = given[name]

@@ -64,7 +64,7 @@ def plan_motion(
     Parameters
     ----------
     arm : ArmModel
-        Passes `aiming.check_pointing_arm`.
+        Passes `pointing_goals.check_pointing_arm`.
     scene : Scene
         The wearer in the base frame.
     q_start : ndarray, shape (dof,)

@@ -85,7 +85,7 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
     world : World
         Its boxes grown by the margin.
     depths : ndarray, shape (n_bars, m)
-        As `leaving.box_depths` [m].
+        As `penetration.box_depths` [m].
     margin : float
         [m].
 

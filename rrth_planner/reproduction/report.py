@@ -77,10 +77,11 @@ Written by `{command}`; do not edit.
 
 Times come from runs done one after another, those of the arm and shares over many seeds from runs
 side by side. The paper gives no coordinates, step sizes or spacings: maps, targets and options are
-ours (`config/maps`, `rrth_planner/reproduction/experiments.py`). Where it names none, the planners have
-one tree, uniform draws and a step of 10 on maps of 100 by 100. "RRT-H" is the method's three steps
-as corrected, without what the planner adds to them (`near_bias`, `corner_moves`), "as printed" the
-same steps word for word. Every path is judged by code that shares nothing with the planners.
+ours (`config/maps`, `rrth_planner/reproduction/experiments.py`). Where it names none, the planners
+have one tree, uniform draws and a step of 10 on maps of 100 by 100. "RRT-H" is the method's three
+steps as corrected, without what the planner adds to them (`near_bias`, `corner_moves`), "as
+printed" the same steps word for word. Every path is judged by code that shares nothing with the
+planners.
 Numbers are medians, with quartiles in brackets.
 
 ## The claims of section 3

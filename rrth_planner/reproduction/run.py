@@ -30,9 +30,9 @@ from rrth_planner.reproduction.problems import CERTIFIED, load_problem, NamedPro
 Row = dict[str, Any]
 # What decides about a row besides the run itself.
 _SOURCES = (
-    *('growth', 'star', 'rrt_h', 'printed', 'planner', 'workspace', 'problem', 'box_map'),
-    *('checking', 'aiming', 'world', 'box_tree', 'reach', 'options', 'oracle', 'shortest'),
-    *('campaign/problems', 'campaign/runs', 'campaign/escape', 'map_file'),
+    *('kernels', 'planning', 'collision/world.py', 'collision/box_tree.py'),
+    *('collision/reference_checker.py', 'model/reach.py', 'reproduction/problems.py'),
+    *('reproduction/run.py', 'reproduction/path_club.py', 'io/map_file.py'),
 )
 
 
@@ -75,7 +75,8 @@ def options_digest(options: TreeOptions) -> str:
 def source_digest() -> str:
     """Return a short digest of the sources that decide what a run brings."""
     root = pathlib.Path(__file__).parent.parent
-    files = [*sorted((root / 'kernels').glob('*.py')), *(root / f'{n}.py' for n in _SOURCES)]
+    places = [root / name for name in _SOURCES]
+    files = [f for p in places for f in ([p] if p.is_file() else sorted(p.rglob('*.py')))]
     return _digest(''.join(file.read_text(encoding='utf-8') for file in files))
 
 

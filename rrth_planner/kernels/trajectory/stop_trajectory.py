@@ -137,8 +137,8 @@ def is_within(points, states, begin, most):
     """
     Return whether the quintics through the points that come after `begin` keep limits, (3, dof).
 
-    As `timing.limit_ratio`: between two of the instants, h apart, a function f is no greater than
-    there by more than h^2 / 8 max|f''|.
+    As `parameterization.limit_ratio`: between two of the instants, h apart, a function f is no
+    greater than there by more than h^2 / 8 max|f''|.
     """
     between = 0.125 / (INSTANTS - 1) ** 2
     for i in range(points.shape[0] - 1):

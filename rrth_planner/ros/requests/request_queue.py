@@ -79,7 +79,7 @@ class PlanQueue:
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
     plan_request : callable
-        `requests.plan_request`, which is loaded late.
+        `plan_request.plan_request`, which is loaded late.
     catch_up : CatchUp
         Returns when the bodies that came are read.
 

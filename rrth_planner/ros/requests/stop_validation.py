@@ -34,7 +34,7 @@ def incident_of_stop(
         Of the motion that it ends.
     parameters : PlannerParameters
     pause : callable
-        As in `fcl_check.first_touch`.
+        As in `fcl_checker.first_touch`.
 
     """
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length

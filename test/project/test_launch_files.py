@@ -14,7 +14,7 @@ from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml
 import yaml
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / 'launch').glob('*.py'))
 NAMES = {
     'launch': ['LaunchDescription'],

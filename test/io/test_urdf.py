@@ -22,7 +22,7 @@ from worlds import examples, QUARTER, random_chain, random_rotation
 
 yourdfpy = pytest.importorskip('yourdfpy')
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 RADIUS = 0.015
 SEEDS = st.integers(0, 2**32 - 1)
 

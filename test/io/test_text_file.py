@@ -22,7 +22,7 @@ from rrth_planner.model.errors import ModelError
 from worlds import examples
 import yaml
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 SHIPPED = sorted(f for d in ('config', 'msg_examples') for f in (ROOT / d).rglob('*.yaml'))
 pytestmark = pytest.mark.timeout(120)
 

@@ -28,7 +28,7 @@ from rrth_planner.ros.messages.message_file import message_from_file  # noqa: E4
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
-FOLDER = Path(__file__).parent.parent / 'msg_examples'
+FOLDER = Path(__file__).parents[2] / 'msg_examples'
 ARM = load_arm()
 LIMITS = MotionLimits(velocity=[1.5] * 4, acceleration=[4.0] * 4, jerk=[40.0] * 4)
 TARGETS = ['front', 'left', 'high', 'behind', 'low']

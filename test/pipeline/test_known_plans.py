@@ -32,7 +32,7 @@ from rrth_planner.io.settings import load_settings
 from rrth_planner.model.start_state import MotionState, Takeover
 from rrth_planner.pipeline.plan_motion import plan_motion
 
-ROOT, FILE = Path(__file__).parent.parent, Path(__file__).with_suffix('.csv')
+ROOT, FILE = Path(__file__).parents[2], Path(__file__).with_suffix('.csv')
 MARGIN, RAY = 0.02, 1.0
 QUICK = RRTHOptions(time_limit=600.0, improve_time=0.0)
 OTHERS = (

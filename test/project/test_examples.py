@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / 'examples').glob('*.py'))
 # What each of them tells.
 TOLD = {

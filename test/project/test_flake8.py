@@ -11,6 +11,6 @@ ament_flake8 = pytest.importorskip('ament_flake8.main')
 @pytest.mark.flake8
 @pytest.mark.linter
 def test_flake8():
-    config = Path(__file__).parents[1] / 'setup.cfg'
+    config = Path(__file__).parents[2] / 'setup.cfg'
     rc, errors = ament_flake8.main_with_errors(argv=['--config', str(config)])
     assert rc == 0, f'Found {len(errors)} code style errors / warnings:\n' + '\n'.join(errors)

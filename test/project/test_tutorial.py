@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r'-?\d+(\.\d+)?(e[+-]?\d+)?')
 COMPILING = re.compile(r'^\w+: compiling the planner, takes .*\n', re.MULTILINE)

@@ -27,7 +27,7 @@ pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=Imp
 from rrth_planner.cli import replay
 from rrth_planner.collision import checker_comparison, trajectory_validation
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 TOUCH = Touch(0.25, 0.0123, 'ray', 'head')
 QUESTION = PlanQuestion(
     arm=table_1_arm(),

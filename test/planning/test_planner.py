@@ -172,11 +172,12 @@ def test_the_same_seed_gives_the_same_bytes_in_this_and_in_other_processes():
     assert here == path_bytes(7)
     assert here != path_bytes(8)
     folder = os.path.dirname(os.path.abspath(__file__))
-    paths = os.pathsep.join([os.path.dirname(folder), folder, os.environ.get('PYTHONPATH', '')])
+    tests = os.path.dirname(folder)
+    paths = [os.path.dirname(tests), tests, folder, os.environ.get('PYTHONPATH', '')]
     for hash_seed in ('1', '2'):
         done = subprocess.run(
             [sys.executable, '-c', 'import test_planner; print(test_planner.path_bytes(7))'],
-            env={**os.environ, 'PYTHONPATH': paths, 'PYTHONHASHSEED': hash_seed},
+            env={**os.environ, 'PYTHONPATH': os.pathsep.join(paths), 'PYTHONHASHSEED': hash_seed},
             capture_output=True,
             text=True,
             check=True,

@@ -24,7 +24,7 @@ from test_incident import disagreement
 from test_motion_files import random_motion
 from worlds import examples
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.timeout(300)
 
 

@@ -12,7 +12,7 @@ from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml
 import yaml
 
-TEXT = (Path(__file__).parent.parent / 'docs' / 'ros_control.md').read_text(encoding='utf-8')
+TEXT = (Path(__file__).parents[2] / 'docs' / 'ros_control.md').read_text(encoding='utf-8')
 
 
 def block(language):

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
 PAGES += [ROOT / name for name in ('CONTRIBUTING.md', 'QUALITY_DECLARATION.md')]
 IMAGE = re.compile(r'!\[[^\]]*\]\(([^)\s]+)\)')

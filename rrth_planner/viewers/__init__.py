@@ -1,3 +1,0 @@
-# Copyright 2026 The rrth_planner authors
-# SPDX-License-Identifier: Apache-2.0
-"""Pictures of plans and motions."""
