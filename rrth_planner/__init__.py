@@ -35,7 +35,7 @@ _HOME = {
     'map_world': 'planning.box_map',
     'load_map': 'io.map_file',
     'PlanningProblem': 'planning.problem',
-    'PlanResult': 'planning.planner',
+    'PlanResult': 'planning.result',
     'plan': 'planning.planner',
     'PlanStatus': 'model.status',
     'Path': 'model.path',

@@ -24,18 +24,18 @@ from rrth_planner.planning.result import PlanResult
 # The module that searches by these options. It is imported when first needed: each compiles its
 # own kernels, and a node that plans by RRT-H need not wait for those of RRT*.
 _SEARCH = {
-    RRTOptions: 'growth',
-    RRTStarOptions: 'star',
-    InformedRRTStarOptions: 'star',
-    RRTStarSmartOptions: 'star',
+    RRTOptions: 'rrt',
+    RRTStarOptions: 'rrt_star',
+    InformedRRTStarOptions: 'rrt_star',
+    RRTStarSmartOptions: 'rrt_star',
     RRTHOptions: 'rrt_h',
-    PrintedRRTHOptions: 'printed',
+    PrintedRRTHOptions: 'rrt_h_published',
 }
 
 
 @functools.cache
 def _search_of(home: str) -> Callable[..., PlanResult]:
-    search: Callable[..., PlanResult] = import_module(f'rrth_planner.{home}').search
+    search: Callable[..., PlanResult] = import_module(f'rrth_planner.planning.{home}').search
     return search
 
 
