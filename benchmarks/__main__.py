@@ -17,7 +17,7 @@ def main(find: Callable[[str], object] = find_spec) -> int:
     if missing:
         print(MISSING.format(', '.join(missing)), file=sys.stderr)
         return 2
-    from benchmarks.run import main as run
+    from benchmarks.planners.main import main as run
 
     return run()
 

@@ -12,7 +12,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from contextlib import ExitStack  # noqa: E402
 
-from benchmarks.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
+from benchmarks.common.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
 
 _session = ExitStack()
 

@@ -11,25 +11,17 @@ pytest.importorskip('tqdm')
 pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
-from benchmarks import (
-    __main__ as starter,
-    dense,
-    draws,
-    figures,
-    harness,
-    judge,
-    measures,
-    pace,
-    table,
-)
-from benchmarks.extent import Extent, QUICK
-from benchmarks.queries import load_query, MAPS, QUERIES, table_1_arm, wearer, wearer_world
-from benchmarks.report import report
-from benchmarks.rows import read_rows, write_rows
-from benchmarks.run import main
-from benchmarks.table import peer_lines, survival_lines, TARGET_HEADER, target_lines
-from benchmarks.targets import TARGETS
-from benchmarks.task import figure_row, origin, path_row
+from benchmarks import __main__ as starter
+from benchmarks.common import path_checker, random_draws
+from benchmarks.common.queries import load_query, MAPS, QUERIES, table_1_arm, wearer, wearer_world
+from benchmarks.common.rows import read_rows, write_rows
+from benchmarks.common.size import Extent, QUICK
+from benchmarks.common.task import figure_row, origin, path_row
+from benchmarks.planners import dense_checker, figures, harness, machine_speed, measures, table
+from benchmarks.planners.main import main
+from benchmarks.planners.report import report
+from benchmarks.planners.table import peer_lines, survival_lines, TARGET_HEADER, target_lines
+from benchmarks.planners.targets import TARGETS
 import numpy as np
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.visibility_graph import shortest_path
@@ -139,21 +131,21 @@ def test_the_problems_are_valid_and_their_best_cost_can_be(name):
 
 
 def test_the_judge_passes_the_shortest_way_on_a_map():
-    from benchmarks.queries import load_map
+    from benchmarks.common.queries import load_map
 
-    assert judge.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
+    assert path_checker.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
 
 
 def test_the_dense_look_agrees_with_the_judge():
     rng, world = np.random.default_rng(1), wearer_world()
     starts = rng.uniform(*world.bounds, (60, 4))
-    edges = draws.random_edges(rng, world, starts, rng.uniform(0.02, 0.3, 60))
-    flags = dense.touching_edges(
-        table_1_arm(), wearer(), world.ray_length, 0.0, edges, judge.SPACING
+    edges = random_draws.random_edges(rng, world, starts, rng.uniform(0.02, 0.3, 60))
+    flags = dense_checker.touching_edges(
+        table_1_arm(), wearer(), world.ray_length, 0.0, edges, path_checker.SPACING
     )
     assert 0 < flags.sum() < len(flags)
     for is_touching, *edge in zip(flags, *edges, strict=True):
-        is_free = judge.is_arm_path_free(
+        is_free = path_checker.is_arm_path_free(
             table_1_arm(), wearer(), np.array(edge), world.ray_length, 0.0
         )
         assert is_free is not bool(is_touching)
@@ -161,7 +153,7 @@ def test_the_dense_look_agrees_with_the_judge():
 
 def test_boxes_are_split_into_parts_of_the_same_volume():
     volume = sum(np.prod(box.size) for box in wearer().boxes)
-    parts = draws.split_boxes(wearer(), 2).boxes
+    parts = random_draws.split_boxes(wearer(), 2).boxes
     assert len(parts) == 64
     assert sum(np.prod(box.size) for box in parts) == pytest.approx(volume)
 
@@ -181,7 +173,7 @@ def test_lines_of_the_harness_become_rows_with_a_verdict(tmp_path):
 
 
 def test_the_pace_of_a_machine_is_that_of_the_peer_who_was_timed_elsewhere_too(tmp_path):
-    known, lines = pace.published_first(), []
+    known, lines = machine_speed.published_first(), []
     assert set(known) == {*MAPS, *QUERIES}
     # The peer takes twice as long here, but for one problem.
     for problem, first in known.items():
@@ -191,10 +183,10 @@ def test_the_pace_of_a_machine_is_that_of_the_peer_who_was_timed_elsewhere_too(t
         lines.append(json.dumps(run))
     (tmp_path / 'one.jsonl').write_text('\n'.join(lines))
     rows = harness.read_runs(tmp_path / 'one.jsonl')
-    assert pace.slowness(rows) == pytest.approx(2.0)
-    assert 'takes 2.00 times as long here' in pace.sentence(rows)
-    assert pace.slowness(rows[:2]) is None
-    assert 'was not compared' in pace.sentence([])
+    assert machine_speed.slowness(rows) == pytest.approx(2.0)
+    assert 'takes 2.00 times as long here' in machine_speed.sentence(rows)
+    assert machine_speed.slowness(rows[:2]) is None
+    assert 'was not compared' in machine_speed.sentence([])
 
     # What does not make up for all of a miss says what is left; no excuse for a share or a length.
     target = next(t for t in TARGETS if t.what == 'one configuration')

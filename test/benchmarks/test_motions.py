@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('fcl')
 
-from benchmarks.motion_curve import derivative, greatest_jerk, instants
-from benchmarks.motion_fcl import least_distance
-from benchmarks.motion_judge import curve_of, verdict
-from benchmarks.motion_path import distances, planned_pieces
-from benchmarks.queries import wearer
+from benchmarks.common.queries import wearer
+from benchmarks.motions.curve import derivative, greatest_jerk, instants
+from benchmarks.motions.fcl import least_distance
+from benchmarks.motions.judge import curve_of, verdict
+from benchmarks.motions.path import distances, planned_pieces
 import numpy as np
 from rrth_planner.collision import reference_checker
 from rrth_planner.model.path import Path
@@ -198,7 +198,7 @@ def test_python_fcl_agrees_with_the_oracle_about_distances():
 
 def test_toppra_times_a_straight_line_as_the_textbook_does():
     pytest.importorskip('toppra')
-    from benchmarks import toppra_peer as peer
+    from benchmarks.motions import toppra_peer as peer
 
     path, bound = Path([[0.0] * 4, [2.0, 0.5, 0.5, 0.5]]), limits()
     way, speed, acceleration = 2.0, 1.5, 4.0
@@ -208,7 +208,7 @@ def test_toppra_times_a_straight_line_as_the_textbook_does():
 
 def test_toppra_stops_where_a_corner_is_not_rounded():
     pytest.importorskip('toppra')
-    from benchmarks import toppra_peer as peer
+    from benchmarks.motions import toppra_peer as peer
 
     path, bound = Path(CORNERS), limits()
     edges = [peer.optimal_duration(Path(CORNERS[i : i + 2]), (), bound) for i in range(3)]
@@ -224,7 +224,7 @@ def test_toppra_stops_where_a_corner_is_not_rounded():
 
 
 def test_the_command_names_what_is_missing(capsys):
-    from benchmarks.motions import main
+    from benchmarks.motions.__main__ import main
 
     assert main([], lambda name: None if name == 'toppra' else name) == 2
     assert capsys.readouterr().err.startswith('toppra: not installed')
@@ -234,9 +234,9 @@ def test_the_command_names_what_is_missing(capsys):
 def test_a_short_run_writes_the_report_and_pictures(tmp_path, capsys):
     for name in ('pyarrow', 'tqdm', 'matplotlib', 'toppra'):
         pytest.importorskip(name)
-    from benchmarks.motion_rows import read_motions
-    from benchmarks.motion_table import FAULTS
-    from benchmarks.motions import main
+    from benchmarks.motions.__main__ import main
+    from benchmarks.motions.rows import read_motions
+    from benchmarks.motions.table import FAULTS
 
     data = tmp_path / 'rows.parquet'
     where = ['--output', str(tmp_path), '--data', str(data)]
@@ -252,7 +252,7 @@ def test_a_short_run_writes_the_report_and_pictures(tmp_path, capsys):
     assert all(row['n_corners'] > 0 or not row['is_solved'] for row in rows[10:])
     assert not [row['contact'] for row in rows if row['contact']]
     # A row that breaks everything is listed, and the report can be written again without planning.
-    from benchmarks.motion_rows import write_motions
+    from benchmarks.motions.rows import write_motions
 
     broken = next(row for row in rows if row['is_solved'])
     broken |= {'contact': 'bar 3', 'jerk_ratio': 1.02, 'is_at_rest': False, 'deviation': 2e-4}

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from benchmarks.flood import Flood, RATE  # noqa: E402
+from benchmarks.common.flood import Flood, RATE  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402

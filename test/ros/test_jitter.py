@@ -7,7 +7,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from benchmarks import jitter, jitter_report  # noqa: E402
+from benchmarks.jitter import (
+    __main__ as jitter,  # noqa: E402
+    report,  # noqa: E402
+)
 from rrth_planner.model.trajectory import sample  # noqa: E402
 
 
@@ -37,7 +40,7 @@ def test_the_page_has_a_line_for_each_figure():
         'published': {'p50': 0.05, 'p99': 0.2, 'max': 1.0, 'missed': 3.0, 'intervals': 98.0}
     }
     moving = {**figures, 'positions': {'p99': 0.1, 'max': 0.4}}
-    text = jitter_report.page({100.0: {'idle': figures, 'moving': moving}}, 'python -m x', 60.0)
+    text = report.page({100.0: {'idle': figures, 'moving': moving}}, 'python -m x', 60.0)
     assert 'Written by `python -m x`; do not edit.' in text
     assert '| 100 | idle | published | 0.050 | 0.200 | 1.000 | 3 | 98 |' in text
     assert '| 100 | moving | positions | – | 0.100 | 0.400 | – | – |' in text

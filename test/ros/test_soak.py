@@ -19,16 +19,12 @@ pytest.importorskip('tqdm')
 pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
-from benchmarks import (  # noqa: E402
-    processors,
-    soak,
-    soak_contacts as contacts,
-    soak_flood,
-    soak_judge as judge,
-)
-from benchmarks.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
-from benchmarks.real_time import is_real_time, put_ahead, scheduling, staying_off  # noqa: E402
-from benchmarks.soak_body import (  # noqa: E402
+from benchmarks.common import processors
+from benchmarks.common.processors import lose_time_asleep, OnEachProcessor, stay_awake  # noqa: E402
+from benchmarks.common.real_time import is_real_time, put_ahead, scheduling, staying_off  # noqa: E402
+from benchmarks.common.standstill import StandstillWatch, united  # noqa: E402
+from benchmarks.soak import __main__ as soak, contacts, flood as soak_flood, judge
+from benchmarks.soak.body import (  # noqa: E402
     BodyAt,
     BodyStream,
     next_due,
@@ -37,14 +33,13 @@ from benchmarks.soak_body import (  # noqa: E402
     scene_of_body,
     SPEED,
 )
-from benchmarks.soak_client import brakes_in  # noqa: E402
-from benchmarks.soak_flood import FloodRecord  # noqa: E402
-from benchmarks.soak_guard import GuardRecord  # noqa: E402
-from benchmarks.soak_looks import Look, look_at, Loss, losses  # noqa: E402
-from benchmarks.soak_plans import free_starts, PlansRecord  # noqa: E402
-from benchmarks.soak_report import draw_memory, report  # noqa: E402
-from benchmarks.soak_targets import guard_targets, plan_targets  # noqa: E402
-from benchmarks.standstill import StandstillWatch, united  # noqa: E402
+from benchmarks.soak.client import brakes_in  # noqa: E402
+from benchmarks.soak.flood import FloodRecord  # noqa: E402
+from benchmarks.soak.guard import GuardRecord  # noqa: E402
+from benchmarks.soak.looks import Look, look_at, Loss, losses  # noqa: E402
+from benchmarks.soak.plans import free_starts, PlansRecord  # noqa: E402
+from benchmarks.soak.report import draw_memory, report  # noqa: E402
+from benchmarks.soak.targets import guard_targets, plan_targets  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402

@@ -5,7 +5,7 @@
 from fractions import Fraction
 from itertools import pairwise
 
-from benchmarks.motion_path import distances, planned_pieces
+from benchmarks.motions.path import distances, planned_pieces
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest

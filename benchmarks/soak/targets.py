@@ -1,0 +1,110 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a soak is held to: a line of the table of targets for each."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from benchmarks.common.standstill import Standstills
+from benchmarks.soak import contacts
+from benchmarks.soak.flood import FloodRecord
+from benchmarks.soak.guard import GuardRecord
+from benchmarks.soak.judge import FREE, growth_of
+from benchmarks.soak.looks import heard_by
+from benchmarks.soak.plans import PlansRecord
+
+# A brake came while the machine ran where nothing stood still from so long before its body, whose
+# time is known from the log a little late, until so long after [ns].
+EARLIER, MOMENT = 5_000_000, 5_000_000
+MOST_GROWTH, MOST_AGE, RECERTIFIED, BRAKED, ANSWERED = 5.0, 0.05, 0.3, 5.0, 0.1
+
+
+def plan_targets(plans: PlansRecord) -> list[list[str]]:
+    """Return the lines of targets of the plans."""
+    unsafe = sum(n for (word, _), n in plans.verdicts.items() if word != FREE)
+    n_judged = sum(plans.verdicts.values())
+    heard = heard_by(plans.figures)
+    refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('refused messages'))
+    growth = growth_of([m for _, m in plans.memory]).growth if plans.memory else np.nan
+    age = max((look.age for look in plans.looks), default=np.nan)
+    return [
+        _line('calls without an answer', '0', plans.n_unanswered, plans.n_unanswered == 0),
+        _line(
+            'published motions that are not free of the body',
+            '0',
+            f'{unsafe} of {n_judged} judged',
+            unsafe == 0 and n_judged == plans.n_motions,
+        ),
+        _line(
+            'bodies that were sent and not heard, or refused',
+            '0',
+            f'{plans.n_sent - heard} of {plans.n_sent}, {refused} messages refused',
+            plans.n_sent == heard and refused == 0,
+        ),
+        _line('age of the body, at most', '50 ms', f'{1e3 * age:.0f} ms', age < MOST_AGE),
+        _line('memory after the first tenth', '< 5 MB', f'{growth:+.2f} MB', growth < MOST_GROWTH),
+        _brake_line('body to braking trajectory in the busy node, p99', plans.figures),
+    ]
+
+
+def guard_targets(guard: GuardRecord) -> list[list[str]]:
+    """Return the lines of targets of the guard."""
+    held = _milliseconds(guard.figures.get('motions held against a new body', ''), 'p50')
+    bad = guard.outcomes[contacts.TOUCHED] + guard.outcomes[contacts.MISSED]
+    return [
+        _line(
+            'holding a running motion against a body, median',
+            f'{RECERTIFIED} ms',
+            f'{held:.3f} ms',
+            held <= RECERTIFIED,
+        ),
+        _brake_line('body to braking trajectory in the node, p99', guard.figures),
+        _line('contacts that braking could have avoided', '0', bad, bad == 0),
+        _line('arm that cannot go on', 'never', guard.stuck or 'never', not guard.stuck),
+    ]
+
+
+def running_target(brakes: Sequence[tuple[int, float]], still: Standstills) -> list[str]:
+    """Return the line of the target of the brakes while the machine ran."""
+    # Whether it did is asked of the same time of each, however long it took.
+    runs = [took for came, took in brakes if not still.within(came - EARLIER, came + MOMENT)]
+    p99 = float(np.percentile(runs, 99, method='higher')) if runs else np.nan
+    return _line(
+        'body to braking trajectory in either part, p99, of those that came while the machine ran',
+        f'{BRAKED:g} ms',
+        f'{p99:.2f} ms, {len(runs)} of {len(brakes)} times',
+        p99 <= BRAKED,
+    )
+
+
+def flood_target(floods: Sequence[FloodRecord]) -> list[str]:
+    """Return the line of the target of the answers under a flood."""
+    missing = sum(flood.n_unanswered for flood in floods)
+    # Where nothing was measured nothing is met.
+    slowest = float(np.max([np.median(flood.calls or [np.nan]) for flood in floods]))
+    return _line(
+        'answer while any topic is flooded, median',
+        f'{1e3 * ANSWERED:g} ms, each',
+        f'{1e3 * slowest:.1f} ms, {missing} without',
+        slowest <= ANSWERED and missing == 0,
+    )
+
+
+def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:
+    """Return the line of the target of the brakes."""
+    braked = figures.get('brakes', '')
+    p99 = _milliseconds(braked, 'p99')
+    n_brakes = braked.split(',')[0]
+    # Where nothing was measured nothing is met.
+    is_met = n_brakes != '0' and p99 <= BRAKED
+    return _line(what, f'{BRAKED:g} ms', f'{p99:.2f} ms, {n_brakes} times', is_met)
+
+
+def _milliseconds(figures: str, name: str) -> float:
+    found = [part.split()[-2] for part in figures.split(', ') if part.startswith(name)]
+    return float(found[0]) if found else float('nan')
+
+
+def _line(what: str, target: str, measured: object, is_met: bool) -> list[str]:
+    return [what, target, str(measured), 'yes' if is_met else '**no**']
