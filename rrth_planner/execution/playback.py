@@ -8,9 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
-from rrth_planner.timing.proven_stop import soonest_stop
-from rrth_planner.timing.running import first_rest, Running
-from rrth_planner.timing.time_law import RateProfile
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -18,8 +15,7 @@ class Playback:
     """
     What the arm does from some time on.
 
-    The motion is passed through at the rate `time_scale`; from `brake_time` on that is multiplied
-    by the rate of the brake, which falls to 0: so the arm never leaves the path of the motion.
+    The motion is passed through at the rate `time_scale`.
 
     Parameters
     ----------
@@ -31,9 +27,8 @@ class Playback:
         What the arm does until then; None: it stands at the first point.
     time_scale : float
         Seconds of the motion per second of the clock [-].
-    brake_time : float
-        [s]; infinite: no brake.
-    brake : RateProfile or None
+    is_braking : bool
+        Whether the motion is a stop.
 
     """
 
@@ -41,25 +36,12 @@ class Playback:
     start_time: float
     time_scale: float
     before: 'Playback | None' = None
-    brake_time: float = float('inf')
-    brake: RateProfile | None = None
+    is_braking: bool = False
 
     @property
     def end_time(self) -> float:
         """When the arm stands still for good, at the latest [s]."""
-        if self.brake is not None:
-            return self.brake_time + self.brake.duration
         return self.start_time + self.trajectory.duration / self.time_scale
-
-    def phase(self, times: ArrayLike) -> tuple[Array, Array, Array]:
-        """Return time within the motion [s], its rate [-] and the rate's slope [1/s]."""
-        t = np.asarray(times, dtype=np.float64)
-        if self.brake is None:
-            ahead = self.time_scale * (t - self.start_time)
-            return ahead, np.full_like(t, self.time_scale), np.zeros_like(t)
-        way, rate, slope, _ = self.brake.at(t - self.brake_time)
-        before = self.brake_time - self.start_time
-        return self.time_scale * (before + way), self.time_scale * rate, self.time_scale * slope
 
     def states_at(self, times: ArrayLike) -> tuple[Array, Array, Array]:
         """
@@ -72,10 +54,9 @@ class Playback:
 
         """
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        phase, rate, slope = self.phase(t)
-        q, v, a = sample(self.trajectory, phase)
-        rate, slope = rate[:, None], slope[:, None]
-        states = q, v * rate, a * rate**2 + v * slope
+        rate = self.time_scale
+        q, v, a = sample(self.trajectory, rate * (t - self.start_time))
+        states = q, v * rate, a * rate**2
         is_early = t < self.start_time
         if self.before is not None and is_early.any():
             for values, earlier in zip(states, self.before.states_at(t[is_early]), strict=True):
@@ -109,39 +90,34 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     """
     Return what the arm does when it brakes along its path from now on.
 
-    Velocity, acceleration and jerk of every joint stay at every instant within the limits, or
-    within what the motion itself does up to where it stops, where that is more. An arm that
-    comes to rest by itself as soon does that; one that brakes already goes on.
+    The stop is `fast_stop.emergency_stop`, and holds what that holds. An arm that comes to rest by
+    itself as soon does that; one that brakes already goes on.
 
     Parameters
     ----------
     playback : Playback
     limits : MotionLimits
+        Of the arm, by the clock.
     time : float
         Now [s].
 
     """
     playback = at_present(playback, time)
-    if playback.brake is not None or time >= playback.end_time:
+    if playback.is_braking or time >= playback.end_time:
         return playback
     if time <= playback.start_time:
         return standing(playback.trajectory.positions[0])
-    phase = playback.time_scale * (time - playback.start_time)
-    running = Running(trajectory=playback.trajectory, phase=phase, scale=playback.time_scale)
-    brake = soonest_stop(running, limits)
-    if brake is not None:
-        return replace(playback, brake_time=time, brake=brake)
-    return replace(playback, trajectory=_up_to_rest(playback.trajectory, phase))
+    # Kernels take a while to load, and an arm that only follows motions needs none.
+    from rrth_planner.timing.fast_stop import emergency_stop
 
-
-def _up_to_rest(trajectory: Trajectory, phase: float) -> Trajectory:
-    """Return a motion up to where it stands still first after some time [s]."""
-    end = first_rest(trajectory, phase) + 1
-    if end == len(trajectory.times):
-        return trajectory
-    return Trajectory(
-        times=trajectory.times[:end],
-        positions=trajectory.positions[:end],
-        velocities=trajectory.velocities[:end],
-        accelerations=trajectory.accelerations[:end],
+    scale = playback.time_scale
+    in_motion = MotionLimits(
+        velocity=limits.velocity / scale,
+        acceleration=limits.acceleration / scale**2,
+        jerk=limits.jerk / scale**3,
     )
+    phase = scale * (time - playback.start_time)
+    # Without the compiler numpy would warn of what a kernel takes for granted.
+    with np.errstate(all='ignore'):
+        braking = emergency_stop(playback.trajectory, phase, in_motion, lead=0.0)
+    return replace(playback, trajectory=braking, start_time=time, is_braking=True)

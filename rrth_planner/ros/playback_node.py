@@ -4,7 +4,10 @@
 
 from array import array
 import gc
+from importlib import import_module
+import os
 import sys
+from threading import Thread
 import traceback
 from typing import Any
 
@@ -183,15 +186,23 @@ class PlaybackNode(Node):
         return response
 
 
+def _load_stops() -> None:
+    """Load what a stop needs, while the arm is there."""
+    import_module('rrth_planner.timing.fast_stop')
+    # What lives as long as the node need not be looked at by the collector in mid-motion.
+    gc.collect()
+    gc.freeze()
+
+
 def main(args: list[str] | None = None) -> int:
     """Run the node until it is told to end; return the exit code."""
     node = None
+    # Kernels are plain Python here: a stop is found in some 20 ms, and nothing is compiled.
+    os.environ['NUMBA_DISABLE_JIT'] = '1'
     try:
         rclpy.init(args=args)
         node = PlaybackNode()
-        # What lives as long as the node need not be looked at by the collector in mid-motion.
-        gc.collect()
-        gc.freeze()
+        Thread(target=_load_stops, name='stops').start()
         rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -2,6 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The kinematic arm follows, brakes along its path, and takes only what fits."""
 
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.execution.acceptance import accept, PlaybackRules
@@ -9,10 +16,11 @@ from rrth_planner.execution.playback import Playback, standing, stop
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.path import Path
-from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.model.trajectory import part_of, sample, Trajectory
 from rrth_planner.timing.fast_stop import emergency_stop
-from rrth_planner.timing.parameterization import parameterize
-from worlds import limits
+from rrth_planner.timing.parameterization import parameterize, peaks
+from sample_motions import any_motion, path_distance
+from worlds import examples, limits
 
 ARM = load_arm()
 FOLDED = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])
@@ -175,6 +183,66 @@ def test_a_stop_in_full_motion_takes_effect_soon():
     assert stopped.state_at(10.0)[0][1] > FOLDED[1] - 1.6
 
 
+@examples(200)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_stop_of_any_motion_at_any_pace_stays_on_its_path_and_holds_limits(seed):
+    rng = np.random.default_rng(seed)
+    trajectory, scale = any_motion(rng), float(rng.choice([1.0, 0.7, 0.1]))
+    playback = Playback(trajectory=trajectory, start_time=2.0, time_scale=scale)
+    time = 2.0 + rng.random() * trajectory.duration / scale
+    stopped = stop(playback, LIMITS, time)
+    for before, after in zip(playback.state_at(time), stopped.state_at(time), strict=True):
+        np.testing.assert_allclose(after, before, rtol=1e-9, atol=1e-9)
+    assert stopped.end_time <= playback.end_time + 1e-8
+    q, v, a = stopped.states_at(np.linspace(time, stopped.end_time, 400))
+    phase = (time - 2.0) * scale
+    assert path_distance(q, trajectory, phase, trajectory.duration).max() <= 1.001e-4
+    # By the clock, what the motion itself does included.
+    rest = part_of(trajectory, phase, trajectory.duration)
+    if len(rest.times) > 1:
+        own = [peak * scale**k for k, peak in enumerate(peaks(rest), start=1)]
+        for values, limit, most in zip(
+            (v, a), (LIMITS.velocity, LIMITS.acceleration), own, strict=False
+        ):
+            assert (np.abs(values) <= 1.01 * np.maximum(limit, most) + 1e-9).all()
+    last = stopped.state_at(stopped.end_time + 1.0)
+    assert not last[1].any()
+    assert not last[2].any()
+
+
+STOP = """
+import json
+from rrth_planner.execution.playback import Playback, stop
+from rrth_planner.model.trajectory import Trajectory
+from worlds import limits
+rest = [0.0] * 4
+move = Trajectory(
+    times=[0.0, 2.0], positions=[rest, [1.0, 0.5, 0.2, 0.0]],
+    velocities=[rest, rest], accelerations=[rest, rest],
+)
+stopped = stop(Playback(trajectory=move, start_time=0.0, time_scale=0.7), limits(), 1.1).trajectory
+print(json.dumps([stopped.times.tolist(), stopped.positions.tolist()]))
+"""
+
+
+def test_a_stop_needs_no_compiler():
+    root = pathlib.Path(__file__).parents[2]
+    paths = os.pathsep.join([str(root), str(root / 'test'), os.environ.get('PYTHONPATH', '')])
+    told = []
+    for without in '01':
+        done = subprocess.run(
+            [sys.executable, '-c', STOP],
+            env={**os.environ, 'PYTHONPATH': paths, 'NUMBA_DISABLE_JIT': without},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert not done.stderr
+        told.append(json.loads(done.stdout))
+    for compiled, plain in zip(*told, strict=True):
+        np.testing.assert_allclose(plain, compiled, rtol=0.0, atol=1e-9)
+
+
 def test_a_stop_at_rest_or_twice_changes_nothing():
     still = standing(FOLDED)
     assert stop(still, LIMITS, 4.0) is still
@@ -326,20 +394,14 @@ def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
                 n_turns += 1
         # Each state lies on the motion, at the time that has passed.
         times = np.sort(rng.uniform(playback.start_time, playback.end_time, 8))
-        states = playback.states_at(times)
-        expected = sample(playback.trajectory, playback.phase(times)[0])[0]
-        np.testing.assert_allclose(states[0], expected, atol=1e-9)
-        until = np.minimum(times, playback.brake_time)
-        passed = playback.time_scale * (until - playback.start_time)
-        unbraked = times <= playback.brake_time
+        passed = playback.time_scale * (times - playback.start_time)
         expected = sample(playback.trajectory, passed)[0]
-        np.testing.assert_allclose(states[0][unbraked], expected[unbraked], atol=1e-9)
+        np.testing.assert_allclose(playback.states_at(times)[0], expected, atol=1e-9)
         now = playback.end_time + rng.uniform(0.01, 0.5)
         q_end, v_end, a_end = playback.state_at(now)
         assert not v_end.any()
         assert not a_end.any()
-        if playback.brake is None:
-            np.testing.assert_allclose(q_end, playback.trajectory.positions[-1], atol=1e-9)
+        np.testing.assert_allclose(q_end, playback.trajectory.positions[-1], atol=1e-9)
     assert n_motions > 1000
     assert min(n_stops, n_turns) > 100
 

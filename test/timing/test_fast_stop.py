@@ -20,7 +20,6 @@ from rrth_planner.timing.braking import brake
 from rrth_planner.timing.corner_blends import Blend
 from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
-from rrth_planner.timing.running import along_path, derivatives_at, Running, slowed
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
 
@@ -168,6 +167,33 @@ def test_points_a_nanosecond_apart_do_no_harm():
         assert not stop.velocities[-1].any()
 
 
+def derivatives_at(motion, times):
+    """Return velocities, accelerations and jerks at some times, (m,) [s] -> (m, 3, dof)."""
+    _, v, a = sample(motion, times)
+    return np.stack([v, a, jerks_at(motion, times)], axis=1)
+
+
+def slowed(states, rate, slope, bend):
+    """
+    Return velocities, accelerations and jerks, (m, 3, dof), of a motion at another rate.
+
+    With the time in the motion s(t) these are q' s', q'' s'^2 + q' s'' and
+    q''' s'^3 + 3 q'' s' s'' + q' s'''; the rate is s' [-, 1/s, 1/s^2].
+    """
+    r, w, u = rate[:, None], slope[:, None], bend[:, None]
+    v, a, j = (states[:, k] for k in range(3))
+    return np.stack([v * r, a * r**2 + v * w, j * r**3 + 3.0 * a * r * w + v * u], axis=1)
+
+
+def along_path(states, weights):
+    """Return the speed along the path, joints weighed, and its two derivatives, each (m,)."""
+    v, a, j = (states[:, k] / weights for k in range(3))
+    # At rest the derivatives come out as 0 or immense, never as no number.
+    speed = np.maximum(np.sqrt((v * v).sum(axis=-1)), 1e-150)
+    slope = (v * a).sum(axis=-1) / speed
+    return speed, slope, ((a * a).sum(axis=-1) + (v * j).sum(axis=-1) - slope**2) / speed
+
+
 @examples(100)
 @given(seed=SEEDS)
 def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):
@@ -202,8 +228,7 @@ def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):
             )
             for c, way in zip(cells, x, strict=True)
         ]
-        running = Running(trajectory=motion, phase=0.0, scale=1.0)
-        states = derivatives_at(running, np.array(reached))
+        states = derivatives_at(motion, np.array(reached))
         w, w_slope, w_bend = along_path(states, LIMITS.acceleration)
         rate = (v0 + t * (a0 + 0.5 * t * j)) / w
         rate_slope = (a0 + t * j - w_slope * rate**2) / w
