@@ -21,26 +21,6 @@ def to_bernstein(degree: int) -> Array:
     )
 
 
-def from_values(degree: int) -> tuple[Array, Array]:
-    """
-    Return where a polynomial is to be looked at, and the matrix to its Bernstein coefficients.
-
-    A polynomial of this degree is known by its values at degree + 1 instants; these are the
-    Chebyshev nodes of [0, 1], all of them inside.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (degree + 1,) and (degree + 1, degree + 1)
-
-    """
-    n = degree + 1
-    nodes = 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
-    values = [
-        [comb(degree, i) * u**i * (1.0 - u) ** (degree - i) for i in range(n)] for u in nodes
-    ]
-    return nodes, np.linalg.inv(np.array(values))
-
-
 def first_outside(control: Array, low: Array, high: Array) -> tuple[int, float, float] | None:
     """
     Return a place where one of many polynomials over [0, 1] leaves its range, or None.

@@ -5,7 +5,7 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.model.bernstein import first_outside, from_values, to_bernstein
+from rrth_planner.model.bernstein import first_outside, to_bernstein
 from worlds import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -18,13 +18,9 @@ def values(powers, u=U):
 
 
 @pytest.mark.parametrize('degree', [3, 5, 14])
-def test_values_and_powers_have_the_same_coefficients(degree):
+def test_the_first_and_last_coefficients_are_values(degree):
     powers = np.random.default_rng(degree).uniform(-1.0, 1.0, (degree + 1, 20))
-    nodes, matrix = from_values(degree)
-    assert (nodes > 0.0).all()
-    assert (nodes < 1.0).all()
     control = to_bernstein(degree) @ powers
-    np.testing.assert_allclose(matrix @ values(powers, nodes), control, atol=1e-8)
     np.testing.assert_allclose(control[[0, -1]], values(powers, np.array([0.0, 1.0])), atol=1e-12)
 
 
