@@ -21,7 +21,7 @@ from rrth_planner.io.wearer_file import load_body, load_wearer
 from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
 from test_incident import disagreement
-from test_motion_files import random_motion
+from test_motion_file import random_motion
 from worlds import examples
 
 ROOT = Path(__file__).parents[2]

@@ -423,8 +423,8 @@ def test_every_array_of_every_value_is_read_only():
 
 
 def test_the_paper_arm_is_the_one_in_the_package():
-    resources = pytest.importorskip('rrth_planner.io.resources', exc_type=ImportError)
-    packaged, own = resources.load_arm(), table_1_arm()
+    arm_file = pytest.importorskip('rrth_planner.io.arm_file', exc_type=ImportError)
+    packaged, own = arm_file.load_arm(), table_1_arm()
     assert packaged.joint_names == own.joint_names
     for name in ('dh', 'bounds', 'radii', 'T_base_mount'):
         assert np.array_equal(getattr(packaged, name), getattr(own, name)), name
@@ -432,11 +432,11 @@ def test_the_paper_arm_is_the_one_in_the_package():
 
 @pytest.mark.parametrize('before', ['', '\ufeff', '\n <!-- an arm: -->\n'])
 def test_a_urdf_is_no_arm_file_and_is_sent_to_read_urdf(tmp_path, before):
-    resources = pytest.importorskip('rrth_planner.io.resources', exc_type=ImportError)
+    arm_file = pytest.importorskip('rrth_planner.io.arm_file', exc_type=ImportError)
     file = tmp_path / 'arm.yaml'
     file.write_text(f'{before}<robot name="a"><link name="b"/></robot>', encoding='utf-8')
     words = (f'file {file}: XML, as a URDF is', 'read_urdf writes one')
-    refuses(ModelError, lambda: resources.load_arm(file), *words)
+    refuses(ModelError, lambda: arm_file.load_arm(file), *words)
 
 
 @examples(300)

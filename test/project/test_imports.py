@@ -69,9 +69,11 @@ FCL_USERS = {
 }
 # Modules that import of the project below their top: the node says that it compiles before it
 # imports what has to be compiled, a command which libraries it misses before it imports what needs
-# them, and what only one option of a command needs takes seconds to load.
+# them, what only one option of a command needs takes seconds to load, and a playback needs
+# kernels for stops only.
 LATE = {
     'rrth_planner.ros.planner_node',
+    'rrth_planner.execution.playback',
     *(
         f'rrth_planner.cli.{name}'
         for name in ('plot', 'point_at', 'record', 'reproduce', 'viewer')

@@ -10,6 +10,9 @@ import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
 
+# When a message was sent: source timestamp [ns] and sequence number.
+Stamp = tuple[int, int]
+
 # A quaternion this far from unit length is no rounding but a mistake.
 QUATERNION_TOLERANCE = 1e-2
 NANOSECONDS = 1_000_000_000

@@ -5,11 +5,9 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.fields import Stamp
 from rrth_planner.ros.messages.marker_edits import Edit, Key
 from visualization_msgs.msg import Marker
-
-# When a message was sent: source timestamp [ns] and sequence number.
-Stamp = tuple[int, int]
 
 # So many deleted markers, and so many namespaces, are remembered; of one that is forgotten a late
 # array may add the box once more.

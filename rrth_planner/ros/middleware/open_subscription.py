@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rrth_planner.model.errors import MessageError
-from rrth_planner.ros.messages.marker_order import Stamp
+from rrth_planner.ros.messages.fields import Stamp
 
 DEPTH = 50
 # Longer messages are not decoded, which would hold up everything else: half a second for a
