@@ -28,7 +28,7 @@ from benchmarks.planners.full_query import Case, cases, MARGIN, RAY
 
 # The wearers of the other benchmark are the first hundred.
 FIRST_BODY = 1000
-STEPS = ('round_corners', 'in_time', 'first_proven', 'touch_seen')
+STEPS = ('round_corners', 'in_time', 'first_proven', 'violation_seen')
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

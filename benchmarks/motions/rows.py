@@ -66,7 +66,7 @@ def motion_row(motion: Motion, is_sought: bool, limits: MotionLimits) -> Row:
         'n_stops': sum(blend.half_length == 0.0 for blend in motion.rounded),
         'time_round': motion.step_times['round_corners'],
         'time_prove': motion.step_times['in_time'] + motion.step_times['first_proven'],
-        'time_second': motion.step_times['touch_seen'],
+        'time_second': motion.step_times['violation_seen'],
         'time_plan': plan.planning_time,
     }
     return row | _judged(motion, limits) if row['is_solved'] else row

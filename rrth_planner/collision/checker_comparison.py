@@ -9,8 +9,8 @@ import numpy as np
 from rrth_planner.collision import reference_checker as oracle
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.fcl_checker import nearest
-from rrth_planner.collision.trajectory_validation import is_proven_free, touch_seen
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
+from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel, reach_to
 from rrth_planner.model.arrays import Array
@@ -33,7 +33,7 @@ class Opinion:
         [s]; the same for the posture at the end, with the ray out to the target.
     certificate : str
         `proven`, `touches` or `undecided`.
-    fcl : Touch
+    fcl : Violation
         Where python-fcl sees the arm closest to the wearer, at some instants.
     oracle : float
         The least clearance that the numpy oracle sees at such instants [m].
@@ -43,7 +43,7 @@ class Opinion:
     begin: float
     end: float
     certificate: str
-    fcl: Touch
+    fcl: Violation
     oracle: float
 
 
@@ -56,7 +56,7 @@ class Verdict:
     ----------
     is_proven : bool
         By the certificate.
-    touch : Touch or None
+    touch : Violation or None
         What python-fcl sees first.
     clearance : float
         The least that the numpy oracle sees [m].
@@ -66,7 +66,7 @@ class Verdict:
     """
 
     is_proven: bool
-    touch: Touch | None
+    touch: Violation | None
     clearance: float
     opinions: tuple[Opinion, ...]
 
@@ -118,7 +118,7 @@ def verdict_of(
     )
     return Verdict(
         is_proven=is_proven_free(world, trajectory, reach, escape_time),
-        touch=touch_seen(arm, scene, world, trajectory, margin, reach, escape_time),
+        touch=violation_seen(arm, scene, world, trajectory, margin, reach, escape_time),
         clearance=min(opinion.oracle for opinion in (*opinions, last)),
         opinions=(*opinions, last),
     )
@@ -150,12 +150,12 @@ def _of_piece(
     )
 
 
-def _closest(arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float) -> Touch:
+def _closest(arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float) -> Violation:
     """Return where python-fcl sees the arm closest at instants, q (n, dof), times (n,) [s]."""
-    best = Touch(float(times[0]), math.inf, '', '')
+    best = Violation(float(times[0]), math.inf, '', '')
     # Without a box there is nothing to be close to.
     for time, one in zip(times.tolist(), q if scene.boxes else (), strict=False):
         seen = nearest(arm, scene, one, ray)
         if seen.distance < best.distance:
-            best = Touch(time, seen.distance, seen.bar, seen.box)
+            best = Violation(time, seen.distance, seen.bar, seen.box)
     return best

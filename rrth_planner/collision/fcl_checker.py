@@ -11,7 +11,7 @@ import math
 import numpy as np
 from rrth_planner.collision.displacement_bounds import travelled
 from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.reach import bar_ends
@@ -29,7 +29,7 @@ APART = 1e-3
 MOST_LOOKS = 8
 
 
-def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Touch:
+def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Violation:
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
     boxes, poses = boxes_of(scene), forward_kinematics(arm, q)
     least, where = math.inf, ('', '')
@@ -38,7 +38,7 @@ def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Touch:
         distance, j = bar.nearest(boxes, np.full(len(boxes.names), -math.inf), q, poses)
         if distance < least:
             least, where = distance, (bar.name, boxes.names[j])
-    return Touch(0.0, least, *where)
+    return Violation(0.0, least, *where)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +94,7 @@ class _Watch:
         pause()
         self.bars = [Bar(arm, k, ray_length) for k in range(len(self.ways))]
         self._unknown = np.full(len(scene.boxes), -math.inf)
-        self.touch: Touch | None = None
+        self.touch: Violation | None = None
 
     def look(self, wanted: Sequence[tuple[Bar, int, tuple[_Look, ...]]]) -> list[_Look]:
         """Return looks at bars at some instants, each with what others have seen of the bar."""
@@ -113,7 +113,7 @@ class _Watch:
                 # What comes later need not be looked at any more.
                 self.last = index
                 box = self._boxes.names[j]
-                self.touch = Touch(float(self._times[index]), distance, bar.name, box)
+                self.touch = Violation(float(self._times[index]), distance, bar.name, box)
             looks.append(_Look(index, way, max(0.0, distance - self._margin - DOUBT), bounds))
         return looks
 
@@ -131,7 +131,7 @@ class _Watch:
         return sorted({bisect_left(way, begin + (j + 0.5) * step, low, high) for j in range(n)})
 
 
-def first_touch(
+def first_violation(
     arm: ArmModel,
     scene: Scene,
     trajectory: Trajectory,
@@ -139,7 +139,7 @@ def first_touch(
     ray_guard_length: float,
     reach: float,
     pause: Callable[[], object] = lambda: None,
-) -> Touch | None:
+) -> Violation | None:
     """
     Return where a trajectory first comes nearer than the margin, or None.
 
@@ -193,7 +193,7 @@ def touch_on_way_out(
     margin: float,
     ray_guard_length: float,
     pause: Callable[[], object] = lambda: None,
-) -> Touch | None:
+) -> Violation | None:
     """
     Return where a motion that leads out of boxes first comes nearer than it may, or None.
 
@@ -211,7 +211,7 @@ def touch_on_way_out(
     margin, ray_guard_length : float
         [m].
     pause : callable
-        As in `first_touch`.
+        As in `first_violation`.
 
     """
     if escape_time == 0.0:
@@ -220,10 +220,10 @@ def touch_on_way_out(
     for box, by in zip(scene.boxes, kept.tolist(), strict=True):
         size = box.size + 2.0 * (by - APART)
         if not (size > 0.0).all():
-            return Touch(0.0, by, 'the arm', box.name)
+            return Violation(0.0, by, 'the arm', box.name)
         boxes.append(Box(box.name, box.center, size, box.rotation))
     way = part_of(trajectory, 0.0, escape_time)
-    touch = first_touch(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0, pause)
+    touch = first_violation(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0, pause)
     if touch is None:
         return None
     by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == touch.box)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.fcl_checker import first_touch, touch_on_way_out
+from rrth_planner.collision.fcl_checker import first_violation, touch_on_way_out
 from rrth_planner.collision.penetration import box_depths, leads_out
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.scene import Scene
@@ -38,7 +38,7 @@ def is_proven_free(
     )
 
 
-def touch_seen(
+def violation_seen(
     arm: ArmModel,
     scene: Scene,
     world: World,
@@ -47,7 +47,7 @@ def touch_seen(
     reach: float,
     escape_time: float = 0.0,
     pause: Callable[[], object] = lambda: None,
-) -> Touch | None:
+) -> Violation | None:
     """
     Return where python-fcl sees a motion first come nearer than it may, or None.
 
@@ -64,7 +64,7 @@ def touch_seen(
     reach, escape_time : float
         As in `is_proven_free`.
     pause : callable
-        As in `fcl_checker.first_touch`.
+        As in `fcl_checker.first_violation`.
 
     """
     ray = world.ray_length
@@ -73,5 +73,5 @@ def touch_seen(
         touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray, pause)
         if touch is not None:
             return touch
-    touch = first_touch(arm, scene, beyond(trajectory, escape_time), margin, ray, reach, pause)
+    touch = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach, pause)
     return None if touch is None else replace(touch, time=escape_time + touch.time)

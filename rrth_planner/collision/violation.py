@@ -8,7 +8,7 @@ from rrth_planner.model.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
-class Touch:
+class Violation:
     """
     Where a trajectory comes nearer to the wearer than the margin.
 
@@ -38,7 +38,7 @@ class Disagreement:
     ----------
     trajectory : Trajectory
         Never published.
-    touch : Touch
+    touch : Violation
         What python-fcl saw first.
     escape_time : float
         Until then the motion leads out of boxes that the arm was in [s].
@@ -46,7 +46,7 @@ class Disagreement:
     """
 
     trajectory: Trajectory
-    touch: Touch
+    touch: Violation
     escape_time: float = 0.0
 
     def sentence(self, margin: float) -> str:

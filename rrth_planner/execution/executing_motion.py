@@ -34,7 +34,7 @@ N_SOON = 9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RunningMotion:
+class ExecutingMotion:
     """
     A motion and when it began.
 

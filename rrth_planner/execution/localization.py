@@ -4,7 +4,7 @@
 
 import numpy as np
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.trajectory import near_point, sample, Trajectory
 
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
@@ -23,7 +23,7 @@ def takeover(
     running: Trajectory | None,
     ahead: float,
     known: tuple[float, float] | None = None,
-) -> Takeover:
+) -> StartState:
     """
     Return what an arm will do, from a reading of it.
 
@@ -48,7 +48,7 @@ def takeover(
     if running is not None and found is None:
         found = phase_of(positions, velocities, running)
     if running is None or found is None:
-        return Takeover(
+        return StartState(
             state=MotionState(
                 positions=positions + ahead * velocities,
                 velocities=velocities,
@@ -59,7 +59,7 @@ def takeover(
     # At a point of the motion where there is one: no piece of what follows is too short.
     time = near_point(running, min(phase + rate * ahead, running.duration))
     q, v, a = (values[0] for values in sample(running, [time]))
-    return Takeover(
+    return StartState(
         state=MotionState(positions=q, velocities=v, accelerations=a), running=running, time=time
     )
 

@@ -90,7 +90,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     """
     Return what the arm does when it brakes along its path from now on.
 
-    The stop is `fast_stop.emergency_stop`, and holds what that holds. An arm that comes to rest by
+    The stop is `fast_stop.fast_stop`, and holds what that holds. An arm that comes to rest by
     itself as soon does that; one that brakes already goes on.
 
     Parameters
@@ -108,7 +108,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     if time <= playback.start_time:
         return standing(playback.trajectory.positions[0])
     # Kernels take a while to load, and an arm that only follows motions needs none.
-    from rrth_planner.timing.fast_stop import emergency_stop
+    from rrth_planner.timing.fast_stop import fast_stop
 
     scale = playback.time_scale
     in_motion = MotionLimits(
@@ -119,5 +119,5 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     phase = scale * (time - playback.start_time)
     # Without the compiler numpy would warn of what a kernel takes for granted.
     with np.errstate(all='ignore'):
-        braking = emergency_stop(playback.trajectory, phase, in_motion, lead=0.0)
+        braking = fast_stop(playback.trajectory, phase, in_motion, lead=0.0)
     return replace(playback, trajectory=braking, start_time=time, is_braking=True)

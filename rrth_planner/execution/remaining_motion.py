@@ -9,7 +9,7 @@ from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import leads_out
 from rrth_planner.collision.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -31,18 +31,18 @@ REFINEMENTS, TINY = 3, 1e-12
 
 
 def taken_over(
-    before: RunningMotion, phase: float, after: RunningMotion, now: float
-) -> RunningMotion:
+    before: ExecutingMotion, phase: float, after: ExecutingMotion, now: float
+) -> ExecutingMotion:
     """
     Return a motion that begins a little later, with what the arm does until then before it.
 
     Parameters
     ----------
-    before : RunningMotion
+    before : ExecutingMotion
         That the arm follows until then.
     phase, now : float
         The time within it that the arm has come to, and the time by which that is so [s].
-    after : RunningMotion
+    after : ExecutingMotion
         That takes over; returned as it is where nothing is known of the way to it.
 
     """
@@ -73,7 +73,7 @@ def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
 
 
 def is_still_free(
-    running: RunningMotion,
+    running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
     scene: Scene,
@@ -86,7 +86,7 @@ def is_still_free(
 
     Parameters
     ----------
-    running : RunningMotion
+    running : ExecutingMotion
     phase : float
         Time within the motion that it has come to [s].
     arm : ArmModel
@@ -107,7 +107,7 @@ def is_still_free(
 
 
 def leads_away(
-    running: RunningMotion,
+    running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
     scene: Scene,
@@ -158,7 +158,7 @@ def is_place_free(
 
 
 def _is_rest_free(
-    running: RunningMotion,
+    running: ExecutingMotion,
     begin: float,
     arm: ArmModel,
     scene: Scene,

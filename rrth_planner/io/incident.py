@@ -13,7 +13,7 @@ from pathlib import Path
 import platform
 from typing import Any
 
-from rrth_planner.collision.violation import Disagreement, Touch
+from rrth_planner.collision.violation import Disagreement, Violation
 from rrth_planner.io.entries import number, text
 from rrth_planner.io.serialization import (
     fields_of,
@@ -57,7 +57,7 @@ class Incident:
         What the plan began with.
     trajectory : Trajectory or None
         The motion in question, if there was one already.
-    touch : Touch or None
+    touch : Violation or None
         What python-fcl saw of it.
     present : Scene or None
         The wearer that the motion was judged for, where that is not the one it was planned for:
@@ -81,7 +81,7 @@ class Incident:
     time: str
     question: PlanQuestion
     trajectory: Trajectory | None = None
-    touch: Touch | None = None
+    touch: Violation | None = None
     present: Scene | None = None
     escape_time: float = 0.0
     error: str = ''

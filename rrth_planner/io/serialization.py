@@ -8,14 +8,14 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.io.entries import mapping, number, sequence, whole
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, RecordError, shown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
@@ -94,10 +94,10 @@ def trajectory_from_mapping(data: Any, name: str) -> Trajectory:
     return Trajectory(**fields_of(data, Trajectory, name))
 
 
-def touch_from_mapping(data: Any) -> Touch:
+def touch_from_mapping(data: Any) -> Violation:
     """Return the touch that `plain` wrote, or raise RrthError."""
-    given = fields_of(data, Touch, 'touch')
-    return Touch(
+    given = fields_of(data, Violation, 'touch')
+    return Violation(
         time=number(given['time'], 'touch: time', 's', RecordError),
         distance=number(given['distance'], 'touch: distance', 'm', RecordError),
         bar=printable(given['bar'], 'touch: bar', RecordError),
@@ -123,11 +123,11 @@ def _options(data: Any) -> TreeOptions:
     return kind(**given)
 
 
-def _takeover(data: Any, dof: int) -> Takeover:
-    given = fields_of(data, Takeover, 'moving')
+def _takeover(data: Any, dof: int) -> StartState:
+    given = fields_of(data, StartState, 'moving')
     state = fields_of(given['state'], MotionState, 'moving: state')
     running = given['running']
-    return Takeover(
+    return StartState(
         state=MotionState(
             **{
                 name: frozen_array(value, (dof,), f'moving: {name}', 'rad, s', RecordError)

@@ -26,7 +26,7 @@ class MotionState:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Takeover:
+class StartState:
     """
     What an arm that moves does when a motion takes over from its present one.
 

@@ -13,7 +13,7 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Refusal
-from rrth_planner.timing.lead_in import Lead
+from rrth_planner.timing.lead_in import LeadIn
 from rrth_planner.timing.parameterization import parameterize
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
@@ -50,9 +50,9 @@ class Escape:
         q: Array = self.trajectory.positions[-1]
         return q
 
-    def lead(self, limits: MotionLimits) -> Lead:
+    def lead(self, limits: MotionLimits) -> LeadIn:
         """Return it as what comes before the path."""
-        return Lead(trajectory=self.trajectory, speed=0.0, q_stop=self.q_end, allowed=limits)
+        return LeadIn(trajectory=self.trajectory, speed=0.0, q_stop=self.q_end, allowed=limits)
 
 
 def way_out(

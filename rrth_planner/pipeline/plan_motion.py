@@ -18,7 +18,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.start_state import StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape, way_out
@@ -37,7 +37,7 @@ from rrth_planner.pipeline.time_path import time_path
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import PlanResult
 from rrth_planner.planning.pointing_goals import check_pointing_arm
-from rrth_planner.timing.lead_in import Lead, lead_in, stop_first
+from rrth_planner.timing.lead_in import lead_in, LeadIn, stop_first
 
 # A wearer who holds still makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)
@@ -55,7 +55,7 @@ def plan_motion(
     ray_guard_length: float,
     seed: int,
     should_stop: Callable[[], bool] = lambda: False,
-    moving: Takeover | None = None,
+    moving: StartState | None = None,
     escape_depth: float = 0.05,
 ) -> MotionPlan:
     """
@@ -81,7 +81,7 @@ def plan_motion(
         >= 0.
     should_stop : callable
         Polled while planning; True cancels.
-    moving : Takeover, optional
+    moving : StartState, optional
         How the arm moves at q_start; without, it is at rest. The motion then begins with this
         state: the arm goes on straight ahead, no further than it needs to stop, and turns off; or,
         where there is no room for that, it stops along its present motion first.
@@ -95,7 +95,7 @@ def plan_motion(
     q_start = within_limits(arm, q_start)
     world = _world_of(arm, scene, margin, ray_guard_length)
     escape, disagreement = None, None
-    leads: Iterable[Lead | None | Refusal] = (None,)
+    leads: Iterable[LeadIn | None | Refusal] = (None,)
     refusal = start_refusal(arm, grown(world, SPARES[-1]), q_start)
     if refusal is not None and refusal.status is PlanStatus.START_IN_COLLISION:
         if moving is not None:
@@ -186,8 +186,8 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
 
 
 def _leads(
-    arm: ArmModel, world: World, moving: Takeover, limits: MotionLimits
-) -> Iterator[Lead | Refusal]:
+    arm: ArmModel, world: World, moving: StartState, limits: MotionLimits
+) -> Iterator[LeadIn | Refusal]:
     """
     Yield what an arm in motion may do first: go straight on, or stop along its present motion.
 

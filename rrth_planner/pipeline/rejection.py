@@ -16,7 +16,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.pointing_goals import GoalSet
-from rrth_planner.timing.lead_in import Lead
+from rrth_planner.timing.lead_in import LeadIn
 
 # A joint this far beyond its limit is at it [rad, m].
 ROUNDING = 1e-6
@@ -101,7 +101,9 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
     return f'{part} is {where}: {depth:.4f} m deep in it with its margin'
 
 
-def lead_refusal(arm: ArmModel, world: World, lead: Lead, limits: MotionLimits) -> Refusal | None:
+def lead_refusal(
+    arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
+) -> Refusal | None:
     """Return why an arm that moves cannot go straight on until it could rest, or None."""
     fastest = np.abs(lead.trajectory.velocities) / limits.velocity
     k = int(fastest.max(axis=0).argmax())

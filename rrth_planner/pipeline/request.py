@@ -10,7 +10,7 @@ from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.start_state import StartState
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import TreeOptions
 
@@ -33,7 +33,7 @@ class PlanQuestion:
         From 0 to 1e4 [m].
     seed : int
         >= 0.
-    moving : Takeover or None
+    moving : StartState or None
     escape_depth : float
         From 0 to 1e4 [m].
 
@@ -53,7 +53,7 @@ class PlanQuestion:
     margin: float
     ray_guard_length: float
     seed: int
-    moving: Takeover | None = None
+    moving: StartState | None = None
     escape_depth: float = 0.05
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.trajectory_validation import touch_seen
+from rrth_planner.collision.trajectory_validation import violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arm import ArmModel, reach_to
@@ -20,7 +20,7 @@ from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape
 from rrth_planner.pipeline.rejection import CANCELLED, Refusal
 from rrth_planner.timing.corner_blends import Blend, round_corners
-from rrth_planner.timing.lead_in import Lead, reserved
+from rrth_planner.timing.lead_in import LeadIn, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
 
 # Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
@@ -40,7 +40,7 @@ def time_path(
     path: Path,
     limits: MotionLimits,
     margin: float,
-    lead: Lead | None,
+    lead: LeadIn | None,
     escape: Escape | None,
     should_stop: Callable[[], bool],
 ) -> Trajectory | Disagreement | Refusal:
@@ -60,7 +60,7 @@ def time_path(
     limits : MotionLimits
     margin : float
         [m].
-    lead : Lead or None
+    lead : LeadIn or None
         What comes before the path.
     escape : Escape or None
         The lead, where it leads out of boxes that the arm was in.
@@ -100,7 +100,7 @@ def time_path(
     if should_stop():
         return CANCELLED
     reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = touch_seen(
+    touch = violation_seen(
         arm, scene, world, trajectory, margin, reach, escape_time, pause=should_stop
     )
     if should_stop():
@@ -111,7 +111,7 @@ def time_path(
 
 
 def in_time(
-    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, lead: Lead | None
+    path: Path, choices: Sequence[tuple[Blend, ...]], limits: MotionLimits, lead: LeadIn | None
 ) -> list[Trajectory]:
     """
     Return the trajectories along a path that hold the limits, the fastest first.
@@ -122,7 +122,7 @@ def in_time(
     choices : sequence of tuple of Blend
         Ways to take the corners.
     limits : MotionLimits
-    lead : Lead or None
+    lead : LeadIn or None
         What comes before the path, whose first edge is then followed from its speed on.
 
     """
@@ -154,7 +154,7 @@ def first_proven(
     return None
 
 
-def _straight_on(lead: Lead, path: Path) -> Path:
+def _straight_on(lead: LeadIn, path: Path) -> Path:
     """Return the path from the end of the lead-in over where the arm would stop."""
     begin = lead.trajectory.positions[-1]
     rest = path.waypoints if path.length > 0.0 else path.waypoints[:1]

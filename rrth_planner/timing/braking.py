@@ -6,7 +6,7 @@ import numpy as np
 from rrth_planner.collision.certificate import Certificate, certify
 from rrth_planner.collision.world import World
 from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
-from rrth_planner.timing.fast_stop import emergency_stop
+from rrth_planner.timing.fast_stop import fast_stop
 
 # What rounding leaves of an acceleration [rad/s^2].
 ROUNDING = 1e-9
@@ -36,7 +36,7 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     """
     if not 0.0 < time < trajectory.duration:
         return part_of(trajectory, time, time)
-    stop = emergency_stop(trajectory, time, limits, lead=0.0)
+    stop = fast_stop(trajectory, time, limits, lead=0.0)
     q, v, a = sample(trajectory, [time])
     if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.

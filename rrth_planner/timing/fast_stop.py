@@ -3,7 +3,7 @@
 """A stop along a running motion that is found within a millisecond."""
 
 import numpy as np
-from rrth_planner.kernels.trajectory.fast_stop import quick_stop
+from rrth_planner.kernels.trajectory.fast_stop import write_fast_stop
 from rrth_planner.kernels.trajectory.stop_trajectory import SPACINGS
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
@@ -11,7 +11,7 @@ from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Traj
 ON_ITS_WAY = 0.01
 
 
-def emergency_stop(
+def fast_stop(
     trajectory: Trajectory, time: float, limits: MotionLimits, lead: float = ON_ITS_WAY
 ) -> Trajectory:
     """
@@ -51,7 +51,7 @@ def emergency_stop(
         )
     most = len(trajectory.times) + 8 + int(trajectory.duration / SPACINGS[-1])
     times, states = np.empty(most), np.empty((3, most, dof))
-    n = quick_stop(
+    n = write_fast_stop(
         curves,
         trajectory.times,
         time,

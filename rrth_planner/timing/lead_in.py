@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.parameterization import peaks
@@ -21,7 +21,7 @@ RESERVE = 0.99
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Lead:
+class LeadIn:
     """
     From a moving state to constant velocity, and where straight on leads to rest.
 
@@ -44,7 +44,7 @@ class Lead:
     allowed: MotionLimits
 
 
-def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
+def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     """
     Return how an arm that moves gets onto a straight line.
 
@@ -74,10 +74,10 @@ def lead_in(state: MotionState, limits: MotionLimits) -> Lead:
         velocities[-1], speed = 0.0, 0.0
     u = velocities[-1] / max(speed, 1e-300)
     share = np.abs(u) + 1e-300
-    grip = RESERVE * float((limits.acceleration / share).min())
-    snap = RESERVE * float((limits.jerk / share).min())
-    length = 0.5 * speed * ramp_time(speed, grip, snap) * (1 + 1e-6)
-    return Lead(
+    a_max = RESERVE * float((limits.acceleration / share).min())
+    j_max = RESERVE * float((limits.jerk / share).min())
+    length = 0.5 * speed * ramp_time(speed, a_max, j_max) * (1 + 1e-6)
+    return LeadIn(
         trajectory=Trajectory(
             times=times, positions=positions, velocities=velocities, accelerations=accelerations
         ),
@@ -100,7 +100,7 @@ def reserved(limits: MotionLimits) -> MotionLimits:
     )
 
 
-def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
+def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
     """Return the lead that is a stop along the present motion; None where that is not known."""
     if moving.running is None:
         return None
@@ -110,4 +110,4 @@ def stop_first(moving: Takeover, limits: MotionLimits) -> Lead | None:
         own = zip(peaks(stop), (limits.velocity, limits.acceleration, limits.jerk), strict=True)
         v, a, j = (np.maximum(*pair) for pair in own)
         allowed = MotionLimits(velocity=v, acceleration=a, jerk=j)
-    return Lead(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)
+    return LeadIn(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 import pytest
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.localization import takeover
 from rrth_planner.io.incident import disagreement_incident, error_incident, IncidentKind
@@ -28,7 +28,7 @@ from rrth_planner.cli import replay
 from rrth_planner.collision import checker_comparison, trajectory_validation
 
 ROOT = Path(__file__).parents[2]
-TOUCH = Touch(0.25, 0.0123, 'ray', 'head')
+TOUCH = Violation(0.25, 0.0123, 'ray', 'head')
 QUESTION = PlanQuestion(
     arm=table_1_arm(),
     scene=wearer(),
@@ -44,7 +44,7 @@ QUESTION = PlanQuestion(
 
 def disagree(monkeypatch):
     """Have python-fcl see a touch in every motion."""
-    monkeypatch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
+    monkeypatch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
 
 
 def disagreement(monkeypatch, question=QUESTION):

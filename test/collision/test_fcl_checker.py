@@ -79,7 +79,7 @@ def test_contacts_deeper_than_a_millimetre_are_found():
         trajectory = straight(q_from, q_to)
         dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 4001))
         curve = np.stack([q_from, q_to - q_from])
-        touch = fcl_check.first_touch(arm, scene, trajectory, 0.02, 1.0, 1.0)
+        touch = fcl_check.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
         # Round corners: what the grown boxes touch only at their edges may pass the margin.
         if min(world.clearances(q).min() for q in dense[::8]) < -0.0125:
             assert touch is not None
@@ -139,7 +139,7 @@ def test_the_first_touch_is_that_of_a_look_every_millisecond():
             # Touching by as little as can be, and not touching by as little, too.
             margin = rng.choice([0.0, 0.02, 0.1])
             expected = first_touch_by_brute_force(arm, scene, trajectory, margin, 0.5)
-            touch = fcl_check.first_touch(arm, scene, trajectory, margin, 0.5, 0.5)
+            touch = fcl_check.first_violation(arm, scene, trajectory, margin, 0.5, 0.5)
             assert (touch and touch.time) == expected
             n_touching += expected is not None
             n_free += expected is None
@@ -162,10 +162,10 @@ def test_a_touch_of_one_instant_is_found():
             continue
         n_found += 1
         margin = least[lowest] + 2 * fcl_check.TOLERANCE
-        touch = fcl_check.first_touch(arm, scene, trajectory, margin, 1.0, 1.0)
+        touch = fcl_check.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
         assert touch is not None
         assert touch.distance == pytest.approx(least[lowest], abs=2 * fcl_check.TOLERANCE)
-        assert fcl_check.first_touch(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
+        assert fcl_check.first_violation(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
     assert n_found > 10
 
 
@@ -182,8 +182,8 @@ def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre():
     hold = straight(q, q)
     for gap in (0.01, 0.02, 0.05):
         scene = plate_beside(arm, q, gap)
-        assert fcl_check.first_touch(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
-        touch = fcl_check.first_touch(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
+        assert fcl_check.first_violation(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
+        touch = fcl_check.first_violation(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
         assert touch is not None
         assert (touch.time, touch.bar, touch.box) == (0.0, 'pointing ray', 'plate')
         assert touch.distance == pytest.approx(gap, abs=5e-6)
@@ -195,7 +195,9 @@ def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over():
     T = tool_pose(arm, np.array([0.31, -0.8, 0.0, 0.5]))
     thin = Scene((Box('blade', T[:3, 3] + 0.9 * T[:3, 2], (0.002,) * 3, np.eye(3)),))
     for duration in (0.3, 1.0, 5.0):
-        touch = fcl_check.first_touch(arm, thin, straight(q_from, q_to, duration), 0.02, 1.0, 1.0)
+        touch = fcl_check.first_violation(
+            arm, thin, straight(q_from, q_to, duration), 0.02, 1.0, 1.0
+        )
         assert touch is not None
         assert touch.box == 'blade'
 
@@ -209,12 +211,12 @@ def test_only_at_the_end_the_ray_counts_out_to_the_target():
         return Scene((Box('far', T[:3, 3] + 1.8 * T[:3, 2], (0.1,) * 3, np.eye(3)),))
 
     trajectory = straight(q_from, q_to)
-    assert fcl_check.first_touch(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
-    touch = fcl_check.first_touch(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
+    assert fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
+    touch = fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
     assert touch is not None
     assert touch.time == trajectory.duration
     middle = 0.5 * (q_from + q_to)
-    assert fcl_check.first_touch(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
+    assert fcl_check.first_violation(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
 
 
 def test_others_may_go_first_between_looks(monkeypatch):
@@ -227,7 +229,7 @@ def test_others_may_go_first_between_looks(monkeypatch):
     monkeypatch.setattr(fcl_check.Bar, 'nearest', look)
     arm = table_1_arm()
     q = np.mean(arm.bounds, axis=0)
-    fcl_check.first_touch(
+    fcl_check.first_violation(
         arm, wearer(), straight(q, q + 0.2), 0.02, 1.0, 2.0, lambda: done.append('pause')
     )
     assert len(done) > 20
@@ -237,7 +239,7 @@ def test_others_may_go_first_between_looks(monkeypatch):
 def test_nothing_touches_where_there_is_nothing():
     arm = table_1_arm()
     trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))
-    assert fcl_check.first_touch(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
+    assert fcl_check.first_violation(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
 
 
 def test_objects_of_the_library_are_used_again(monkeypatch):
@@ -253,7 +255,7 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
 
     def look():
         motion = straight(q_from, q_to)
-        touches = [fcl_check.first_touch(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies]
+        touches = [fcl_check.first_violation(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies]
         return [touch and (touch.time, touch.distance, touch.bar, touch.box) for touch in touches]
 
     before = look()

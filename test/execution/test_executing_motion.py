@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.trajectory import sample, Trajectory
 
 
@@ -22,7 +22,7 @@ def _swing():
 @pytest.mark.parametrize('at', [0.1, 0.3, 0.5, 0.8])
 def test_an_arm_that_began_late_is_found_where_it_is(late, at):
     motion = _swing()
-    running = RunningMotion(trajectory=motion, start_time=10.0)
+    running = ExecutingMotion(trajectory=motion, start_time=10.0)
     q, _, _ = (values[0] for values in sample(motion, [at]))
     taken = 10.0 + at + late
     phase = running.phase(q, taken, taken + 0.004)
@@ -31,7 +31,7 @@ def test_an_arm_that_began_late_is_found_where_it_is(late, at):
 
 
 def test_an_arm_at_rest_is_where_the_time_says():
-    running = RunningMotion(trajectory=_swing(), start_time=10.0)
+    running = ExecutingMotion(trajectory=_swing(), start_time=10.0)
     assert running.phase(np.zeros(4), 10.01, 10.02) == pytest.approx(0.02)
 
 
@@ -39,7 +39,7 @@ def test_an_arm_at_rest_is_where_the_time_says():
 @pytest.mark.parametrize('beside', [0.0, 0.01, 0.05])
 def test_an_arm_that_lags_or_sags_is_where_it_is_nearest_to(late, beside):
     motion = _swing()
-    running = RunningMotion(trajectory=motion, start_time=10.0)
+    running = ExecutingMotion(trajectory=motion, start_time=10.0)
     q = sample(motion, [0.5])[0][0] + beside * np.array([0.6, 0.8, 0.0, 0.0])
     phase = running.phase(q, 10.5 + late, 10.5 + late)
     path = sample(motion, np.linspace(0.0, 1.0, 20001))[0]
@@ -48,7 +48,7 @@ def test_an_arm_that_lags_or_sags_is_where_it_is_nearest_to(late, beside):
 
 
 def test_an_arm_that_is_elsewhere_is_nowhere_on_its_motion():
-    running = RunningMotion(trajectory=_swing(), start_time=10.0)
+    running = ExecutingMotion(trajectory=_swing(), start_time=10.0)
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 10.5, 10.5) is None
     assert running.phase(np.full(4, np.nan), 10.5, 10.5) is None
     # It may still be on its way there.
@@ -72,7 +72,7 @@ def _two_swings():
 )
 def test_an_arm_is_on_time_where_its_motion_is(at, goes_on):
     motion = _two_swings()
-    running = RunningMotion(trajectory=motion, start_time=10.0)
+    running = ExecutingMotion(trajectory=motion, start_time=10.0)
     q, v, _ = (values[0] for values in sample(motion, [at]))
     assert running.is_on_time(q, v, 10.0 + at)
     assert not running.is_on_time(q + [0.0, 0.001, 0.0, 0.0], v, 10.0 + at)
@@ -82,6 +82,6 @@ def test_an_arm_is_on_time_where_its_motion_is(at, goes_on):
 
 
 def test_an_arm_that_never_began_is_not_on_time():
-    running = RunningMotion(trajectory=_two_swings(), start_time=10.0)
+    running = ExecutingMotion(trajectory=_two_swings(), start_time=10.0)
     for since in (-0.1, 0.0, 0.02, 0.049, 0.06, 0.5, 1.0, 3.0):
         assert not running.is_on_time(np.zeros(4), np.zeros(4), 10.0 + since)

@@ -17,7 +17,7 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import part_of, sample, Trajectory
-from rrth_planner.timing.fast_stop import emergency_stop
+from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.parameterization import parameterize, peaks
 from sample_motions import any_motion, path_distance
 from worlds import examples, limits
@@ -338,7 +338,7 @@ def test_a_stop_is_taken_at_the_pace_of_the_motion_whatever_the_time_scale_is_by
     move = motion(FOLDED, FOLDED - 0.8, duration=2.0)
     running = taken(standing(FOLDED), move, time_scale=before)
     phase = 0.9
-    braking = emergency_stop(move, phase, LIMITS)
+    braking = fast_stop(move, phase, LIMITS)
     now = phase / before
     stopped = taken(running, braking, now, time_scale=after)
     assert stopped.time_scale == before

@@ -11,7 +11,7 @@ from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import frames, quintic_states
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import (
     is_place_free,
     is_still_free,
@@ -26,7 +26,7 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
+from rrth_planner.timing.fast_stop import fast_stop, ON_ITS_WAY
 from rrth_planner.timing.parameterization import limit_ratio
 from worlds import (
     dense_touch,
@@ -62,7 +62,7 @@ def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
     if motion is None:
         return
     time = rng.uniform(0.0, motion.duration)
-    stop = emergency_stop(motion, time, limits())
+    stop = fast_stop(motion, time, limits())
     q, v, a = (values[0] for values in sample(motion, [time]))
     assert np.allclose(stop.positions[0], q, atol=1e-12)
     if len(stop.times) == 1:
@@ -94,7 +94,7 @@ def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach)
     scene = Scene((*wearer().boxes, *random_boxes(rng, n_more, spread=3.0, largest=0.2).boxes))
     world = arm_world(arm, scene, MARGIN, RAY)
     is_proven = certify(motion, world, max(phase, 0.0)).is_proven
-    running = RunningMotion(trajectory=motion, start_time=0.0, reach=reach)
+    running = ExecutingMotion(trajectory=motion, start_time=0.0, reach=reach)
     is_free = is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
     assert is_free == (is_proven and world.is_valid(motion.positions[-1], max(reach, RAY)))
 
@@ -113,7 +113,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
     hand = Box('hand', where, rng.uniform(0.05, 0.2, 3), np.eye(3))
     scene = Scene((*wearer().boxes, hand))
     is_free = is_still_free(
-        RunningMotion(trajectory=motion, start_time=0.0),
+        ExecutingMotion(trajectory=motion, start_time=0.0),
         phase,
         arm,
         scene,
@@ -142,7 +142,7 @@ def test_a_reading_tells_how_far_the_motion_is(seed):
     motion = random_motion(rng)
     if motion is None:
         return
-    running = RunningMotion(trajectory=motion, start_time=100.0)
+    running = ExecutingMotion(trajectory=motion, start_time=100.0)
     time = rng.uniform(0.05, 0.95) * motion.duration
     q, v, _ = (values[0] for values in sample(motion, [time]))
     # By the clock where it fits; else by where the arm is, as when it is played slowly.
@@ -183,7 +183,7 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         scene = hand_beside(rng, q[0], MARGIN)
         if scene is None:
             continue
-        running = RunningMotion(trajectory=motion, start_time=0.0)
+        running = ExecutingMotion(trajectory=motion, start_time=0.0)
         assert not is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
         found = leads_away(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
         told[found] += 1
@@ -222,14 +222,14 @@ def some_motions():
 def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
     n_known = 0
     for motion in some_motions():
-        before = RunningMotion(trajectory=motion, start_time=100.0)
+        before = ExecutingMotion(trajectory=motion, start_time=100.0)
         begin, begin_ahead = 0.3 * motion.duration, 0.025
         # Its first two points are close, as those of a lead-in.
         at = begin + rate * begin_ahead
         later = joined(
             part_of(motion, at, at + 0.001), part_of(motion, at + 0.001, motion.duration)
         )
-        after = RunningMotion(trajectory=later, start_time=150.0)
+        after = ExecutingMotion(trajectory=later, start_time=150.0)
         now = 150.0 - begin_ahead
         whole = taken_over(before, begin - late, after, now)
         # Where nothing moves no place tells the time.
@@ -244,16 +244,16 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
         assert np.abs(q - expected).max() < 1e-5
         # No jump where they meet, and none in a stop that follows it.
         assert limit_ratio(whole.trajectory, limits()) < 1.01
-        assert limit_ratio(emergency_stop(whole.trajectory, 0.001, limits()), limits()) < 1.01
+        assert limit_ratio(fast_stop(whole.trajectory, 0.001, limits()), limits()) < 1.01
     assert n_known >= 5
 
 
 def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
     motion = some_motions()[0]
-    before = RunningMotion(trajectory=motion, start_time=100.0)
+    before = ExecutingMotion(trajectory=motion, start_time=100.0)
     half = 0.5 * motion.duration
     later = part_of(motion, half, motion.duration)
-    after = RunningMotion(trajectory=later, start_time=100.0 + half)
+    after = ExecutingMotion(trajectory=later, start_time=100.0 + half)
     assert taken_over(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
     # Its motion is over before, has not begun, or does not lead there.
     assert taken_over(before, 0.9 * motion.duration, after, 100.0) is after
@@ -264,5 +264,5 @@ def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
         velocities=later.velocities,
         accelerations=later.accelerations,
     )
-    aside = RunningMotion(trajectory=aside, start_time=100.0 + half)
+    aside = ExecutingMotion(trajectory=aside, start_time=100.0 + half)
     assert taken_over(before, half - 0.02, aside, 100.0 + half - 0.02) is aside

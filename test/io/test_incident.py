@@ -9,7 +9,7 @@ from types import MappingProxyType
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.collision.violation import Disagreement, Touch
+from rrth_planner.collision.violation import Disagreement, Violation
 from rrth_planner.io.incident import (
     disagreement_incident,
     error_incident,
@@ -28,7 +28,7 @@ from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
@@ -76,7 +76,7 @@ def incidents(draw):
     state = MotionState(
         positions=draw(rows(1))[0], velocities=draw(rows(1))[0], accelerations=draw(rows(1))[0]
     )
-    moving = Takeover(
+    moving = StartState(
         state=state, running=draw(st.none() | trajectories()), time=draw(st.floats(0.0, 9.0))
     )
     scenes = st.lists(boxes(), max_size=3).map(lambda found: Scene(tuple(found)))
@@ -100,7 +100,7 @@ def incidents(draw):
         escape_depth=draw(st.floats(0.0, 1.0)),
     )
     is_disagreement = draw(st.booleans())
-    touch = Touch(draw(ANY), draw(ANY), draw(NAMES), draw(NAMES))
+    touch = Violation(draw(ANY), draw(ANY), draw(NAMES), draw(NAMES))
     return Incident(
         kind=IncidentKind.DISAGREEMENT if is_disagreement else IncidentKind.ERROR,
         sentence=draw(LINES),
@@ -162,7 +162,9 @@ def disagreement():
         velocities=np.zeros((1, 4)),
         accelerations=np.zeros((1, 4)),
     )
-    return disagreement_incident(question(), Disagreement(still, Touch(0.0, 0.01, 'ray', 'head')))
+    return disagreement_incident(
+        question(), Disagreement(still, Violation(0.0, 0.01, 'ray', 'head'))
+    )
 
 
 def test_half_a_character_does_not_keep_a_file_from_being_written(tmp_path):

@@ -24,10 +24,10 @@ SEEDS = st.integers(0, 2**32 - 1)
 @given(seed=SEEDS)
 def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     rng = np.random.default_rng(seed)
-    top, grip, snap = 10.0 ** rng.uniform(-1.0, 1.0, 3) * [1.0, 3.0, 30.0]
+    top, a_max, j_max = 10.0 ** rng.uniform(-1.0, 1.0, 3) * [1.0, 3.0, 30.0]
     v_from = rng.choice([0.0, rng.uniform(0.0, top)])
     least = 10.0 ** rng.uniform(-3.0, 1.0)
-    v_to = speed_profile.reachable_speed(v_from, least, rng.uniform(v_from, top), grip, snap)
+    v_to = speed_profile.reachable_speed(v_from, least, rng.uniform(v_from, top), a_max, j_max)
     length = least * rng.choice([1.01, 1.1, 3.0])
     if rng.random() < 0.5:
         v_from, v_to = v_to, v_from
@@ -35,12 +35,12 @@ def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     request.current_position, request.target_position = [0.0], [length]
     request.current_velocity, request.target_velocity = [v_from], [v_to]
     request.current_acceleration, request.target_acceleration = [0.0], [0.0]
-    request.max_velocity, request.max_acceleration = [top * (1 + 1e-9)], [grip]
-    request.max_jerk = [snap]
+    request.max_velocity, request.max_acceleration = [top * (1 + 1e-9)], [a_max]
+    request.max_jerk = [j_max]
     profile = Profile(1)
     assert Ruckig(1).calculate(request, profile) in (Result.Working, Result.Finished)
     phases = np.empty((7, 2))
-    cell = np.array([length, top, grip, snap])
+    cell = np.array([length, top, a_max, j_max])
     n = speed_profile.stretch_phases(v_from, v_to, cell, phases)
     assert phases[:n, 0].sum() == pytest.approx(profile.duration, rel=1e-5, abs=1e-6)
 

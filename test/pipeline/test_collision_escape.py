@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
 from rrth_planner.collision.reference_checker import bar_box_touch, first_contact
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_still_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import positions_at, sample
 from rrth_planner.pipeline.plan_path import SPARES
@@ -281,7 +281,7 @@ def test_an_arm_that_moves_is_not_led_out():
     assert ask(arm, scene, FOLDED).status is PlanStatus.SOLVED
     still = np.zeros(4)
     state = MotionState(positions=FOLDED, velocities=still + 0.1, accelerations=still)
-    plan = ask(arm, scene, FOLDED, moving=Takeover(state=state))
+    plan = ask(arm, scene, FOLDED, moving=StartState(state=state))
     assert plan.status is PlanStatus.START_IN_COLLISION
     assert 'pointing ray is 0.0100 m inside box "hand": 0.0300 m deep' in plan.sentence
     assert 'at rest' in plan.sentence
@@ -353,7 +353,7 @@ def second_opinion(arm, scene, world, trajectory):
 
 def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
     arm, scene = pressed()
-    touch = Touch(0.001, 0.005, 'pointing ray', 'hand')
+    touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
     monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
@@ -396,7 +396,7 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
 def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED)
-    running = RunningMotion(
+    running = ExecutingMotion(
         trajectory=plan.trajectory,
         start_time=0.0,
         reach=plan.reach,

@@ -29,7 +29,7 @@ from rrth_planner import (
     Scene,
 )
 from rrth_planner.io.settings import load_settings
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.pipeline.plan_motion import plan_motion
 
 ROOT, FILE = Path(__file__).parents[2], Path(__file__).with_suffix('.csv')
@@ -110,7 +110,7 @@ def rows():
         time = rng.uniform(0.1, 0.9) * motion.duration
         q, v, a = (values[0] for values in sample(motion, [time]))
         state = MotionState(positions=q, velocities=v, accelerations=a)
-        moving = Takeover(state=state, running=motion, time=time)
+        moving = StartState(state=state, running=motion, time=time)
         found.append(_row('moving', _asked(case, q, rng, moving=moving)))
         stop = brake(motion, time, load_settings(arm.dof).limits)
         found.append(

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.reference_checker import first_contact
-from rrth_planner.collision.violation import Touch
+from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.kinematics.pan_tilt_ik import aim
 from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
 from rrth_planner.pipeline.rejection import goal_refusal
@@ -294,12 +294,12 @@ def test_an_arm_that_moves_may_stop_past_a_limit_by_rounding(excess):
             continue
         state = MotionState(positions=q, velocities=v, accelerations=still)
         assert 0.0 < lead_in(state, limits()).q_stop[1] - arm.bounds[1, 1] < 1e-6
-        plan = ask(wearer(), q, [1.5, 0.3, 0.4], moving=Takeover(state=state))
+        plan = ask(wearer(), q, [1.5, 0.3, 0.4], moving=StartState(state=state))
         n_solved += plan.status is PlanStatus.SOLVED
     assert n_solved > 2
 
 
-@pytest.mark.parametrize('opinion', [None, Touch(0.1, 0.01, 'ray', 'torso')])
+@pytest.mark.parametrize('opinion', [None, Violation(0.1, 0.01, 'ray', 'torso')])
 def test_what_is_cancelled_while_the_second_judge_looks_ends_so(monkeypatch, opinion):
     looked = []
 
@@ -307,7 +307,7 @@ def test_what_is_cancelled_while_the_second_judge_looks_ends_so(monkeypatch, opi
         looked.append(opinion)
         return opinion
 
-    monkeypatch.setattr(path_timing, 'touch_seen', look)
+    monkeypatch.setattr(path_timing, 'violation_seen', look)
     target = [1.5, 0.3, 0.4]
     plan = ask(wearer(), FOLDED, target, should_stop=lambda: bool(looked))
     assert looked == [opinion]

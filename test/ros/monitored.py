@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from rrth_planner.collision import reference_checker
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box
 from rrth_planner.model.trajectory import sample, Trajectory
@@ -17,7 +17,7 @@ from rrth_planner.ros.interface.parameters import declare_parameters
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.messages.marker_edits import BodyPart
-from rrth_planner.ros.monitor.execution_monitor import Guard
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 import worlds
 
 ARM = worlds.table_1_arm()
@@ -56,7 +56,7 @@ class Monitored:
             assert_liveliness=lambda: self.alive.append(self.now),
             flush=lambda: None,
         )
-        self.guard = Guard(node, self.heard, self.reporter, publishers, RLock())
+        self.guard = ExecutionMonitor(node, self.heard, self.reporter, publishers, RLock())
         self.guard._now = lambda: self.now
         self.guard._waited = lambda arrived: self.late
         self.see(FAR)
@@ -66,7 +66,7 @@ class Monitored:
 
     def begin(self):
         """Let a motion begin."""
-        running = RunningMotion(trajectory=self.motion, start_time=100.0)
+        running = ExecutingMotion(trajectory=self.motion, start_time=100.0)
         self.tell(running)
 
     def tell(self, running, publish=lambda: None):

@@ -15,15 +15,15 @@ pytest.importorskip('fcl')
 from monitored import FAR, Monitored  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
-from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import Guard  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import Followed  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 PACKAGE = str(Path(rrth_planner.__file__).parent)
@@ -150,12 +150,12 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 
 def places():
     """Return what the monitor calls, as (owner, name)."""
-    names = 'scene_of out_of_sight is_still_free leads_away emergency_stop arm_world'
+    names = 'scene_of out_of_sight is_still_free leads_away fast_stop arm_world'
     found = [(execution_monitor, name) for name in names.split()]
     found += [
         (execution_tracker, name) for name in ('phase_of', 'sample', 'goes_on', 'is_on_other')
     ]
-    for owner in (Guard, Followed, Input, WearerBody, RunningMotion):
+    for owner in (ExecutionMonitor, ExecutionTracker, Input, WearerBody, ExecutingMotion):
         found += [
             (owner, name)
             for name, value in vars(owner).items()

@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
 from rrth_planner.ros.monitor.execution_tracker import ASIDE, goes_on, LATE  # noqa: E402
-from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
+from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402
 from worlds import examples, limits  # noqa: E402
 
@@ -26,9 +26,9 @@ def _stopped(seed):
     rng = np.random.default_rng(seed)
     motion = planned_motion(rng)
     phase = float(rng.uniform(0.1, 0.9)) * motion.duration
-    stop = emergency_stop(motion, phase, limits())
-    before = RunningMotion(trajectory=motion, start_time=BEGIN - phase)
-    return before, phase, RunningMotion(trajectory=stop, start_time=BEGIN)
+    stop = fast_stop(motion, phase, limits())
+    before = ExecutingMotion(trajectory=motion, start_time=BEGIN - phase)
+    return before, phase, ExecutingMotion(trajectory=stop, start_time=BEGIN)
 
 
 def _seen_to_go_on(before, stop, arm, span):
@@ -121,7 +121,7 @@ def test_an_arm_that_lags_or_has_stopped_by_itself_does_not_go_on(seed, lag):
     assert _seen_to_go_on(before, stop, lags, stop.trajectory.duration + lag + 0.2) == []
     # So long before it was told to.
     early = min(lag, phase)
-    stopped = emergency_stop(before.trajectory, phase - early, limits())
+    stopped = fast_stop(before.trajectory, phase - early, limits())
 
     def brakes(time):
         return _at(stopped, early + time)

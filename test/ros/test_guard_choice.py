@@ -15,12 +15,12 @@ from monitored import ARM, FAR, Monitored, PHASE  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
-from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import Guard, Watch  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Watch  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 
@@ -111,7 +111,7 @@ def test_every_arm_is_braked(watched, arm, late):
 
 def test_the_guard_looks_while_simulated_time_stands_still(spinning, wait_until, monkeypatch):
     looks = []
-    monkeypatch.setattr(Guard, '_on_timer', lambda _: looks.append(0))
+    monkeypatch.setattr(ExecutionMonitor, '_on_timer', lambda _: looks.append(0))
     node = Node('paused', parameter_overrides=[Parameter('use_sim_time', value=True)])
     Monitored(node)
     with spinning(node):
@@ -164,7 +164,7 @@ def fail(*_):
 
 def test_a_motion_that_could_not_be_told_is_not_watched(watched):
     before = watched.guard.running
-    running = RunningMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
+    running = ExecutingMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
     with pytest.raises(OSError, match='nothing works'):
         watched.tell(running, fail)
     assert watched.guard.running is before
@@ -173,7 +173,7 @@ def test_a_motion_that_could_not_be_told_is_not_watched(watched):
 
 
 def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
-    running = RunningMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
+    running = ExecutingMotion(trajectory=_turned(watched, 0.2), start_time=watched.now + 0.2)
     watched.tell(running)
     watched.now += 0.02
     watched.read(*watched.on_time(PHASE + 0.02))
@@ -189,7 +189,7 @@ def test_the_way_to_a_motion_that_takes_over_is_watched_too(watched):
 def _told(watched, ahead):
     """Tell a motion that takes over; return it, and arms by whether they take it."""
     turned = _turned(watched, ahead)
-    running = RunningMotion(trajectory=turned, start_time=watched.now + ahead)
+    running = ExecutingMotion(trajectory=turned, start_time=watched.now + ahead)
     watched.tell(running)
 
     def taken(after):

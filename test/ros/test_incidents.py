@@ -17,7 +17,7 @@ from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
-from rrth_planner.collision.violation import Touch  # noqa: E402
+from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.incident import IncidentKind  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
@@ -29,13 +29,13 @@ from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
 from rrth_planner.ros.requests import incidents, plan_request, stop_validation  # noqa: E402
-from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
+from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent
-TOUCH = Touch(0.25, 0.0123, 'pointing ray', 'head')
+TOUCH = Violation(0.25, 0.0123, 'pointing ray', 'head')
 SENTENCE = (
     'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
     'at 0.250 s, expected at least 0.02 m'
@@ -78,7 +78,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     )
     say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
@@ -125,7 +125,7 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     say_all(planner, stranger)
     assert stranger.answer().success
     guard = planner._queue.guard
-    stop = emergency_stop(guard.running.trajectory, 0.3, planner._reporter.parameters.limits)
+    stop = fast_stop(guard.running.trajectory, 0.3, planner._reporter.parameters.limits)
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
     guard.judge(stop, scene, goal, planner._reporter.parameters)
     guard.judge(stop, scene, goal, planner._reporter.parameters)
@@ -133,7 +133,7 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
         # What agrees leaves nothing behind.
         planner._queue._worker.submit(lambda: None).result(30.0)
         assert not list(tmp_path.iterdir())
-        patch.setattr(stop_validation, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(stop_validation, 'first_violation', lambda *_: TOUCH)
         guard.judge(stop, scene, goal, planner._reporter.parameters)
         planner._queue._worker.submit(lambda: None).result(30.0)
     (file,) = tmp_path.iterdir()
@@ -151,7 +151,7 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
         message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
@@ -167,7 +167,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
@@ -238,7 +238,7 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkey
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
     answers = [stranger.answer() for _ in range(2)]
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_touch', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
         answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())

@@ -33,7 +33,7 @@ from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_to_msg,
     tool_path_to_msg,
 )
-from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
+from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
 import worlds  # noqa: E402
@@ -291,7 +291,7 @@ def test_what_is_sent_is_what_was_proven_to_the_bit(seed):
     moving = worlds.random_motion(rng)
     if moving is None:
         return
-    stop = emergency_stop(moving, rng.uniform(0.0, moving.duration), worlds.limits())
+    stop = fast_stop(moving, rng.uniform(0.0, moving.duration), worlds.limits())
     for sent in (moving, stop):
         back = joint_trajectory_from_msg(joint_trajectory_to_msg(sent, JOINTS, 'torso'), JOINTS)
         for name in ('positions', 'velocities', 'accelerations'):

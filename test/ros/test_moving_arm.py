@@ -14,7 +14,7 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from rclpy.node import Node  # noqa: E402
-from rrth_planner.execution.executing_motion import RunningMotion  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs, PlanInputs  # noqa: E402
@@ -26,8 +26,8 @@ from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.requests import handover as start  # noqa: E402
 from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402
 from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
-from rrth_planner.ros.requests.revalidation import LastLook, require_news  # noqa: E402
-from rrth_planner.timing.fast_stop import emergency_stop  # noqa: E402
+from rrth_planner.ros.requests.revalidation import require_news, Revalidation  # noqa: E402
+from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -71,7 +71,7 @@ def _ask(monkeypatch):
     parameters = declare_parameters(node)
 
     def ask(motion, since, is_known=True, tick=2e-4, reads=True, reading=0.0, looking=None):
-        clock, take = Clock(BEGIN + since, tick), LastLook.take
+        clock, take = Clock(BEGIN + since, tick), Revalidation.take
         if tick > 0.0:
             # No time but that of the clock, however busy the machine.
             still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
@@ -98,12 +98,12 @@ def _ask(monkeypatch):
             heard.body.accept(lambda: WearerBody(parts), clock())
 
         if looking is not None:
-            monkeypatch.setattr(LastLook, 'take', look_slowly)
+            monkeypatch.setattr(Revalidation, 'take', look_slowly)
         n_heard = count()
         heard = Inputs('body', 'target', 'joints')
         hear(0.01 * next(n_heard))
         heard.joints = Following(motion, clock)
-        running = RunningMotion(trajectory=motion, start_time=BEGIN) if is_known else None
+        running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
         outcome = plan_request(
             heard, parameters, clock, lambda: False, TARGET, running, catch_up, tell
         )
@@ -221,11 +221,11 @@ def test_a_motion_that_nobody_knows_pauses_unseen(ask):
 
 def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
     motion = _swings()
-    stop = emergency_stop(motion, 0.4, worlds.limits())
+    stop = fast_stop(motion, 0.4, worlds.limits())
     q, v, _ = (row[0] for row in sample(motion, [0.39]))
     reading = JointReading(q, v, BEGIN + 0.39, BEGIN + 0.39, float('inf'))
     inputs = PlanInputs(worlds.wearer(), TARGET, reading)
-    running = RunningMotion(trajectory=stop, start_time=BEGIN + 0.4)
+    running = ExecutingMotion(trajectory=stop, start_time=BEGIN + 0.4)
     found = inputs.ahead(running, BEGIN + 0.46, worlds.table_1_arm())
     assert found.running is stop
     assert np.abs(found.state.positions - sample(stop, [0.06])[0][0]).max() < 1e-9

@@ -27,7 +27,7 @@ from rclpy.qos import (  # noqa: E402
     ReliabilityPolicy,
 )
 from rrth_planner.collision import trajectory_validation  # noqa: E402
-from rrth_planner.collision.violation import Touch  # noqa: E402
+from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
@@ -39,7 +39,7 @@ from rrth_planner.ros.middleware.executor_barrier import CatchUp  # noqa: E402
 from rrth_planner.ros.middleware.thread_priority import RightOfWay  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests import plan_request, revalidation, wait_for_rest  # noqa: E402
-from rrth_planner.ros.requests.revalidation import LastLook  # noqa: E402
+from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -365,7 +365,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    touches.append(Touch(0.001, 0.01, 'pointing ray', 'hand/0'))
+    touches.append(Violation(0.001, 0.01, 'pointing ray', 'hand/0'))
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
     assert not stranger.heard['joint_trajectory']
@@ -529,10 +529,28 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     ('owner', 'step', 'topic', 'msg', 'answer'),
     [
         (plan_request, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
-        (LastLook, 'take', 'body_boxes', fenced(), 'the wearer moved'),
-        (LastLook, 'take', 'body_boxes', array(command(Marker.DELETEALL)), 'is empty: every box'),
-        (LastLook, 'take', 'joint_states', joints([0.5, *FOLDED[1:]]), 'the arm moved by 0.5000'),
-        (LastLook, 'take', 'joint_states', joints(velocity=[0.3] * 4), 'joint_1 moves at 0.300'),
+        (Revalidation, 'take', 'body_boxes', fenced(), 'the wearer moved'),
+        (
+            Revalidation,
+            'take',
+            'body_boxes',
+            array(command(Marker.DELETEALL)),
+            'is empty: every box',
+        ),
+        (
+            Revalidation,
+            'take',
+            'joint_states',
+            joints([0.5, *FOLDED[1:]]),
+            'the arm moved by 0.5000',
+        ),
+        (
+            Revalidation,
+            'take',
+            'joint_states',
+            joints(velocity=[0.3] * 4),
+            'joint_1 moves at 0.300',
+        ),
     ],
 )
 def test_what_came_but_was_not_read_yet_counts(
@@ -566,7 +584,7 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, take, checked = inputs_of(planner), LastLook.take, []
+    inputs, take, checked = inputs_of(planner), Revalidation.take, []
 
     def check_while_a_body_comes(look):
         seen, body = take(look), inputs.body.value
@@ -576,7 +594,7 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
         wait_until(lambda: inputs.body.value is not body)
         return seen
 
-    monkeypatch.setattr(LastLook, 'take', check_while_a_body_comes)
+    monkeypatch.setattr(Revalidation, 'take', check_while_a_body_comes)
     message = stranger.answer().message
     # Not for ever: the guard holds the motion against the bodies that follow.
     assert len(checked) == (1 if is_in_the_way else plan_request.MOST_LOOKS)
@@ -588,7 +606,7 @@ def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, take, looks = inputs_of(planner), LastLook.take, []
+    inputs, take, looks = inputs_of(planner), Revalidation.take, []
 
     def look_while_a_body_comes(look):
         seen, body = take(look), inputs.body.value
@@ -599,7 +617,7 @@ def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
         wait_until(lambda: inputs.body.value is not body)
         return seen
 
-    monkeypatch.setattr(LastLook, 'take', look_while_a_body_comes)
+    monkeypatch.setattr(Revalidation, 'take', look_while_a_body_comes)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     assert not stranger.heard['joint_trajectory']
@@ -630,7 +648,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
-    take, end, catch_up = LastLook.take, Event(), CatchUp.__call__
+    take, end, catch_up = Revalidation.take, Event(), CatchUp.__call__
 
     def catch_up_until_it_is_over(self):
         is_through = catch_up(self)
@@ -645,7 +663,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
         assert begun.wait(10.0)
         return take(look)
 
-    monkeypatch.setattr(LastLook, 'take', look_while_the_node_is_busy)
+    monkeypatch.setattr(Revalidation, 'take', look_while_the_node_is_busy)
     message = stranger.answer().message
     assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.heard['joint_trajectory']
@@ -654,7 +672,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
 def test_a_motion_is_not_told_where_the_machine_stood_still_before(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    still_fits, looks = LastLook.still_fits, []
+    still_fits, looks = Revalidation.still_fits, []
 
     def look_while_all_stands_still(look, *args):
         fits = still_fits(look, *args)
@@ -665,7 +683,7 @@ def test_a_motion_is_not_told_where_the_machine_stood_still_before(start, monkey
         looks.append(fits)
         return fits
 
-    monkeypatch.setattr(LastLook, 'still_fits', look_while_all_stands_still)
+    monkeypatch.setattr(Revalidation, 'still_fits', look_while_all_stands_still)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
     assert looks[0]
@@ -801,10 +819,10 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
 
     def disagree(*args, **_):
         asked.append(args)
-        return Touch(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
+        return Violation(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
     monkeypatch.setattr(plan_request, 'plan_motion', plan_while_a_box_comes)
-    monkeypatch.setattr(revalidation, 'touch_seen', disagree)
+    monkeypatch.setattr(revalidation, 'violation_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
@@ -853,7 +871,7 @@ def test_a_body_is_read_and_guarded_against_on_the_way(start):
 def test_what_was_cancelled_is_never_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, take = planner._queue, LastLook.take
+    queue, take = planner._queue, Revalidation.take
     ended = []
 
     def cancel_after_the_last_look(look):
@@ -862,7 +880,7 @@ def test_what_was_cancelled_is_never_published(start, monkeypatch):
         return seen
 
     with monkeypatch.context() as patch:
-        patch.setattr(LastLook, 'take', cancel_after_the_last_look)
+        patch.setattr(Revalidation, 'take', cancel_after_the_last_look)
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
@@ -920,7 +938,7 @@ def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
 def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, take = planner._queue, LastLook.take
+    queue, take = planner._queue, Revalidation.take
     closers = []
 
     def close_after_the_last_look(look):
@@ -930,7 +948,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
         stranger.wait_until(lambda: queue._is_closed)
         return seen
 
-    monkeypatch.setattr(LastLook, 'take', close_after_the_last_look)
+    monkeypatch.setattr(Revalidation, 'take', close_after_the_last_look)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
     assert not stranger.heard['joint_trajectory']

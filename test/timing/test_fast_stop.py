@@ -18,7 +18,7 @@ from rrth_planner.model.trajectory import (
 )
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.corner_blends import Blend
-from rrth_planner.timing.fast_stop import emergency_stop, ON_ITS_WAY
+from rrth_planner.timing.fast_stop import fast_stop, ON_ITS_WAY
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
@@ -68,7 +68,7 @@ def test_a_quick_stop_goes_on_a_little_and_rests_on_the_path_within_limits(seed)
     rng = np.random.default_rng(seed)
     motion = any_motion(rng)
     time = rng.random() * motion.duration
-    check_stop(emergency_stop(motion, time, LIMITS), motion, time, LIMITS)
+    check_stop(fast_stop(motion, time, LIMITS), motion, time, LIMITS)
 
 
 @examples(100)
@@ -82,7 +82,7 @@ def test_a_quick_stop_of_any_number_and_kind_of_joints_is_one(seed):
     q = np.cumsum(scale * rng.standard_normal((3, dof)), axis=0)
     motion = parameterize(Path(q[:2]), (), bounds)
     time = rng.random() * motion.duration
-    stop = emergency_stop(motion, time, bounds)
+    stop = fast_stop(motion, time, bounds)
     check_stop(stop, motion, time, bounds)
     assert limit_ratio(stop, bounds) <= 1.0026
 
@@ -101,7 +101,7 @@ def test_a_quick_stop_is_about_as_soon_as_the_proven_one(make):
     for _ in range(60):
         motion = make(rng)
         time = rng.random() * motion.duration
-        stop = emergency_stop(motion, time, LIMITS)
+        stop = fast_stop(motion, time, LIMITS)
         ratios.append((stop.duration + 1e-3) / (later_brake(motion, time) + 1e-3))
     assert np.mean(ratios) < 1.01
     assert max(ratios) < 1.2
@@ -111,7 +111,7 @@ def test_a_quick_stop_of_an_arm_that_gets_faster_is_soon():
     motion = parameterize(Path([[0.0] * 4, [2.0, -1.0, 0.5, 0.8]]), (), LIMITS)
     # While the jerk is at its limit up, while the acceleration is, and while the jerk falls again.
     for time in np.arange(0.02, 0.6, 0.04):
-        stop = emergency_stop(motion, time, LIMITS)
+        stop = fast_stop(motion, time, LIMITS)
         assert stop.duration <= 1.02 * later_brake(motion, time)
         assert limit_ratio(stop, LIMITS) <= 1.0026
 
@@ -121,7 +121,7 @@ def test_a_quick_stop_keeps_to_points_that_are_close_to_where_it_begins():
     for knot in motion.times[1:-1]:
         for gap in (-ON_ITS_WAY - 3e-5, -ON_ITS_WAY, -ON_ITS_WAY + 3e-5, -3e-5, -3e-6, 0.0):
             time = max(0.0, knot + gap)
-            stop = emergency_stop(motion, time, LIMITS)
+            stop = fast_stop(motion, time, LIMITS)
             assert stop.duration <= 1.2 * later_brake(motion, time) + 1e-3
             assert (np.diff(stop.times) > 5e-6).all()
 
@@ -130,7 +130,7 @@ def test_a_quick_stop_keeps_to_points_that_are_close_to_where_it_begins():
 def test_near_its_ends_a_motion_is_stopped_too(time):
     motion = parameterize(Path([[0.0] * 4, [1.0, -0.5, 0.3, 0.8]]), (), LIMITS)
     at = time * motion.duration if 0.0 < time <= 1.0 else time
-    stop = emergency_stop(motion, at, LIMITS)
+    stop = fast_stop(motion, at, LIMITS)
     assert stop.duration < 0.2
     within = min(max(at, 0.0), motion.duration)
     np.testing.assert_allclose(stop.positions[0], sample(motion, [within])[0][0], atol=1e-12)
@@ -140,7 +140,7 @@ def test_near_its_ends_a_motion_is_stopped_too(time):
 def test_an_arm_that_stands_still_is_stopped_where_it_is():
     still = np.zeros((1, 4))
     point = Trajectory(times=[0.0], positions=still, velocities=still, accelerations=still)
-    assert emergency_stop(point, 1.0, LIMITS).positions.tolist() == still.tolist()
+    assert fast_stop(point, 1.0, LIMITS).positions.tolist() == still.tolist()
 
 
 def test_a_motion_that_rests_on_its_way_is_followed_no_further():
@@ -150,7 +150,7 @@ def test_a_motion_that_rests_on_its_way_is_followed_no_further():
     motion = parameterize(Path(q), (halt,), LIMITS)
     rest = float(motion.times[~motion.velocities.any(axis=1)][1])
     # Where only the way to that rest is left, that is it.
-    stop = emergency_stop(motion, rest - 0.05, LIMITS)
+    stop = fast_stop(motion, rest - 0.05, LIMITS)
     assert stop.duration <= 0.05 + 2e-9
     np.testing.assert_allclose(stop.positions[-1], q[1], atol=1e-9)
 
@@ -162,7 +162,7 @@ def test_points_a_nanosecond_apart_do_no_harm():
     q, v, a = sample(motion, times)
     dense = Trajectory(times=times, positions=q, velocities=v, accelerations=a)
     for time in np.concatenate([inner - 1e-9, inner - 0.01, inner + 1e-9, [0.98 * times[-1]]]):
-        stop = emergency_stop(dense, time, LIMITS)
+        stop = fast_stop(dense, time, LIMITS)
         assert path_distance(stop.positions, motion, 0.0, motion.duration).max() < 1e-6
         assert not stop.velocities[-1].any()
 

@@ -12,7 +12,7 @@ from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, Takeover
+from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
 from rrth_planner.pipeline import time_path
@@ -96,7 +96,7 @@ def test_a_running_motion_is_taken_over_at_any_instant(seed):
     time = rng.uniform(0.0, before.trajectory.duration)
     q, v, a = (values[0] for values in sample(before.trajectory, [time]))
     state = MotionState(positions=q, velocities=v, accelerations=a)
-    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, Takeover(state=state))
+    plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, StartState(state=state))
     if plan.trajectory is None:
         assert plan.status is not PlanStatus.NOT_CERTIFIED
         return
@@ -120,7 +120,7 @@ def test_an_arm_with_no_room_ahead_is_told_so():
     )
     ahead = tool_pose(arm, lead_in(state, limits()).q_stop)[:3, 3]
     box = Box('wall', ahead, np.full(3, 0.02), np.eye(3))
-    plan = motion(Scene((box,)), q, [0.0, 0.0, 2.0], 3, Takeover(state=state))
+    plan = motion(Scene((box,)), q, [0.0, 0.0, 2.0], 3, StartState(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert 'straight ahead' in plan.sentence
 
@@ -168,7 +168,7 @@ def test_an_arm_with_no_room_ahead_stops_along_its_motion_first(seed):
     time = rng.uniform(0.0, before.trajectory.duration)
     q, v, a = (values[0] for values in sample(before.trajectory, [time]))
     state = MotionState(positions=q, velocities=v, accelerations=a)
-    moving = Takeover(state=state, running=before.trajectory, time=time)
+    moving = StartState(state=state, running=before.trajectory, time=time)
     plan = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving)
     # Along a motion that is proven free it can stop; it may just fail to be proven, since the
     # curve through the points of the stop is off the path by a little.
@@ -198,7 +198,7 @@ def test_a_motion_is_taken_over_where_it_ends(before_end):
     q, v, a = (values[0] for values in sample(running, [running.duration - before_end]))
     # As the end of a motion comes out of `sample` on its own: nearly, not quite, at rest.
     state = MotionState(positions=q, velocities=v + 3e-16, accelerations=a - 8e-15)
-    moving = Takeover(state=state, running=running, time=running.duration - before_end)
+    moving = StartState(state=state, running=running, time=running.duration - before_end)
     found = motion(scene, q, [0.5, 0.3, 1.6], 1, moving)
     assert found.status is PlanStatus.SOLVED, found.sentence
     assert np.array_equal(found.trajectory.positions[0], q)
@@ -215,7 +215,7 @@ def test_in_its_last_milliseconds_a_motion_is_taken_over_within_the_limits(seed)
         return
     time = before.duration - rng.uniform(0.0, 0.012)
     q, v, a = (values[0] for values in sample(before, [time]))
-    moving = Takeover(
+    moving = StartState(
         state=MotionState(positions=q, velocities=v, accelerations=a), running=before, time=time
     )
     taken = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving).trajectory
@@ -235,9 +235,9 @@ def test_a_motion_that_would_break_the_limits_is_none(monkeypatch):
     rng = np.random.default_rng(3)
     q = free_configuration(rng, wearer_world())
     state = MotionState(positions=q, velocities=np.full(4, 0.3), accelerations=np.zeros(4))
-    assert motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state)).trajectory is not None
+    assert motion(wearer(), q, [1.5, 0.1, 0.3], 2, StartState(state=state)).trajectory is not None
     monkeypatch.setattr(time_path, 'EXCESS', 0.5)
-    plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, Takeover(state=state))
+    plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, StartState(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert plan.trajectory is None
     assert 'holds the limits of its joints' in plan.sentence

@@ -95,7 +95,7 @@ def points_between(times, begin, end):
 
 
 @kernel(int64(CUBE, VEC, float64, float64, VEC, VEC, VEC, OUT_VEC, OUT_CUBE), is_short=True)
-def quick_stop(curves, times, now, lead, velocity, acceleration, jerk, points, states):
+def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, points, states):
     """
     Write the points of the soonest stop that is found; return their number.
 

@@ -11,10 +11,10 @@ from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, VEC
 # Rows of the limits of the joints, (3, dof).
 VELOCITY, ACCELERATION, JERK = 0, 1, 2
 # Columns of `cells`: length, and the greatest speed, acceleration and jerk along the path.
-LENGTH, TOP, GRIP, SNAP = 0, 1, 2, 3
+LENGTH, TOP, A_MAX, J_MAX = 0, 1, 2, 3
 # Share of the limit of jerk that the bend of the path may take up at constant speed, and share of
 # what is left of it that acceleration within the bend may take.
-BEND_SHARE, GRIP_SHARE = 1.0, 0.5
+BEND_SHARE, A_MAX_SHARE = 1.0, 0.5
 # No phase of constant jerk need be shorter: points of a message closer than this are a burden [s].
 SHORTEST_RAMP = 5e-4
 HALVINGS = 50
@@ -28,22 +28,22 @@ ROUNDING = 1e-9
 
 
 @kernel(float64(float64, float64, float64))
-def ramp_time(change, grip, snap):
+def ramp_time(change, a_max, j_max):
     """Return how long a change of speed takes, from and to constant speed [s]."""
-    if change <= grip * grip / snap:
-        return 2.0 * math.sqrt(change / snap)
-    return change / grip + grip / snap
+    if change <= a_max * a_max / j_max:
+        return 2.0 * math.sqrt(change / j_max)
+    return change / a_max + a_max / j_max
 
 
 @kernel(float64(float64, float64, float64, float64, float64))
-def reachable_speed(speed, length, top, grip, snap):
+def reachable_speed(speed, length, top, a_max, j_max):
     """Return the greatest speed up to `top` that a stretch leaves room to change to."""
     low, high = speed, max(speed, top)
-    if 0.5 * (speed + high) * ramp_time(high - speed, grip, snap) <= length:
+    if 0.5 * (speed + high) * ramp_time(high - speed, a_max, j_max) <= length:
         return high
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if 0.5 * (speed + middle) * ramp_time(middle - speed, grip, snap) <= length:
+        if 0.5 * (speed + middle) * ramp_time(middle - speed, a_max, j_max) <= length:
             low = middle
         else:
             high = middle
@@ -51,12 +51,12 @@ def reachable_speed(speed, length, top, grip, snap):
 
 
 @kernel(float64(float64, float64, float64, float64, float64, float64))
-def peak_speed(v_from, v_to, length, top, grip, snap):
+def peak_speed(v_from, v_to, length, top, a_max, j_max):
     """Return the greatest speed up to `top` that a stretch between two speeds has room for."""
     low, high = max(v_from, v_to), max(v_from, v_to, top)
     peak = high
     for _ in range(HALVINGS):
-        up, down = ramp_time(peak - v_from, grip, snap), ramp_time(peak - v_to, grip, snap)
+        up, down = ramp_time(peak - v_from, a_max, j_max), ramp_time(peak - v_to, a_max, j_max)
         if 0.5 * ((v_from + peak) * up + (v_to + peak) * down) <= length:
             low = peak
             if peak == high:
@@ -68,17 +68,17 @@ def peak_speed(v_from, v_to, length, top, grip, snap):
 
 
 @kernel(int64(float64, float64, float64, float64, OUT_MAT, int64))
-def ramp(v_from, v_to, grip, snap, phases, n):
+def ramp(v_from, v_to, a_max, j_max, phases, n):
     """Write the phases of constant jerk of a change of speed as rows n, ...; return the next."""
     change, sign = abs(v_to - v_from), 1.0 if v_to > v_from else -1.0
     if change == 0.0:
         return n
-    first, held = math.sqrt(change / snap), 0.0
-    if change > grip * grip / snap:
-        first, held = grip / snap, change / grip - grip / snap
-    phases[n, 0], phases[n, 1] = first, sign * snap
+    first, held = math.sqrt(change / j_max), 0.0
+    if change > a_max * a_max / j_max:
+        first, held = a_max / j_max, change / a_max - a_max / j_max
+    phases[n, 0], phases[n, 1] = first, sign * j_max
     phases[n + 1, 0], phases[n + 1, 1] = held, 0.0
-    phases[n + 2, 0], phases[n + 2, 1] = first, -sign * snap
+    phases[n + 2, 0], phases[n + 2, 1] = first, -sign * j_max
     return n + 3
 
 
@@ -91,18 +91,18 @@ def stretch_phases(v_from, v_to, cell, phases):
     room for, on at that, and down again: from constant speed to constant speed that is the fastest
     profile (Berscheid and Kroeger 2021, where it is a case of many).
     """
-    length, top, grip, snap = cell[LENGTH], cell[TOP], cell[GRIP], cell[SNAP]
-    if grip == 0.0:
+    length, top, a_max, j_max = cell[LENGTH], cell[TOP], cell[A_MAX], cell[J_MAX]
+    if a_max == 0.0:
         phases[0, 0] = length / v_from if v_from > 0.0 else math.inf
         phases[0, 1] = 0.0
         return 1
-    peak = peak_speed(v_from, v_to, length, top, grip, snap)
-    up, down = ramp_time(peak - v_from, grip, snap), ramp_time(peak - v_to, grip, snap)
+    peak = peak_speed(v_from, v_to, length, top, a_max, j_max)
+    up, down = ramp_time(peak - v_from, a_max, j_max), ramp_time(peak - v_to, a_max, j_max)
     ramps = 0.5 * ((v_from + peak) * up + (v_to + peak) * down)
-    n = ramp(v_from, peak, grip, snap, phases, 0)
+    n = ramp(v_from, peak, a_max, j_max, phases, 0)
     phases[n, 0] = max(0.0, length - ramps) / peak if peak > 0.0 else math.inf
     phases[n, 1] = 0.0
-    return ramp(peak, v_to, grip, snap, phases, n + 1)
+    return ramp(peak, v_to, a_max, j_max, phases, n + 1)
 
 
 @kernel(void(MAT, MAT, int64, VEC, OUT_MAT))
@@ -161,33 +161,35 @@ def slowed_square(bends, limits, length, square, cap):
 @kernel(void(MAT, MAT, float64, OUT_VEC))
 def grip_at(bends, limits, speed, cell):
     """Write the acceleration and jerk along the path that a cell allows up to a speed."""
-    grip, snap = math.inf, math.inf
+    a_max, j_max = math.inf, math.inf
     for k in range(bends.shape[1]):
         left = limits[JERK, k] - bends[2, k] * speed**3
         if bends[0, k] > 0.0:
-            grip = min(grip, (limits[ACCELERATION, k] - bends[1, k] * speed * speed) / bends[0, k])
+            a_max = min(
+                a_max, (limits[ACCELERATION, k] - bends[1, k] * speed * speed) / bends[0, k]
+            )
         if bends[1, k] * speed > 0.0:
-            grip = min(grip, GRIP_SHARE * left / (3.0 * bends[1, k] * speed))
-    straight_grip, straight_snap = math.inf, math.inf
+            a_max = min(a_max, A_MAX_SHARE * left / (3.0 * bends[1, k] * speed))
+    straight_a_max, straight_j_max = math.inf, math.inf
     for k in range(bends.shape[1]):
-        left = limits[JERK, k] - bends[2, k] * speed**3 - 3.0 * bends[1, k] * speed * grip
+        left = limits[JERK, k] - bends[2, k] * speed**3 - 3.0 * bends[1, k] * speed * a_max
         if bends[0, k] > 0.0:
-            snap = min(snap, left / bends[0, k])
-            straight_grip = min(straight_grip, limits[ACCELERATION, k] / bends[0, k])
-            straight_snap = min(straight_snap, limits[JERK, k] / bends[0, k])
+            j_max = min(j_max, left / bends[0, k])
+            straight_a_max = min(straight_a_max, limits[ACCELERATION, k] / bends[0, k])
+            straight_j_max = min(straight_j_max, limits[JERK, k] / bends[0, k])
     # Next to nothing left is rounding: such a cell is passed at constant speed.
-    has_room = grip > LEAST_SHARE * straight_grip and snap > LEAST_SHARE * straight_snap
-    cell[GRIP] = grip if has_room else 0.0
-    cell[SNAP] = min(snap, grip / SHORTEST_RAMP) if has_room else 0.0
+    has_room = a_max > LEAST_SHARE * straight_a_max and j_max > LEAST_SHARE * straight_j_max
+    cell[A_MAX] = a_max if has_room else 0.0
+    cell[J_MAX] = min(j_max, a_max / SHORTEST_RAMP) if has_room else 0.0
 
 
 @kernel(float64(float64, float64, VEC))
 def ramped(speed, other, cell):
     """Return the greatest speed up to `speed` that the cell can change to, or from, the other."""
-    if speed <= other or cell[GRIP] == 0.0:
+    if speed <= other or cell[A_MAX] == 0.0:
         return min(speed, other)
     length = (1.0 - SPARED) * cell[LENGTH]
-    return reachable_speed(other, length, speed, cell[GRIP], cell[SNAP])
+    return reachable_speed(other, length, speed, cell[A_MAX], cell[J_MAX])
 
 
 @kernel(float64(MAT, MAT, MAT, MAT, float64, OUT_MAT, OUT_VEC))

@@ -44,13 +44,13 @@ def try_stop(
     row, deceleration, jerk, rows, geometry, pieces, n, limits, reserve, best, phases, tried
 ):
     """Write a stop to `best` and `phases` if it ends sooner and keeps limits; return whether."""
-    grip, snap = math.inf, math.inf
+    a_max, j_max = math.inf, math.inf
     for k in range(limits.shape[1]):
         t = abs(geometry[row, BEGIN, 0, k]) + 1e-300
-        grip, snap = min(grip, limits[1, k] / t), min(snap, limits[2, k] / t)
-    grip, snap = grip * deceleration, snap * jerk
+        a_max, j_max = min(a_max, limits[1, k] / t), min(j_max, limits[2, k] / t)
+    a_max, j_max = a_max * deceleration, j_max * jerk
     way, speed, slope = rows[row, WAY], rows[row, SPEED], rows[row, SLOPE]
-    end = rows[row, TIME] + line_stop(way, speed, slope, grip, snap, tried)
+    end = rows[row, TIME] + line_stop(way, speed, slope, a_max, j_max, tried)
     # Stops that do not get to their decelerations are the same one.
     is_twin = end == best[TRIED]
     best[TRIED] = end

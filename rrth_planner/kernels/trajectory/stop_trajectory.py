@@ -156,17 +156,17 @@ def is_within(points, states, begin, most):
             top = most[0, k] * ALLOWED * WITHIN * T - between * (
                 6 * abs(c3) + 24 * abs(c4) + 60 * abs(c5)
             )
-            grip = most[1, k] * ALLOWED * WITHIN**2 * T**2 - between * (
+            a_max = most[1, k] * ALLOWED * WITHIN**2 * T**2 - between * (
                 24 * abs(c4) + 120 * abs(c5)
             )
-            snap = most[2, k] * ALLOWED * WITHIN**3 * T**3 + noise - between * 120 * abs(c5)
+            j_max = most[2, k] * ALLOWED * WITHIN**3 * T**3 + noise - between * 120 * abs(c5)
             for instant in range(INSTANTS):
                 u = instant / (INSTANTS - 1)
                 if not abs((((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1) <= top:
                     return False
-                if not abs(((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + 2 * c2) <= grip:
+                if not abs(((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + 2 * c2) <= a_max:
                     return False
-                if not abs((60 * c5 * u + 24 * c4) * u + 6 * c3) <= snap:
+                if not abs((60 * c5 * u + 24 * c4) * u + 6 * c3) <= j_max:
                     return False
     return True
 

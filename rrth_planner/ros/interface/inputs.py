@@ -8,14 +8,14 @@ from threading import RLock
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.localization import sharp_phase_of, takeover
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.start_state import Takeover
+from rrth_planner.model.start_state import StartState
 from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -126,7 +126,7 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
 
-    def pauses(self, running: RunningMotion | None, now: float, span: float) -> bool:
+    def pauses(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, to go on in less than a span [s]."""
         if running is None or self.is_moving(now):
             return False
@@ -137,7 +137,7 @@ class PlanInputs:
         then = running.start_time + phase + rate * (now - self.joints.taken)
         return running.will_move(then, rate * span)
 
-    def ahead(self, running: RunningMotion | None, time: float, arm: ArmModel) -> Takeover:
+    def ahead(self, running: ExecutingMotion | None, time: float, arm: ArmModel) -> StartState:
         """Return what an arm that moves will do at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
@@ -168,7 +168,7 @@ class PlanInputs:
             )
         return found
 
-    def _followed(self, running: RunningMotion) -> tuple[float, float] | None:
+    def _followed(self, running: ExecutingMotion) -> tuple[float, float] | None:
         """Return the time within a motion where an arm hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities

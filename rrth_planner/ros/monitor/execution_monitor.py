@@ -19,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_still_free, leads_away
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
@@ -30,8 +30,8 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of
-from rrth_planner.ros.monitor.execution_tracker import Followed
-from rrth_planner.timing.fast_stop import emergency_stop
+from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
+from rrth_planner.timing.fast_stop import fast_stop
 
 # How often the age of the body is looked at [s].
 PERIOD = 0.02
@@ -54,7 +54,7 @@ class Watch(Enum):
     HOLDING = 'holds'
 
 
-class Guard:
+class ExecutionMonitor:
     """
     Stops the arm when what is left of its motion is no longer proven free of the wearer.
 
@@ -84,7 +84,7 @@ class Guard:
         """Begin with no motion."""
         self._node, self._heard, self._reporter = node, heard, reporter
         self._publishers, self._lock = publishers, lock
-        self._followed = Followed(heard.joints)
+        self._followed = ExecutionTracker(heard.joints)
         self._goal: PointingGoal | None = None
         self._state = Watch.IDLE
         # Motions that were planned before a brake are of no use after it, nor is a plan for what
@@ -106,13 +106,13 @@ class Guard:
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
 
     @property
-    def running(self) -> RunningMotion | None:
+    def running(self) -> ExecutingMotion | None:
         """The motion that the arm follows, as far as that is known."""
         return self._followed.motion
 
     def begin(
         self,
-        running: RunningMotion,
+        running: ExecutingMotion,
         goal: PointingGoal,
         parameters: PlannerParameters,
         tell: Callable[[], None],
@@ -146,12 +146,12 @@ class Guard:
             self._followed.forget()
             self._state = Watch.IDLE
 
-    def _stop_of(self, running: RunningMotion, phase: float, now: float) -> RunningMotion:
+    def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
         """Return the soonest stop that is found at once, from where the arm is."""
         # Of a motion that takes over a little later the stop begins then.
         start = running.start_time if phase < 0.0 else now
-        stop = emergency_stop(running.trajectory, phase, self._parameters.limits)
-        return RunningMotion(trajectory=stop, start_time=start)
+        stop = fast_stop(running.trajectory, phase, self._parameters.limits)
+        return ExecutingMotion(trajectory=stop, start_time=start)
 
     def on_body(self, arrived: int) -> None:
         """Hold the body, which came at a time [ns], against what is left of the motion."""
@@ -346,7 +346,7 @@ class Guard:
             if self._is_again and goal is not None and self._reporter.parameters.replan:
                 self.plan_again(goal, stopped.trajectory.duration)
 
-    def _phase_for_certain(self, running: RunningMotion, now: float) -> float | None:
+    def _phase_for_certain(self, running: ExecutingMotion, now: float) -> float | None:
         """Return the time within a motion, whatever is wrong; None where the arm is not on it."""
         try:
             return self._followed.phase(now)
@@ -354,7 +354,7 @@ class Guard:
             # What is told of where the arm is may be what is wrong; it was told to be here.
             return now - running.start_time
 
-    def _publish_stop(self, stop: RunningMotion, why: str) -> None:
+    def _publish_stop(self, stop: ExecutingMotion, why: str) -> None:
         """Publish a stop, and follow the arm on that."""
         before = copy(self._followed)
         self._followed.stop(stop)

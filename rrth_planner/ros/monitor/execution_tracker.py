@@ -3,7 +3,7 @@
 """Which motion an arm follows, of those that it was told, and how far it has come."""
 
 import numpy as np
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.localization import phase_of
 from rrth_planner.execution.remaining_motion import taken_over
 from rrth_planner.model.arrays import Array
@@ -44,7 +44,7 @@ class Pace:
         return is_fast or abs(now - self._then) < STILL
 
 
-def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -> bool:
+def goes_on(reading: JointReading, before: ExecutingMotion, stop: ExecutingMotion) -> bool:
     """
     Return whether an arm is seen to go on along a motion that it was told to stop.
 
@@ -64,13 +64,13 @@ def goes_on(reading: JointReading, before: RunningMotion, stop: RunningMotion) -
     return here is not None and (begin is None or here[0] > begin[0])
 
 
-def is_on_other(reading: JointReading, motion: RunningMotion, other: RunningMotion) -> bool:
+def is_on_other(reading: JointReading, motion: ExecutingMotion, other: ExecutingMotion) -> bool:
     """Return whether an arm is far from its motion, and much nearer to the other one."""
     gap = motion.gap(reading.positions, reading.taken)
     return gap > ASIDE and other.gap(reading.positions, reading.taken) < NEARER * gap
 
 
-class Followed:
+class ExecutionTracker:
     """
     The motion that an arm was told last, or the one before, as its joint states bear out.
 
@@ -83,18 +83,18 @@ class Followed:
 
     def __init__(self, joints: Input[JointReading | None]) -> None:
         """Begin with no motion."""
-        self.motion: RunningMotion | None = None
+        self.motion: ExecutingMotion | None = None
         # Whether that is what the arm was told last.
         self.is_told = True
         self._joints, self._pace = joints, Pace()
         # What the arm followed when it was told what it follows now: as the way that it stops on,
         # and as the motion that gave way to another one.
-        self._stopped: RunningMotion | None = None
-        self._replaced: RunningMotion | None = None
+        self._stopped: ExecutingMotion | None = None
+        self._replaced: ExecutingMotion | None = None
         # When the arm was last where its motion leads [s].
         self._seen = 0.0
 
-    def begin(self, motion: RunningMotion, now: float) -> None:
+    def begin(self, motion: ExecutingMotion, now: float) -> None:
         """Follow a motion from its beginning on, and the present one, if any, until then."""
         phase = None if self.is_over(now) else self.phase(now)
         self._replaced = None if phase is None else self.motion
@@ -102,7 +102,7 @@ class Followed:
             motion = taken_over(self.motion, phase, motion, now)
         self.motion, self.is_told, self._stopped, self._seen = motion, True, None, now
 
-    def stop(self, stop: RunningMotion) -> None:
+    def stop(self, stop: ExecutingMotion) -> None:
         """Follow a stop on the way of the present motion."""
         self.motion, self._stopped = stop, self.motion
 
@@ -151,7 +151,7 @@ class Followed:
         self.is_told = not self.is_told
         return True
 
-    def unstopped(self, now: float) -> tuple[RunningMotion, float] | None:
+    def unstopped(self, now: float) -> tuple[ExecutingMotion, float] | None:
         """Return the motion that the arm goes on with although it was stopped, and the time."""
         stop, before, reading = self.motion, self._stopped, self._joints.value
         if stop is None or before is None or reading is None or not goes_on(reading, before, stop):

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
-from rrth_planner.execution.executing_motion import LONGEST_LEAD, RunningMotion
-from rrth_planner.model.start_state import Takeover
+from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LEAD
+from rrth_planner.model.start_state import StartState
 
 # How far ahead a motion begins that takes over from one that runs: that long its plan may take,
 # and once more with more time [s].
@@ -28,16 +28,16 @@ class Start:
     ----------
     time : float
         [s].
-    takeover : Takeover
+    takeover : StartState
         What the arm does then.
-    running : RunningMotion or None
+    running : ExecutingMotion or None
         The motion that it was last told to follow.
 
     """
 
     time: float
-    takeover: Takeover
-    running: RunningMotion | None
+    takeover: StartState
+    running: ExecutingMotion | None
 
     @property
     def early(self) -> float:

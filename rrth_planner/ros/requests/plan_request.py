@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 import secrets
 
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
@@ -19,7 +19,7 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.requests.handover import LEADS, Start
 from rrth_planner.ros.requests.incidents import PlanError
-from rrth_planner.ros.requests.revalidation import LastLook, require_news
+from rrth_planner.ros.requests.revalidation import require_news, Revalidation
 
 # How often both judges are asked about a motion before it is told: the wearer may never stand
 # still.
@@ -67,7 +67,7 @@ def plan_request(
     clock: Callable[[], float],
     should_stop: Callable[[], bool],
     goal: PointingGoal | None = None,
-    running: RunningMotion | None = None,
+    running: ExecutingMotion | None = None,
     catch_up: Callable[[], bool] = lambda: True,
     tell: Callable[[PlanOutcome, Callable[[], bool]], bool] = lambda _, fits: fits(),
 ) -> PlanOutcome:
@@ -88,7 +88,7 @@ def plan_request(
         Polled while planning; True cancels.
     goal : PointingGoal, optional
         Of the request; without, the last target.
-    running : RunningMotion, optional
+    running : ExecutingMotion, optional
         The motion that the arm was last told to follow.
     catch_up : callable, optional
         Returns when the bodies that came are heard, and whether that is so.
@@ -134,7 +134,7 @@ def plan_request(
                 # That long it may take again.
                 start.wait(clock, should_stop, clock() - begin)
             outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
-            look = LastLook(heard, clock, parameters, inputs, plan, start, should_stop)
+            look = Revalidation(heard, clock, parameters, inputs, plan, start, should_stop)
             try:
                 told = _told(outcome, look, tell)
             except ArmHasMoved:
@@ -159,7 +159,7 @@ def plan_request(
 
 def _told(
     outcome: PlanOutcome,
-    look: LastLook,
+    look: Revalidation,
     tell: Callable[[PlanOutcome, Callable[[], bool]], bool],
 ) -> PlanOutcome | None:
     """Return the outcome once its motion is told, or why it is not; None: it is too late."""

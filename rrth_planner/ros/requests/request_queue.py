@@ -12,7 +12,7 @@ from typing import Any
 from nav_msgs.msg import Path
 from rclpy.node import Node
 from rclpy.task import Future
-from rrth_planner.execution.executing_motion import RunningMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -24,7 +24,7 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.middleware.executor_barrier import CatchUp
 from rrth_planner.ros.middleware.thread_priority import stand_back
-from rrth_planner.ros.monitor.execution_monitor import Guard
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 from rrth_planner.ros.requests.incidents import incident_of, keep, sentence_of
 from rrth_planner.ros.requests.revalidation import busy, require_news
 from rrth_planner.ros.requests.stop_validation import incident_of_stop
@@ -103,7 +103,7 @@ class PlanQueue:
         )
         # Held while a motion is published, so that what was cancelled before never is.
         self._lock = heard.lock
-        self.guard = Guard(node, heard, reporter, self._publishers, self._lock)
+        self.guard = ExecutionMonitor(node, heard, reporter, self._publishers, self._lock)
         self.guard.plan_again = self._plan_again
         self.guard.judge = self._judge
         self._open: set[_Ticket] = set()
@@ -245,7 +245,7 @@ class PlanQueue:
                 if self._catch_up.is_news():
                     self._open.discard(ticket)
                     self.guard.begin(
-                        RunningMotion(
+                        ExecutingMotion(
                             trajectory=outcome.trajectory,
                             start_time=begin or self._now(),
                             reach=outcome.plan.reach,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.collision.penetration import box_depths
-from rrth_planner.collision.trajectory_validation import is_proven_free, touch_seen
+from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import reach_to
@@ -49,7 +49,7 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LastLook:
+class Revalidation:
     """
     Holds a planned motion against wearer and arm as they are by now, as often as need be.
 
@@ -96,7 +96,7 @@ class LastLook:
         self.should_stop()
         motion, escape_time = self._motion, self.plan.escape_time
         parameters = self.parameters
-        touch = touch_seen(
+        touch = violation_seen(
             parameters.arm,
             scene,
             world,

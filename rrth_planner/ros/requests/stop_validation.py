@@ -4,7 +4,7 @@
 
 from collections.abc import Callable
 
-from rrth_planner.collision.fcl_checker import first_touch
+from rrth_planner.collision.fcl_checker import first_violation
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
@@ -34,11 +34,11 @@ def incident_of_stop(
         Of the motion that it ends.
     parameters : PlannerParameters
     pause : callable
-        As in `fcl_checker.first_touch`.
+        As in `fcl_checker.first_violation`.
 
     """
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
-    touch = first_touch(arm, scene, stop, margin, ray, ray, pause)
+    touch = first_violation(arm, scene, stop, margin, ray, ray, pause)
     if touch is None:
         return None
     question = PlanQuestion(
