@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An arm that obeys a stop is told from one that goes on, where its motion slows down anyhow."""
 
-from hypothesis import given, strategies as st
+from hypothesis import assume, given, strategies as st
 import numpy as np
 import pytest
 
@@ -122,6 +122,8 @@ def test_an_arm_that_lags_or_has_stopped_by_itself_does_not_go_on(seed, lag):
     # So long before it was told to.
     early = min(lag, phase)
     stopped = fast_stop(before.trajectory, phase - early, limits())
+    # One that begins earlier, at a corner say, may take longer and go further.
+    assume(stopped.duration - early <= stop.trajectory.duration)
 
     def brakes(time):
         return _at(stopped, early + time)
