@@ -753,6 +753,8 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
     # No joint position comes that would say that it rests.
     planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
     assert stranger.answer().success
+    # It is reported once it has been answered, by another thread.
+    stranger.wait_until(lambda: planner._reporter.report.n_requests == 1)
     planner._queue._worker.submit(lambda: None).result(30.0)
     assert planner._reporter.report.n_requests == 1
     assert not planner._queue._open
