@@ -82,9 +82,10 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
         wait_until(lambda: client.speed() == 0.0)
     moving = [answer for was_moving, answer in answers if was_moving]
     assert len(moving) >= 3
-    # At 500 Hz and half the pace a busy machine holds up the arm's own process, and an arm that has
-    # hardly begun to move is taken to rest: what is planned then is refused.
-    refused = [a.message for a in moving if not a.success] + [x for x in said if 'refused' in x]
+    # At 500 Hz and half the pace a busy machine holds up the arm's own process, and an arm that
+    # has hardly begun to move is taken to rest: what is planned then is refused.
+    refused = [a.message for a in moving if not a.success]
+    refused += [line for line in said if 'refused' in line]
     assert all(any(place in sentence for place in OFF_COURSE) for sentence in refused), refused
     assert len(refused) <= (MOST_HELD_UP if settings else 0), refused
     stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in client.states])
