@@ -3,9 +3,11 @@
 """What the tests of the nodes share: a ROS context, and waiting on conditions."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+import sys
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -70,6 +72,34 @@ def ros_context() -> Iterator[None]:
     rclpy.init()
     yield
     rclpy.try_shutdown()
+
+
+@pytest.fixture(autouse=True)
+def _destroyed_nodes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """
+    Destroy what nodes a test has made and left, whether it passed or not.
+
+    A node outlives its context. A publisher of one would go on giving its last body to each
+    planner of the tests after it, whose own body that may replace.
+    """
+    if 'rclpy.node' not in sys.modules:
+        yield
+        return
+    from rclpy.exceptions import InvalidHandle
+    from rclpy.node import Node
+
+    made, begin = weakref.WeakSet(), Node.__init__
+
+    def noted(self, *args: object, **options: object) -> None:
+        made.add(self)
+        begin(self, *args, **options)
+
+    monkeypatch.setattr(Node, '__init__', noted)
+    yield
+    for node in list(made):
+        # One that has been destroyed, or was refused before it had begun.
+        with suppress(InvalidHandle, AttributeError), node.handle:
+            node.destroy_node()
 
 
 @pytest.fixture(name='wait_until')

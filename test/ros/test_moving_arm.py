@@ -16,7 +16,7 @@ pytest.importorskip('fcl')
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
-from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
+from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs, PlanInputs  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
@@ -37,15 +37,16 @@ BEGIN, TARGET = 100.0, PointingGoal(np.array([2.0, 0.3, 0.4]))
 class Following(Input):
     """Joint states of an arm that is where its motion is whenever somebody looks."""
 
-    def __init__(self, motion, clock):
+    def __init__(self, motion, clock, pace):
         """Say where the arm is by a clock."""
-        self._motion, self._clock = motion, clock
+        self._motion, self._clock, self._pace = motion, clock, pace
         super().__init__('joints', None)
 
     def at(self, now):
         """Return the reading of that time."""
-        q, v, _ = (values[0] for values in sample(self._motion, [now - BEGIN]))
-        return JointReading(q, v, now, now, float('inf'))
+        time = self._pace * (now - BEGIN)
+        q, v, _ = (values[0] for values in sample(self._motion, [time]))
+        return JointReading(q, self._pace * v, now, now, float('inf'))
 
     value = property(lambda self: self.at(self._clock()), lambda self, _: None)
     received = property(lambda self: self._clock(), lambda self, _: None)
@@ -70,7 +71,9 @@ def _ask(monkeypatch):
     node = Node('moving_arm')
     parameters = declare_parameters(node)
 
-    def ask(motion, since, is_known=True, tick=2e-4, reads=True, reading=0.0, looking=None):
+    def ask(
+        motion, since, is_known=True, tick=2e-4, reads=True, reading=0.0, looking=None, pace=1.0
+    ):
         clock, take = Clock(BEGIN + since, tick), Revalidation.take
         if tick > 0.0:
             # No time but that of the clock, however busy the machine.
@@ -102,7 +105,7 @@ def _ask(monkeypatch):
         n_heard = count()
         heard = Inputs('body', 'target', 'joints')
         hear(0.01 * next(n_heard))
-        heard.joints = Following(motion, clock)
+        heard.joints = Following(motion, clock, pace)
         running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
         outcome = plan_request(
             heard, parameters, clock, lambda: False, TARGET, running, catch_up, tell
@@ -241,3 +244,13 @@ def test_an_arm_that_begins_to_move_while_a_plan_is_made_is_planned_for_as_it_mo
     # By somebody else it is not known how it goes on.
     outcome, _ = ask(_swings(), since=-1e-3, reading=0.05, is_known=False)
     assert outcome.code is ErrorCode.START_STATE_INVALID
+
+
+@pytest.mark.parametrize('pace', [0.5, 1.0])
+def test_an_arm_that_has_hardly_begun_its_motion_is_not_one_at_rest(ask, pace):
+    # By its velocity alone it still rests, and would move faster by the time that it is told.
+    motion, reading = _swings(), 0.02
+    assert np.abs(pace * sample(motion, [pace * reading])[1]).max() < 0.5 * REST_SPEED
+    outcome, _ = ask(motion, since=-1e-3, reading=reading, pace=pace)
+    assert outcome.code is ErrorCode.SUCCESS
+    assert outcome.start is not None

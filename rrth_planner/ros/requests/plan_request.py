@@ -134,7 +134,9 @@ def plan_request(
                 # That long it may take again.
                 start.wait(clock, should_stop, clock() - begin)
             outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
-            look = Revalidation(heard, clock, parameters, inputs, plan, start, should_stop)
+            look = Revalidation(
+                heard, clock, parameters, inputs, plan, start, running, should_stop
+            )
             try:
                 told = _told(outcome, look, tell)
             except ArmHasMoved:

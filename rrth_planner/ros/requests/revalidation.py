@@ -10,6 +10,7 @@ from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world, World
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -19,7 +20,7 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
-from rrth_planner.ros.requests.handover import Start
+from rrth_planner.ros.requests.handover import LEADS, Start
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3
@@ -66,6 +67,8 @@ class Revalidation:
         With a motion.
     start : Start or None
         None: from rest.
+    running : ExecutingMotion or None
+        The motion that the arm was last told to follow.
     should_stop : callable
         Polled between and while the judges look; what it says is for the caller to ask.
 
@@ -77,6 +80,7 @@ class Revalidation:
     inputs: PlanInputs
     plan: MotionPlan
     start: Start | None
+    running: ExecutingMotion | None
     should_stop: Callable[[], bool]
 
     def take(self) -> Seen:
@@ -137,6 +141,11 @@ class Revalidation:
         expected = inputs.q_start
         if start is None:
             present.require_rest(now, arm)
+            if present.pauses(self.running, now, LEADS[0]):
+                raise ArmHasMoved(
+                    ErrorCode.START_STATE_INVALID,
+                    'the arm has begun the motion that it was told, expected an arm at rest',
+                )
         else:
             expected = inputs.ahead(start.running, present.joints.taken, arm).state.positions
         moved = float(np.abs(present.q_start - expected).max())
