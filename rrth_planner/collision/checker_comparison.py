@@ -118,7 +118,7 @@ def verdict_of(
     )
     return Verdict(
         is_proven=is_proven_free(world, trajectory, reach, escape_time),
-        touch=violation_seen(arm, scene, world, trajectory, margin, reach, escape_time),
+        touch=violation_seen(arm, scene, trajectory, margin, ray_guard_length, reach, escape_time),
         clearance=min(opinion.oracle for opinion in (*opinions, last)),
         opinions=(*opinions, last),
     )

@@ -3,7 +3,7 @@
 """The second opinion: the same trajectory judged by the Flexible Collision Library."""
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, pairwise
 import math
@@ -83,15 +83,12 @@ class _Watch:
         trajectory: Trajectory,
         margin: float,
         ray_length: float,
-        pause: Callable[[], object],
     ) -> None:
         self._arm, self._trajectory, self._margin = arm, trajectory, margin
-        self._pause = pause
         self._boxes = boxes_of(scene)
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.ways = travelled(arm, trajectory, self._times, ray_length)
-        pause()
         self.bars = [Bar(arm, k, ray_length) for k in range(len(self.ways))]
         self._unknown = np.full(len(scene.boxes), -math.inf)
         self.touch: Violation | None = None
@@ -102,7 +99,6 @@ class _Watch:
         poses = forward_kinematics(self._arm, q)
         looks = []
         for (bar, index, others), one_q, one_poses in zip(wanted, q, poses, strict=True):
-            self._pause()
             way = float(self.ways[bar.k, index])
             bounds = self._unknown
             for other in others:
@@ -138,7 +134,6 @@ def first_violation(
     margin: float,
     ray_guard_length: float,
     reach: float,
-    pause: Callable[[], object] = lambda: None,
 ) -> Violation | None:
     """
     Return where a trajectory first comes nearer than the margin, or None.
@@ -160,11 +155,9 @@ def first_violation(
         How much of the ray is guarded in motion [m].
     reach : float
         How much of it must be clear at the end [m].
-    pause : callable
-        Called between looks, each of which takes about a tenth of a millisecond.
 
     """
-    watch = _Watch(arm, scene, trajectory, margin, ray_guard_length, pause)
+    watch = _Watch(arm, scene, trajectory, margin, ray_guard_length)
     end = watch.last
     starts = sorted({0, end // 2, end})
     looks = iter(watch.look([(bar, index, ()) for bar in watch.bars for index in starts]))
@@ -192,7 +185,6 @@ def touch_on_way_out(
     escape_time: float,
     margin: float,
     ray_guard_length: float,
-    pause: Callable[[], object] = lambda: None,
 ) -> Violation | None:
     """
     Return where a motion that leads out of boxes first comes nearer than it may, or None.
@@ -210,8 +202,6 @@ def touch_on_way_out(
         When the arm is out; 0: it was not in [s].
     margin, ray_guard_length : float
         [m].
-    pause : callable
-        As in `first_violation`.
 
     """
     if escape_time == 0.0:
@@ -223,7 +213,7 @@ def touch_on_way_out(
             return Violation(0.0, by, 'the arm', box.name)
         boxes.append(Box(box.name, box.center, size, box.rotation))
     way = part_of(trajectory, 0.0, escape_time)
-    touch = first_violation(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0, pause)
+    touch = first_violation(arm, Scene(tuple(boxes)), way, APART, ray_guard_length, 0.0)
     if touch is None:
         return None
     by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == touch.box)

@@ -2,14 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The two judges of a whole motion: the certificate, and python-fcl, who knows nothing of it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.fcl_checker import first_violation, touch_on_way_out
 from rrth_planner.collision.penetration import box_depths, leads_out
 from rrth_planner.collision.violation import Violation
-from rrth_planner.collision.world import World
+from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import beyond, Trajectory
@@ -41,12 +40,11 @@ def is_proven_free(
 def violation_seen(
     arm: ArmModel,
     scene: Scene,
-    world: World,
     trajectory: Trajectory,
     margin: float,
+    ray_guard_length: float,
     reach: float,
     escape_time: float = 0.0,
-    pause: Callable[[], object] = lambda: None,
 ) -> Violation | None:
     """
     Return where python-fcl sees a motion first come nearer than it may, or None.
@@ -56,22 +54,21 @@ def violation_seen(
     arm : ArmModel
     scene : Scene
         The wearer in the base frame.
-    world : World
-        The same, grown by the margin.
     trajectory : Trajectory
     margin : float
         Distance to keep from every box [m].
+    ray_guard_length : float
+        How much of the ray is guarded in motion [m].
     reach, escape_time : float
         As in `is_proven_free`.
-    pause : callable
-        As in `fcl_checker.first_violation`.
 
     """
-    ray = world.ray_length
+    ray = ray_guard_length
     if escape_time > 0.0:
+        world = arm_world(arm, scene, margin, ray)
         depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray, pause)
+        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray)
         if touch is not None:
             return touch
-    touch = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach, pause)
+    touch = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
     return None if touch is None else replace(touch, time=escape_time + touch.time)

@@ -100,9 +100,7 @@ def time_path(
     if should_stop():
         return CANCELLED
     reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = violation_seen(
-        arm, scene, world, trajectory, margin, reach, escape_time, pause=should_stop
-    )
+    touch = violation_seen(arm, scene, trajectory, margin, world.ray_length, reach, escape_time)
     if should_stop():
         return CANCELLED
     if touch is not None:

@@ -24,9 +24,13 @@ from rclpy.signals import SignalHandlerOptions
 from rrth_planner.kernels.jit import cache_folder, is_compiled
 from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
-from rrth_planner.ros.interface.parameters import current_parameters, declare_parameters
+from rrth_planner.pipeline.planning_process import Planner, PlanningProcess
+from rrth_planner.ros.interface.parameters import (
+    current_parameters,
+    declare_parameters,
+    PlannerParameters,
+)
 from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
-from rrth_planner.ros.middleware.executor_barrier import CatchUp
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -39,9 +43,16 @@ SWITCH_INTERVAL = 5e-4
 class PlannerNode(Node):
     """Plan a motion that points the arm at a target, from what was heard last, on request."""
 
-    def __init__(self, **kwargs: Any) -> None:
+    def __init__(self, planner: Planner | None = None, **kwargs: Any) -> None:
         """
         Listen, compile or load the planner, and only then offer the services.
+
+        Parameters
+        ----------
+        planner : Planner, optional
+            Without, one is started; it ends with the node.
+        kwargs
+            Of `rclpy.node.Node`.
 
         Raises
         ------
@@ -52,21 +63,16 @@ class PlannerNode(Node):
         super().__init__(NAME, **kwargs)
         parameters = declare_parameters(self)
         self._compile()
-        # Only now: loading them compiles the kernels that nobody has compiled yet.
-        from rrth_planner.ros.interface.inputs import Inputs
-        from rrth_planner.ros.interface.reporter import Reporter
-        from rrth_planner.ros.interface.scene_monitor import Listener
-        from rrth_planner.ros.requests.request_queue import PlanQueue
-
-        heard = Inputs(
-            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        # It loads while the node does.
+        self._planner: Planner = planner or PlanningProcess(
+            parameters.arm, parameters.options, self._on_death
         )
-        self._reporter = Reporter(self, heard, parameters)
-        self._listener = Listener(self, parameters, heard, self._reporter.publish)
-        catch_up = CatchUp(self, self._listener.body_progress)
-        self._queue = PlanQueue(self, heard, self._reporter, self._load_planner(), catch_up)
-        self._listener.on_body = self._queue.guard.on_body
-        self._listener.on_error = self.fail
+        try:
+            self._listen(parameters)
+            self._planner.warm_up(parameters.arm, parameters.options)
+        except BaseException:
+            self._planner.close()
+            raise
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         for kind, name, answer_it in (
@@ -77,13 +83,41 @@ class PlannerNode(Node):
             self.create_service(kind, name, answer_it, qos_profile=SERVICE, callback_group=group)
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
+    def _listen(self, parameters: PlannerParameters) -> None:
+        """Build what hears, monitors and plans."""
+        # Only now: loading them compiles the kernels that nobody has compiled yet.
+        from rrth_planner.ros.interface.inputs import Inputs
+        from rrth_planner.ros.interface.publishers import PlanPublishers
+        from rrth_planner.ros.interface.reporter import Reporter
+        from rrth_planner.ros.interface.scene_monitor import Listener
+        from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
+        from rrth_planner.ros.requests.request_queue import PlanQueue
+
+        heard = Inputs(
+            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        )
+        publishers, self._reporter = PlanPublishers(self), Reporter(self, heard, parameters)
+        self._monitor = ExecutionMonitor(self, heard, self._reporter, publishers)
+        self._listener = Listener(
+            self, parameters, heard, self._reporter.publish, self._monitor.on_body, self.fail
+        )
+        self._queue = PlanQueue(
+            self,
+            heard,
+            self._reporter,
+            publishers,
+            self._monitor,
+            self._planner,
+            self._listener.body_progress,
+        )
+
     def close(self) -> None:
         """Stop an arm in motion; end the plan in progress, those that wait, and the worker."""
         self._queue.close()
 
     def fail(self, what: str) -> None:
         """Stop an arm in motion for an error that nobody expected."""
-        self._queue.guard.fail(what, is_again=False)
+        self._monitor.fail(what, is_again=False)
 
     def _compile(self) -> None:
         """Compile all kernels, in processes of their own where they can be kept."""
@@ -98,22 +132,15 @@ class PlannerNode(Node):
             if cache_folder() is not None:
                 compile_kernels()
 
-    def _load_planner(self) -> Callable[..., Any]:
-        """Return what plans, ready for its first plan."""
-        from rrth_planner.pipeline.plan_motion import warm_up
-        from rrth_planner.ros.requests.plan_request import plan_request
-
-        self._warm_up = warm_up
-        parameters = self._reporter.parameters
-        warm_up(parameters.arm, parameters.options)
-        return plan_request
+    def _on_death(self, sentence: str) -> None:
+        self.get_logger().error(sentence)
 
     def _on_parameters(self, _: Any) -> None:
         before = self._reporter.parameters
         now = self._reporter.parameters = current_parameters(self, before.arm)
         if type(now.options) is not type(before.options):
             # Not within the time of the next plan; requests wait until it is done.
-            self._queue.prepare(lambda: self._warm_up(now.arm, now.options))
+            self._queue.prepare(lambda: self._planner.warm_up(now.arm, now.options))
 
     async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         found = await self._queue.respond(None)

@@ -219,23 +219,6 @@ def test_only_at_the_end_the_ray_counts_out_to_the_target():
     assert fcl_check.first_violation(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
 
 
-def test_others_may_go_first_between_looks(monkeypatch):
-    done, nearest = [], fcl_check.Bar.nearest
-
-    def look(*args):
-        done.append('look')
-        return nearest(*args)
-
-    monkeypatch.setattr(fcl_check.Bar, 'nearest', look)
-    arm = table_1_arm()
-    q = np.mean(arm.bounds, axis=0)
-    fcl_check.first_violation(
-        arm, wearer(), straight(q, q + 0.2), 0.02, 1.0, 2.0, lambda: done.append('pause')
-    )
-    assert len(done) > 20
-    assert done == ['pause', *['pause', 'look'] * (len(done) // 2)]
-
-
 def test_nothing_touches_where_there_is_nothing():
     arm = table_1_arm()
     trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))

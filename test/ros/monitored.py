@@ -3,7 +3,6 @@
 """A monitor of a motion on a clock of its own, for tests of what it does."""
 
 from dataclasses import replace
-from threading import RLock
 from types import SimpleNamespace
 
 import numpy as np
@@ -56,7 +55,7 @@ class Monitored:
             assert_liveliness=lambda: self.alive.append(self.now),
             flush=lambda: None,
         )
-        self.guard = ExecutionMonitor(node, self.heard, self.reporter, publishers, RLock())
+        self.guard = ExecutionMonitor(node, self.heard, self.reporter, publishers)
         self.guard._now = lambda: self.now
         self.guard._waited = lambda arrived: self.late
         self.see(FAR)
@@ -86,7 +85,7 @@ class Monitored:
         """Let a body come."""
         parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
         self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
-        self.guard.on_body(0)
+        self.guard.on_body(self.heard.body.value, 0)
 
     def hand(self, ahead, away, motion=None):
         """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""

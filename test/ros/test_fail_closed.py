@@ -214,7 +214,7 @@ def test_a_body_that_is_refused_stops_the_arm_and_says_why(monitored):
         raise MessageError('marker 3 ("shoe"): pose.position: nan')
 
     arm.heard.body.accept(refuse, arm.now)
-    arm.guard.on_body(0)
+    arm.guard.on_body(arm.heard.body.value, 0)
     assert len(arm.published) == 1
     assert arm.reporter.guard[0] == 'brakes'
     assert 'the last body was refused, marker 3 ("shoe")' in arm.reporter.guard[1]
@@ -242,15 +242,15 @@ def test_a_body_that_is_judged_late_stops_the_arm(monitored, late, n_stops):
 def test_after_an_error_nothing_is_planned_by_itself(
     monitored, monkeypatch, replan, late, n_again
 ):
-    arm, asked = monitored(), []
+    arm = monitored()
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
-    arm.guard.plan_again = lambda *arguments: asked.append(arguments)
     arm.late = late
     if not late:
         monkeypatch.setattr(execution_monitor, 'is_still_free', lambda *_, **__: 1 / 0)
     arm.see(FAR)
     assert len(arm.published) == 1
-    assert len(asked) == n_again * replan
+    (stop,) = arm.guard.take_stops()
+    assert stop.is_again == (n_again * replan == 1)
 
 
 def test_a_planner_that_ends_stops_its_arm(monitored):

@@ -41,8 +41,6 @@ def test_an_arm_that_has_its_way_goes_on(watched):
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
 def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
-    judged = []
-    watched.guard.judge = lambda stop, *_: judged.append(stop)
     watched.see(watched.hand(ahead, 0.0))
     ((stop, _),) = watched.published
     assert watched.said == ['braked']
@@ -51,7 +49,9 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     assert 'the arm brakes' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
     # What is proven free, and only that, is for the second judge too.
-    assert judged == ([] if ahead < 0.3 else [stop])
+    (kept,) = watched.guard.take_stops()
+    assert kept.trajectory is stop
+    assert (kept.scene is None) == (ahead < 0.3)
     level = 'ERROR' if ahead < 0.3 else 'WARN'
     (line,) = [line for line in capfd.readouterr().err.splitlines() if sentence in line]
     took = float(re.search('; published after (.*) ms$', line)[1])
@@ -327,11 +327,12 @@ def test_an_arm_that_is_elsewhere_is_said_aloud(watched):
 @pytest.mark.parametrize('replan', [False, True])
 def test_it_plans_again_for_the_same_goal_only_where_it_may(watched, replan):
     watched.reporter.parameters = replace(watched.reporter.parameters, replan=replan)
-    asked = []
-    watched.guard.plan_again = lambda goal, wait: asked.append((goal.target.tolist(), wait))
     watched.see(watched.hand(0.6, 0.0))
     ((stop, _),) = watched.published
-    assert asked == [([1.0, 1.0, 1.0], stop.duration)] * replan
+    (kept,) = watched.guard.take_stops()
+    assert (kept.trajectory, kept.is_again) == (stop, replan)
+    assert kept.goal.target.tolist() == [1.0, 1.0, 1.0]
+    assert watched.guard.take_stops() == []
 
 
 def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched, capfd):

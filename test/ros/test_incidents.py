@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ from rrth_planner.ros.interface.diagnostics import diagnostics_msg, PlanReport  
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
-from rrth_planner.ros.requests import incidents, plan_request, stop_validation  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
+from rrth_planner.ros.requests import incidents, plan_request  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 import samples  # noqa: E402
 from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
@@ -124,18 +126,23 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
     say_all(planner, stranger)
     assert stranger.answer().success
-    guard = planner._queue.guard
-    stop = fast_stop(guard.running.trajectory, 0.3, planner._reporter.parameters.limits)
+    monitor, parameters = planner._monitor, planner._reporter.parameters
+    stop = fast_stop(monitor.running.trajectory, 0.3, parameters.limits)
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
-    guard.judge(stop, scene, goal, planner._reporter.parameters)
-    guard.judge(stop, scene, goal, planner._reporter.parameters)
+
+    def follow_up():
+        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_begun))
+        stranger.wait_until(lambda: not monitor._stops)
+        # Whatever the node's thread is at.
+        time.sleep(0.05)
+        planner._queue._worker.submit(lambda: None).result(30.0)
+
+    follow_up()
     with monkeypatch.context() as patch:
         # What agrees leaves nothing behind.
-        planner._queue._worker.submit(lambda: None).result(30.0)
         assert not list(tmp_path.iterdir())
-        patch.setattr(stop_validation, 'first_violation', lambda *_: TOUCH)
-        guard.judge(stop, scene, goal, planner._reporter.parameters)
-        planner._queue._worker.submit(lambda: None).result(30.0)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        follow_up()
     (file,) = tmp_path.iterdir()
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'

@@ -20,11 +20,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
+from rrth_planner.pipeline import in_process_planner  # noqa: E402
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
-from rrth_planner.ros.requests import plan_request  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -86,7 +87,10 @@ def test_markers_act_over_the_wire_as_in_rviz(start):
 
 def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_until):
     words = ['--ros-args', '-r', 'body_boxes:=/wearer', '-r', '__ns:=']
-    planners = [PlannerNode(cli_args=[*words[:-1], f'{words[-1]}{ns}']) for ns in ('/a', '/b')]
+    planners = [
+        PlannerNode(InProcessPlanner(), cli_args=[*words[:-1], f'{words[-1]}{ns}'])
+        for ns in ('/a', '/b')
+    ]
     strangers = [Stranger(ns, wait_until) for ns in ('/a', '/b')]
     assert [p.get_fully_qualified_name() for p in planners] == [
         '/a/rrth_planner',
@@ -296,7 +300,7 @@ def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_ba
 def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     planner, stranger = start(seed=5)
     say_all(planner, stranger)
-    jerks, plan_motion = [], plan_request.plan_motion
+    jerks, plan_motion = [], in_process_planner.plan_motion
 
     def plan_while_it_is_set(*args, **kwargs):
         if not jerks:
@@ -310,11 +314,11 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
         jerks.append(kwargs['limits'].jerk[0])
         return plan_motion(*args, **kwargs)
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_it_is_set)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_is_set)
     # The motion is watched by them too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.endswith(f'seed {seed}')
-        assert planner._queue.guard._parameters.margin == margin
+        assert planner._monitor._parameters.margin == margin
     assert jerks == [40.0, 30.0]
 
 

@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from threading import current_thread, Event, Thread, Timer
+from threading import Event, Thread, Timer
 import time
 
 import numpy as np
@@ -31,14 +31,18 @@ from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
+from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.pipeline import in_process_planner  # noqa: E402
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
+from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
 from rrth_planner.ros.interface.diagnostics import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
-from rrth_planner.ros.middleware.executor_barrier import CatchUp  # noqa: E402
-from rrth_planner.ros.middleware.thread_priority import RightOfWay  # noqa: E402
+from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.ros.requests import plan_request, revalidation, wait_for_rest  # noqa: E402
+from rrth_planner.ros.requests import wait_for_rest  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -118,7 +122,7 @@ def _start(spinning, wait_until, request):
 
     def start(**parameters):
         given = [Parameter(name=name, value=value) for name, value in parameters.items()]
-        planner = PlannerNode(namespace=namespace, parameter_overrides=given)
+        planner = PlannerNode(InProcessPlanner(), namespace=namespace, parameter_overrides=given)
         stranger = Stranger(namespace, wait_until)
         contexts = [spinning(planner), spinning(stranger.node)]
         for context in contexts:
@@ -305,7 +309,7 @@ def test_deeper_than_escape_depth_is_refused(start):
 def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
     moves = iter((leaned(), fenced()))
 
     def plan_while_the_body_changes(*args, **kwargs):
@@ -316,7 +320,7 @@ def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wai
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_the_body_changes)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_the_body_changes)
     assert stranger.answer().success
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
@@ -329,7 +333,7 @@ def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
     # It is 0.0275 m deep at first.
     planner, stranger = start(escape_depth=depth)
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
 
     def plan_while_the_wearer_leans(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
@@ -337,7 +341,7 @@ def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_the_wearer_leans)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_the_wearer_leans)
     assert stranger.answer().message.startswith(answer)
 
 
@@ -346,7 +350,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion, touches = inputs_of(planner), plan_request.plan_motion, []
+    inputs, plan_motion, touches = inputs_of(planner), in_process_planner.plan_motion, []
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -360,7 +364,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
             )
         return plan
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_a_box_comes)
     with monkeypatch.context() as patch:
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
@@ -434,7 +438,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
         raise ZeroDivisionError('of a test')
 
     with monkeypatch.context() as patch:
-        patch.setattr(plan_request, 'plan_motion', fail)
+        patch.setattr(in_process_planner, 'plan_motion', fail)
         message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
@@ -460,7 +464,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
 
     def plan_while_things_move(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -469,7 +473,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
         wait_until(lambda: inputs.body.value is not body or inputs.joints.value is not positions)
         return plan
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_things_move)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_things_move)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
     assert sentence in message
@@ -511,7 +515,7 @@ def test_an_arm_that_moves_faster_than_it_may_is_not_taken_over(start):
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    heard, plan_motion = inputs_of(planner).joints, plan_request.plan_motion
+    heard, plan_motion = inputs_of(planner).joints, in_process_planner.plan_motion
 
     def plan_while_it_starts(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -519,7 +523,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
         wait_until(lambda: heard.value.velocities[1] == 0.3)
         return plan
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_it_starts)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_starts)
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
     assert not stranger.heard['joint_trajectory']
@@ -528,25 +532,25 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
 @pytest.mark.parametrize(
     ('owner', 'step', 'topic', 'msg', 'answer'),
     [
-        (plan_request, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
-        (Revalidation, 'take', 'body_boxes', fenced(), 'the wearer moved'),
+        (in_process_planner, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
+        (Revalidation, 'disagreement', 'body_boxes', fenced(), 'the wearer moved'),
         (
             Revalidation,
-            'take',
+            'disagreement',
             'body_boxes',
             array(command(Marker.DELETEALL)),
             'is empty: every box',
         ),
         (
             Revalidation,
-            'take',
+            'disagreement',
             'joint_states',
             joints([0.5, *FOLDED[1:]]),
             'the arm moved by 0.5000',
         ),
         (
             Revalidation,
-            'take',
+            'disagreement',
             'joint_states',
             joints(velocity=[0.3] * 4),
             'joint_1 moves at 0.300',
@@ -584,44 +588,23 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, take, checked = inputs_of(planner), Revalidation.take, []
+    inputs, disagreement = inputs_of(planner), Revalidation.disagreement
+    checked = []
 
-    def check_while_a_body_comes(look):
-        seen, body = take(look), inputs.body.value
+    def check_while_a_body_comes(revalidation, planner):
+        found, body = disagreement(revalidation, planner), inputs.body.value
         checked.append(body)
         far = box('far', len(checked), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(fenced() if is_in_the_way else array(far))
         wait_until(lambda: inputs.body.value is not body)
-        return seen
+        return found
 
-    monkeypatch.setattr(Revalidation, 'take', check_while_a_body_comes)
+    monkeypatch.setattr(Revalidation, 'disagreement', check_while_a_body_comes)
     message = stranger.answer().message
-    # Not for ever: the guard holds the motion against the bodies that follow.
-    assert len(checked) == (1 if is_in_the_way else plan_request.MOST_LOOKS)
+    # The proof alone decides about that one, and about those that follow.
+    assert len(checked) == 1
     assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
-
-
-def test_nothing_is_told_round_a_body_that_comes_after_the_last_look(
-    start, monkeypatch, wait_until
-):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    inputs, take, looks = inputs_of(planner), Revalidation.take, []
-
-    def look_while_a_body_comes(look):
-        seen, body = take(look), inputs.body.value
-        looks.append(seen)
-        far = box('far', len(looks), center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
-        is_last = len(looks) == plan_request.MOST_LOOKS
-        stranger.publishers['body_boxes'].publish(fenced() if is_last else array(far))
-        wait_until(lambda: inputs.body.value is not body)
-        return seen
-
-    monkeypatch.setattr(Revalidation, 'take', look_while_a_body_comes)
-    message = stranger.answer().message
-    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    assert not stranger.heard['joint_trajectory']
-    assert len(looks) == plan_request.MOST_LOOKS
+    assert bool(stranger.heard['joint_trajectory']) == (not is_in_the_way)
 
 
 def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
@@ -648,62 +631,37 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
-    take, end, catch_up = Revalidation.take, Event(), CatchUp.__call__
+    end, call = Event(), ExecutorBarrier.call
 
-    def catch_up_until_it_is_over(self):
-        is_through = catch_up(self)
-        end.set()
-        return is_through
-
-    monkeypatch.setattr(CatchUp, '__call__', catch_up_until_it_is_over)
-
-    def look_while_the_node_is_busy(look):
+    def call_a_busy_node(barrier, work):
         begun = Event()
         planner.executor.create_task(lambda: begun.set() or end.wait(10.0))
         assert begun.wait(10.0)
-        return take(look)
+        try:
+            return call(barrier, work)
+        finally:
+            end.set()
 
-    monkeypatch.setattr(Revalidation, 'take', look_while_the_node_is_busy)
+    monkeypatch.setattr(ExecutorBarrier, 'call', call_a_busy_node)
     message = stranger.answer().message
     assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
     assert not stranger.heard['joint_trajectory']
 
 
-def test_a_motion_is_not_told_where_the_machine_stood_still_before(start, monkeypatch):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    still_fits, looks = Revalidation.still_fits, []
-
-    def look_while_all_stands_still(look, *args):
-        fits = still_fits(look, *args)
-        if not looks:
-            # Nobody reads it meanwhile: the lock is held.
-            stranger.publishers['body_boxes'].publish(fenced())
-            time.sleep(0.3)
-        looks.append(fits)
-        return fits
-
-    monkeypatch.setattr(Revalidation, 'still_fits', look_while_all_stands_still)
-    message = stranger.answer().message
-    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    assert looks[0]
-    assert not stranger.heard['joint_trajectory']
-
-
-def test_a_motion_is_not_told_where_the_machine_stands_still_again_and_again(start, monkeypatch):
-    monkeypatch.setattr(executor_barrier, 'NEWS', -1.0)
-    planner, stranger = start()
-    say_all(planner, stranger)
-    message = stranger.answer().message
-    assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
-    assert not stranger.heard['joint_trajectory']
+def stop_for(planner):
+    """Have a stop of the arm, which was on its way to the target, followed up; it is over."""
+    goal, parameters = inputs_of(planner).target.value, planner._reporter.parameters
+    still = np.zeros((1, 4))
+    over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
+    monitor = planner._monitor
+    monitor._stops.append(Stop(over, goal, parameters, None, True, monitor.n_begun))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
     monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    stop_for(planner)
     # Time enough for a plan that does not wait for rest.
     time.sleep(0.2)
     stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
@@ -718,14 +676,14 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
 def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    plan_motion = plan_request.plan_motion
+    plan_motion = in_process_planner.plan_motion
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
-        planner._queue.guard.n_brakes += 1
+        planner._monitor.n_brakes += 1
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
-        patch.setattr(plan_request, 'plan_motion', plan_while_the_arm_is_stopped)
+        patch.setattr(in_process_planner, 'plan_motion', plan_while_the_arm_is_stopped)
         message = stranger.answer().message
     assert message.startswith(
         'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
@@ -738,9 +696,11 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
-    planner._queue.guard.n_begun += 1
+    stop_for(planner)
+    stranger.wait_until(lambda: planner._queue._open)
+    planner._monitor.n_begun += 1
     stranger.publishers['joint_states'].publish(joints())
+    stranger.wait_until(lambda: not planner._queue._open)
     planner._queue._worker.submit(lambda: None).result(30.0)
     assert planner._reporter.report.n_requests == 0
     assert not planner._queue._open
@@ -751,7 +711,7 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
     planner, stranger = start()
     say_all(planner, stranger)
     # No joint position comes that would say that it rests.
-    planner._queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    stop_for(planner)
     assert stranger.answer().success
     # It is reported once it has been answered, by another thread.
     stranger.wait_until(lambda: planner._reporter.report.n_requests == 1)
@@ -765,7 +725,8 @@ def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(star
     planner, stranger = start()
     say_all(planner, stranger)
     queue = planner._queue
-    queue.guard.plan_again(inputs_of(planner).target.value, 0.0)
+    stop_for(planner)
+    stranger.wait_until(lambda: queue._open)
     refused = stranger.answer('get_plan', GetPlan.Request()).plan
     assert not refused.poses
     assert not stranger.heard['joint_trajectory']
@@ -778,8 +739,7 @@ def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(star
 def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
     planner, stranger = start(max_samples=100)
     say_all(planner, stranger, body_boxes=fenced())
-    guard = planner._queue.guard
-    guard.plan_again(inputs_of(planner).target.value, 0.0)
+    stop_for(planner)
     stranger.publishers['joint_states'].publish(joints())
     stranger.wait_until(lambda: stranger.value('guard') == 'holds')
     said = stranger.value('last stop')
@@ -808,7 +768,7 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
 def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), plan_request.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
     asked = []
 
     def plan_while_a_box_comes(*args, **kwargs):
@@ -823,8 +783,8 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
         asked.append(args)
         return Violation(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_while_a_box_comes)
-    monkeypatch.setattr(revalidation, 'violation_seen', disagree)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(planner._planner, 'violation_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
     assert not stranger.heard['joint_trajectory']
@@ -837,52 +797,37 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
     assert len(asked) == 2
 
 
-def test_a_plan_gives_way_often_and_never_with_a_lock(start, monkeypatch):
-    planner, stranger = start()
+def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    lock, give, places = planner._queue._lock, RightOfWay.give, []
 
-    def note(way):
-        places.append((current_thread().name, lock._is_owned()))
-        give(way)
+    def die(*_):
+        raise PlanningProcessError('the planning process ended with code -9 while it worked')
 
-    monkeypatch.setattr(RightOfWay, 'give', note)
+    with monkeypatch.context() as patch:
+        patch.setattr(planner._planner, 'plan', die)
+        message = stranger.answer().message
+    assert message.startswith('FAILURE (99999): planning failed unexpectedly: PlanningProcessErr')
+    assert 'ended with code -9' in message
+    # What was asked is kept, to be asked again.
+    assert len(list(tmp_path.iterdir())) == 1
+    assert not stranger.heard['joint_trajectory']
     assert stranger.answer().success
-    stranger.wait_until(lambda: stranger.heard['rrth_planner/markers'])
-    # The second judge looks at several bars at several instants each.
-    assert len(places) > 20
-    assert {name.split('_')[0] for name, _ in places} == {'planner'}
-    assert not any(is_owned for _, is_owned in places)
-
-
-def test_a_body_is_read_and_guarded_against_on_the_way(start):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    way, on_body, is_free = inputs_of(planner).way, planner._listener.on_body, []
-
-    def note(arrived):
-        is_free.append(way._is_free.is_set())
-        on_body(arrived)
-
-    planner._listener.on_body = note
-    stranger.say('body_boxes', TOPICS['body_boxes'][1]())
-    stranger.wait_until(lambda: is_free)
-    assert is_free == [False]
 
 
 def test_what_was_cancelled_is_never_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, take = planner._queue, Revalidation.take
+    queue, disagreement = planner._queue, Revalidation.disagreement
     ended = []
 
-    def cancel_after_the_last_look(look):
-        seen = take(look)
+    def cancel_after_the_last_look(*args):
+        found = disagreement(*args)
         ended.append(queue.cancel())
-        return seen
+        return found
 
     with monkeypatch.context() as patch:
-        patch.setattr(Revalidation, 'take', cancel_after_the_last_look)
+        patch.setattr(Revalidation, 'disagreement', cancel_after_the_last_look)
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
@@ -940,17 +885,17 @@ def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
 def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    queue, take = planner._queue, Revalidation.take
+    queue, disagreement = planner._queue, Revalidation.disagreement
     closers = []
 
-    def close_after_the_last_look(look):
-        seen = take(look)
+    def close_after_the_last_look(*args):
+        found = disagreement(*args)
         closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
-        return seen
+        return found
 
-    monkeypatch.setattr(Revalidation, 'take', close_after_the_last_look)
+    monkeypatch.setattr(Revalidation, 'disagreement', close_after_the_last_look)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
     assert not stranger.heard['joint_trajectory']
@@ -959,7 +904,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
 def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    order, plan_motion = [], plan_request.plan_motion
+    order, plan_motion = [], in_process_planner.plan_motion
 
     def warm_up(_, options):
         time.sleep(0.2)
@@ -969,8 +914,8 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
         order.append('plan')
         return plan_motion(*args, **kwargs)
 
-    monkeypatch.setattr(planner, '_warm_up', warm_up)
-    monkeypatch.setattr(plan_request, 'plan_motion', plan_in_turn)
+    monkeypatch.setattr(planner._planner, 'warm_up', warm_up)
+    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_in_turn)
     planner.set_parameters([Parameter(name='margin', value=0.03)])
     planner.set_parameters([Parameter(name='algorithm', value='rrt')])
     assert stranger.answer().success
@@ -1052,7 +997,7 @@ def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until)
     ]
     for publisher, make in publishers:
         publisher.publish(make())
-    planner = PlannerNode(namespace='/latched')
+    planner = PlannerNode(InProcessPlanner(), namespace='/latched')
     with spinning(early), spinning(planner):
         wait_until(lambda: all(i.received is not None for i in inputs_of(planner).all.values()))
     planner.close()

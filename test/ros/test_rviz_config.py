@@ -12,6 +12,7 @@ pytest.importorskip('fcl')
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -46,7 +47,7 @@ def manager():
 @pytest.fixture(scope='module')
 def planner(ros_context):
     """Return a planner node."""
-    node = PlannerNode(namespace=NAMESPACE)
+    node = PlannerNode(InProcessPlanner(), namespace=NAMESPACE)
     yield node
     node.close()
     node.destroy_node()

@@ -27,6 +27,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE  # noqa: E402
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import MOST_BYTES, PlaybackNode  # noqa: E402
 from samples import array, box, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
@@ -202,6 +203,7 @@ class Wire:
 @pytest.fixture(name='wire', scope='module')
 def _wire(ros_context):
     planner = PlannerNode(
+        InProcessPlanner(),
         namespace='/fire',
         parameter_overrides=[Parameter('time_limit', value=0.2), Parameter('replan', value=False)],
     )
@@ -396,7 +398,8 @@ def test_after_all_of_this_a_good_motion_is_followed(playback):
 
 
 def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_until):
-    planner, playback = (kind(namespace='/wire') for kind in (PlannerNode, PlaybackNode))
+    planner = PlannerNode(InProcessPlanner(), namespace='/wire')
+    playback = PlaybackNode(namespace='/wire')
     stranger, motions = Node('stranger', namespace='/wire'), []
     topics = {
         'body_boxes': (ARRAYS, wearer()),

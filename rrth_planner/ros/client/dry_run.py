@@ -5,7 +5,7 @@
 from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError
-from rrth_planner.pipeline.plan_motion import warm_up
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import PlannerClient
 from rrth_planner.ros.interface.inputs import Inputs
@@ -13,7 +13,8 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import Listener
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
-from rrth_planner.ros.requests.plan_request import plan_request
+from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome
+from rrth_planner.ros.requests.revalidation import Revalidation
 from visualization_msgs.msg import MarkerArray
 
 
@@ -45,14 +46,15 @@ def plan_without_moving(
     heard = Inputs(
         *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
     )
-    listener = Listener(client, parameters, heard, lambda: None)
+    listener = Listener(client, parameters, heard)
     client.wait_for(lambda: heard.joints.received is not None, heard.joints.topic)
     if body is None:
         client.wait_for(
             lambda: heard.body.received is not None or heard.body.refusal is not None,
             f'a body on {heard.body.topic}, and none is given by --body',
         )
-    warm_up(parameters.arm, parameters.options)
+    planner = InProcessPlanner()
+    planner.warm_up(parameters.arm, parameters.options)
     # Compiling or loading may have taken a while; the arm may have moved.
     client.wait_for_state(parameters.arm.joint_names)
     try:
@@ -66,8 +68,13 @@ def plan_without_moving(
 
     if body is not None:
         heard.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
-    outcome = plan_request(heard, parameters, now, lambda: False, goal)
+    outcome = plan_request(heard, parameters, now, planner, lambda: False, _is_in_time, goal)
     error = None
     if outcome.trajectory is not None:
         error = pointing_error(parameters.arm, outcome.trajectory.positions[-1], goal.target)
     return answer_from_text(answer(outcome.code, outcome.sentence)), error
+
+
+def _is_in_time(_: PlanOutcome, revalidation: Revalidation) -> bool:
+    """Return whether a motion could still be published."""
+    return not revalidation.is_late()

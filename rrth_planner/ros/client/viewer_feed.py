@@ -68,7 +68,7 @@ class ViewerFeed(Node):
         self._heard = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        self._listener = Listener(self, parameters, self._heard, lambda: None)
+        self._listener = Listener(self, parameters, self._heard)
         self._motions = OpenSubscription(
             self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._refuse
         )

@@ -4,7 +4,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import RLock
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -21,7 +20,6 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import code_of_refusal, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
-from rrth_planner.ros.middleware.thread_priority import RightOfWay
 
 T = TypeVar('T')
 # A message from further ahead was heard before the clock was set back: nobody knows when [s].
@@ -192,10 +190,6 @@ class Inputs:
 
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
         """Begin with nothing heard."""
-        # Held while a message is taken, and while a motion is told that fits what was heard.
-        self.lock = RLock()
-        # Taken while a body is read and held against the motion that runs.
-        self.way = RightOfWay()
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)

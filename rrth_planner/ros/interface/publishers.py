@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the planner publishes: the motion first, then what shows it."""
 
-from collections.abc import Callable
-
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -66,13 +64,10 @@ class PlanPublishers:
         parameters: PlannerParameters,
         scene: Scene,
         target: Array,
-        pause: Callable[[], None],
     ) -> None:
-        """Publish what shows a motion, with pauses: nothing waits for it."""
+        """Publish what shows a motion."""
         path = self.tool_path(trajectory, parameters)
-        pause()
         self._tool_path.publish(path)
-        pause()
-        markers = plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
-        pause()
-        self._markers.publish(markers)
+        self._markers.publish(
+            plan_markers(parameters.arm, scene, parameters.margin, trajectory, target, path)
+        )

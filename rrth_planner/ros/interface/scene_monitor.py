@@ -3,7 +3,6 @@
 """Keep the planner's inputs up to date with the three topics that it hears."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 import time
 from typing import Any
 
@@ -21,7 +20,6 @@ from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
 from rrth_planner.ros.messages.marker_edits import read_edits
 from rrth_planner.ros.messages.marker_order import MarkerOrder
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
-from rrth_planner.ros.middleware.thread_priority import Breather
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -40,8 +38,12 @@ class Listener:
         For what never changes: the arm and the base frame.
     inputs : Inputs
         Kept up to date.
-    on_change : callable
+    on_change : callable, optional
         Called when a topic is heard for the first time, is refused, or is good again.
+    on_body : callable, optional
+        Called after each body, with what is known since then of the wearer, and when it came [ns].
+    on_error : callable, optional
+        Called after an error that nobody expected, with what it is.
 
     """
 
@@ -50,22 +52,20 @@ class Listener:
         node: Node,
         parameters: PlannerParameters,
         inputs: Inputs,
-        on_change: Callable[[], None],
+        on_change: Callable[[], None] = lambda: None,
+        on_body: Callable[[WearerBody, int], None] = lambda body, arrived: None,
+        on_error: Callable[[str], None] = lambda what: None,
     ) -> None:
         """Begin to listen."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame = parameters.base_frame
-        self._on_change = on_change
+        self._on_change, self._tell_of_body, self._on_error = on_change, on_body, on_error
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
-        # Called after each body, good or refused, with when it came [ns], and after an error that
-        # nobody expected with what it is; set once there is somebody to tell.
-        self.on_body: Callable[[int], None] = lambda arrived: None
-        self.on_error: Callable[[str], None] = lambda what: None
-        self._order, self._rest = MarkerOrder(), Breather()
+        self._order = MarkerOrder()
         self._subscriptions = [
             self._subscribe(
                 MarkerArray,
@@ -73,7 +73,6 @@ class Listener:
                 inputs.body,
                 self._on_body,
                 on_late=self._on_body,
-                way=inputs.way,
                 # A person waits for it.
                 decode=quick_decoder(MarkerArray),
             ),
@@ -88,7 +87,6 @@ class Listener:
         heard: Input[Any],
         on_message: Callable[[Any, Arrival], None],
         on_late: Callable[[Any, Arrival], None] | None = None,
-        way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
     ) -> OpenSubscription:
         def supervised(take: Callable[..., None]) -> Callable[..., None]:
@@ -96,7 +94,7 @@ class Listener:
                 try:
                     take(*arguments)
                 except Exception as problem:
-                    self.on_error(one_line(f'{topic}: {type(problem).__name__}: {problem}'))
+                    self._on_error(one_line(f'{topic}: {type(problem).__name__}: {problem}'))
                     raise
 
             return supervise
@@ -107,7 +105,7 @@ class Listener:
 
             self._take(heard, read, self._now())
             if heard is self._inputs.body:
-                self.on_body(time.time_ns())
+                self._tell_of_body(heard.value, time.time_ns())
 
         return OpenSubscription(
             self._node,
@@ -116,9 +114,7 @@ class Listener:
             supervised(on_message),
             None if on_late is None else supervised(on_late),
             supervised(refuse),
-            way,
             decode,
-            self._rest,
         )
 
     def body_progress(self) -> tuple[int, int]:
@@ -139,7 +135,7 @@ class Listener:
             return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
 
         self._take(body, read, now, is_news=arrival.is_newer is None)
-        self.on_body(arrival.received)
+        self._tell_of_body(body.value, arrival.received)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:
@@ -159,8 +155,7 @@ class Listener:
         self, heard: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
     ) -> bool:
         was_good = heard.received is not None and not heard.is_last_refused
-        with self._inputs.lock:
-            is_good = heard.accept(read, now, is_news)
+        is_good = heard.accept(read, now, is_news)
         if not is_good:
             self._warn(heard)
         if is_good != was_good:

@@ -1,24 +1,28 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Wait until a node has read what came: what it then judges is the newest that there is."""
+"""Do something in a node's own thread once it has read what came."""
 
 from collections.abc import Callable
-from threading import Event
+from concurrent.futures import CancelledError, Future, TimeoutError as NotYet
 import time
+from typing import Any, Generic, TypeVar
 
 from rclpy.node import Node
 
+T = TypeVar('T')
 # Longer than this a node is not waited for [s].
 LONGEST = 1.0
 # After so long without a round it is asked for again [s].
 AGAIN = 0.02
-# That a node was through is news for so long [s].
-NEWS = 0.01
 
 
-class CatchUp:
+class NodeIsBusyError(Exception):
+    """A node did not come to read what was sent to it."""
+
+
+class ExecutorBarrier:
     """
-    Lets a thread wait until the node's executor has handled the messages that came before.
+    Has the thread that spins a node do something after the messages that came before.
 
     In one round an executor handles one message of each subscription, and a guard condition after
     them. It is through once it has handled a message that came later, or none for a round.
@@ -35,43 +39,62 @@ class CatchUp:
     """
 
     def __init__(self, node: Node, handled: Callable[[], tuple[int, int]]) -> None:
-        """Begin with nobody who waits."""
+        """Begin with nothing to do."""
         self._node, self._handled = node, handled
-        self._begin = self._n = 0
-        self._through = 0.0
-        # Whether somebody waits; whether a round was asked for that nobody waits for any more.
-        self._is_over, self._is_stale = Event(), False
-        self._is_over.set()
+        self._task: _Task[Any] | None = None
         self._round = node.create_guard_condition(self._on_round)
 
-    def __call__(self) -> bool:
-        """Wait, one thread at a time; return whether the executor is through."""
-        if self._node.executor is None:
-            # Whoever calls its callbacks by hand has handed over what there is.
-            self._through = time.monotonic()
-            return True
-        self._begin, self._n = time.time_ns(), self._handled()[0]
-        self._is_over.clear()
-        self._round.trigger()
-        end = time.monotonic() + LONGEST
-        while not (is_through := self._is_over.wait(AGAIN)) and time.monotonic() < end:
-            # Should a wake-up have been lost, nothing but this asks for a round.
-            self._round.trigger()
-        self._is_over.set()
-        self._is_stale = not is_through
-        return is_through
+    def call(self, work: Callable[[], T]) -> T:
+        """
+        Return what some work returns, or raise what it raises; called by one thread at a time.
 
-    def is_news(self) -> bool:
-        """Return whether the executor was through just now; not if the machine stood still."""
-        return time.monotonic() - self._through <= NEWS
+        Raises
+        ------
+        NodeIsBusyError
+            Its turn did not come; it is not done any more.
+
+        """
+        if self._node.executor is None:
+            # Whoever calls the node's callbacks by hand has handed over what there is.
+            return work()
+        task = _Task(work)
+        self._task = task
+        end = time.monotonic() + LONGEST
+        while True:
+            self._round.trigger()
+            try:
+                return task.future.result(AGAIN)
+            except NotYet:
+                # Should a wake-up have been lost, nothing but this asks for a round.
+                if time.monotonic() > end and task.future.cancel():
+                    raise NodeIsBusyError from None
+            except CancelledError:
+                raise NodeIsBusyError from None
 
     def _on_round(self) -> None:
-        is_stale, self._is_stale = self._is_stale, False
-        if self._is_over.is_set():
+        task = self._task
+        if task is None:
             return
-        before, (self._n, came) = self._n, self._handled()
-        if not is_stale and (came >= self._begin or self._n == before):
-            self._through = time.monotonic()
-            self._is_over.set()
+        before, (task.n_handled, came) = task.n_handled, self._handled()
+        if came >= task.begin or task.n_handled == before:
+            self._task = None
+            task.run()
         else:
             self._round.trigger()
+
+
+class _Task(Generic[T]):
+    """Work to be done once the node is through, which is not known before a first round."""
+
+    def __init__(self, work: Callable[[], T]) -> None:
+        self._work, self.begin, self.n_handled = work, time.time_ns(), -1
+        self.future: Future[T] = Future()
+
+    def run(self) -> None:
+        """Do the work, if somebody still waits for it."""
+        if not self.future.set_running_or_notify_cancel():
+            return
+        try:
+            self.future.set_result(self._work())
+        except BaseException as problem:
+            self.future.set_exception(problem)

@@ -3,7 +3,6 @@
 """A subscription that hears every publisher: best effort, reliable, or latched before it began."""
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 import time
@@ -147,12 +146,8 @@ class OpenSubscription:
         last one wins.
     on_refusal : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
-    way : context manager, optional
-        Entered while a message is read and dealt with, again for each.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
-    rest : callable, optional
-        Called after each copy of a message.
 
     """
 
@@ -164,13 +159,10 @@ class OpenSubscription:
         on_message: Callable[[Any, Arrival], None],
         on_late: Callable[[Any, Arrival], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
-        way: AbstractContextManager[None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
-        rest: Callable[[], None] = lambda: None,
     ) -> None:
         """Begin to listen."""
-        self._on_refusal, self._way = on_refusal, way or nullcontext()
-        self._decode, self._rest = decode, rest
+        self._on_refusal, self._decode = on_refusal, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._copies = Copies(on_late is not None)
@@ -241,21 +233,19 @@ class OpenSubscription:
             hearer = self._on_message if arrival.is_newer is None else self._on_late
             assert hearer is not None
             self._hand_on(data, hearer, arrival)
-        self._rest()
 
     def _hand_on(
         self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
-        with self._way:
-            try:
-                msg = decoded(data, self._msg_type, decode=self._decode)
-            except MessageError as problem:
-                self._on_refusal(problem)
-                return
-            try:
-                hearer(msg, arrival)
-            except Exception:
-                self._node.get_logger().error(
-                    f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
-                )
+        try:
+            msg = decoded(data, self._msg_type, decode=self._decode)
+        except MessageError as problem:
+            self._on_refusal(problem)
+            return
+        try:
+            hearer(msg, arrival)
+        except Exception:
+            self._node.get_logger().error(
+                f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+            )

@@ -6,10 +6,11 @@ While the arm moves the wearer may move too: each new body is held against what 
 It fails closed: whatever goes wrong while a body is judged ends in a stop.
 """
 
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from threading import RLock
 import time
@@ -25,11 +26,12 @@ from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.inputs import Inputs, out_of_sight
+from rrth_planner.ros.interface.inputs import Inputs, out_of_sight, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
-from rrth_planner.ros.messages.body import scene_of
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 from rrth_planner.timing.fast_stop import fast_stop
 
@@ -54,6 +56,35 @@ class Watch(Enum):
     HOLDING = 'holds'
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Stop:
+    """
+    A stop that was published, for whoever follows it up.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    goal : PointingGoal or None
+        Of the motion that it ends.
+    parameters : PlannerParameters
+        Of that motion.
+    scene : Scene or None
+        The wearer that the stop was proven free of.
+    is_again : bool
+        Whether to plan for the goal again once the arm rests.
+    n_begun : int
+        How many motions had begun until then.
+
+    """
+
+    trajectory: Trajectory
+    goal: PointingGoal | None
+    parameters: PlannerParameters
+    scene: Scene | None
+    is_again: bool
+    n_begun: int
+
+
 class ExecutionMonitor:
     """
     Stops the arm when what is left of its motion is no longer proven free of the wearer.
@@ -68,22 +99,17 @@ class ExecutionMonitor:
     heard : Inputs
     reporter : Reporter
     publishers : PlanPublishers
-    lock : RLock
-        Held while a motion is published.
 
     """
 
     def __init__(
-        self,
-        node: Node,
-        heard: Inputs,
-        reporter: Reporter,
-        publishers: PlanPublishers,
-        lock: RLock,
+        self, node: Node, heard: Inputs, reporter: Reporter, publishers: PlanPublishers
     ) -> None:
         """Begin with no motion."""
         self._node, self._heard, self._reporter = node, heard, reporter
-        self._publishers, self._lock = publishers, lock
+        self._publishers = publishers
+        # The node's own thread does everything but the end, which may come from another one.
+        self._lock, self._is_closed = RLock(), False
         self._followed = ExecutionTracker(heard.joints)
         self._goal: PointingGoal | None = None
         self._state = Watch.IDLE
@@ -96,11 +122,7 @@ class ExecutionMonitor:
         self._since, self._is_again = 0.0, True
         # Those of the plan: another margin since then says nothing against its motion.
         self._parameters = reporter.parameters
-        # Plans again for a goal, once the arm rests; set by the owner.
-        self.plan_again: Callable[[PointingGoal, float], None] = lambda goal, wait: None
-        # Has a stop that was published as free judged once more; set by the owner.
-        self.judge: Callable[[Trajectory, Scene, PointingGoal, PlannerParameters], None]
-        self.judge = lambda *_: None
+        self._stops: deque[Stop] = deque(maxlen=10)
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
@@ -117,7 +139,19 @@ class ExecutionMonitor:
         parameters: PlannerParameters,
         tell: Callable[[], None],
     ) -> None:
-        """Have a motion told, and watch it by the parameters of its plan; the lock is held."""
+        """Have a motion told, and watch it by the parameters of its plan."""
+        with self._lock:
+            self._begin(running, goal, parameters, tell)
+
+    def _begin(
+        self,
+        running: ExecutingMotion,
+        goal: PointingGoal,
+        parameters: PlannerParameters,
+        tell: Callable[[], None],
+    ) -> None:
+        if self._is_closed:
+            raise RequestError(ErrorCode.PREEMPTED, 'the planner ends')
         before = copy(self._followed), self._parameters, self._goal, self._state
         self._followed.begin(running, self._now())
         self._parameters, self._goal, self._state = parameters, goal, Watch.WATCHING
@@ -131,7 +165,7 @@ class ExecutionMonitor:
         def look() -> None:
             self._say(Watch.WATCHING, '')
             # The body may have changed since the motion was last looked at.
-            self._judge(time.time_ns())
+            self._judge(self._heard.body.value, time.time_ns())
 
         # From here on the arm moves, whatever is wrong.
         self._supervise(look)
@@ -139,6 +173,7 @@ class ExecutionMonitor:
     def close(self) -> None:
         """Stop the arm, since nobody is going to watch it, and watch nothing any more."""
         with self._lock:
+            self._is_closed = True
             if self._node.context.ok():
                 self.fail('the planner ends', is_again=False)
                 if self._state is Watch.BRAKING:
@@ -153,9 +188,16 @@ class ExecutionMonitor:
         stop = fast_stop(running.trajectory, phase, self._parameters.limits)
         return ExecutingMotion(trajectory=stop, start_time=start)
 
-    def on_body(self, arrived: int) -> None:
-        """Hold the body, which came at a time [ns], against what is left of the motion."""
-        self._supervise(lambda: self._judge(arrived))
+    def on_body(self, body: WearerBody, arrived: int) -> None:
+        """Hold a body, which came at a time [ns], against what is left of the motion."""
+        self._supervise(lambda: self._judge(body, arrived))
+
+    def take_stops(self) -> list[Stop]:
+        """Return the stops that were published since this was asked last."""
+        with self._lock:
+            stops = list(self._stops)
+            self._stops.clear()
+        return stops
 
     def fail(self, why: str, is_again: bool = True) -> None:
         """
@@ -184,7 +226,7 @@ class ExecutionMonitor:
                 self._node.get_logger().error(traceback.format_exc())
             self.fail(f'the monitor failed, {_named(problem)}', is_again=False)
 
-    def _judge(self, arrived: int) -> None:
+    def _judge(self, body: WearerBody, arrived: int) -> None:
         """Stop the arm where the rest of its motion is not proven free; the lock is held."""
         begin = time.perf_counter()
         if self.running is None:
@@ -197,7 +239,7 @@ class ExecutionMonitor:
         if why:
             self.fail(why)
             return
-        scene = scene_of(self._heard.body.value.at(now))
+        scene = scene_of(body.at(now))
         if is_still_free(
             self.running,
             phase,
@@ -256,7 +298,7 @@ class ExecutionMonitor:
         if self._state in (Watch.WATCHING, Watch.BRAKING) and self._followed.look_back():
             self._node.get_logger().error(TURNED[self._followed.is_told])
             self._say(Watch.WATCHING, TURNED[self._followed.is_told])
-            self._judge(time.time_ns())
+            self._judge(self._heard.body.value, time.time_ns())
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where there is none any more."""
@@ -281,7 +323,7 @@ class ExecutionMonitor:
         # What was looked at since then may have taken its time.
         now = self._now()
         phase += now - then
-        running, parameters, goal = self.running, self._parameters, self._goal
+        running, parameters = self.running, self._parameters
         if running is None or phase >= running.trajectory.duration:
             return
         stopped = self._stop_of(running, phase, now)
@@ -311,14 +353,11 @@ class ExecutionMonitor:
         warning = '' if is_safe else self._warning(stopped.trajectory, scene)
         self._reporter.braked(took)
         self._tell_of_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
-        if not warning and goal is not None:
-            self.judge(stopped.trajectory, scene, goal, parameters)
-        if self._reporter.parameters.replan and goal is not None:
-            self.plan_again(goal, stopped.trajectory.duration)
+        self._keep(stopped.trajectory, None if warning else scene)
 
     def _stop_for_failure(self) -> None:
         """Publish the stop that is due, by as little as can be; the lock is held."""
-        running, goal = self.running, self._goal
+        running = self.running
         if running is None:
             self.due = ''
             return
@@ -343,8 +382,13 @@ class ExecutionMonitor:
         with suppress(Exception):
             self._reporter.braked(took)
             self._tell_of_stop(stopped.trajectory)
-            if self._is_again and goal is not None and self._reporter.parameters.replan:
-                self.plan_again(goal, stopped.trajectory.duration)
+            self._keep(stopped.trajectory, None, self._is_again)
+
+    def _keep(self, stop: Trajectory, scene: Scene | None, is_again: bool = True) -> None:
+        """Keep a stop for whoever follows it up, and the wearer that it was proven free of."""
+        is_again = is_again and self._reporter.parameters.replan
+        goal, n_begun = self._goal, self.n_begun
+        self._stops.append(Stop(stop, goal, self._parameters, scene, is_again, n_begun))
 
     def _phase_for_certain(self, running: ExecutingMotion, now: float) -> float | None:
         """Return the time within a motion, whatever is wrong; None where the arm is not on it."""

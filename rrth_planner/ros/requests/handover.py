@@ -12,9 +12,9 @@ from rrth_planner.model.start_state import StartState
 # How far ahead a motion begins that takes over from one that runs: that long its plan may take,
 # and once more with more time [s].
 LEADS = (0.05, LONGEST_LEAD)
-# So long before it begins such a motion is told, so that the arm has it in time [s]; not where the
-# present motion is unknown, since the arm has to be looked at as late as can be.
-EARLY = 0.025
+# So great a share of that before it begins it is told, so that the arm has it in time; not where
+# the present motion is unknown, since the arm has to be looked at as late as can be.
+EARLY = 0.5
 # So late a motion may be told of which nobody knows how the arm moved until then [s].
 LATE = 0.02
 
@@ -28,6 +28,8 @@ class Start:
     ----------
     time : float
         [s].
+    lead : float
+        So long before that it was planned for [s].
     takeover : StartState
         What the arm does then.
     running : ExecutingMotion or None
@@ -36,27 +38,26 @@ class Start:
     """
 
     time: float
+    lead: float
     takeover: StartState
     running: ExecutingMotion | None
 
     @property
     def early(self) -> float:
         """How long before it begins the motion is told, if all goes well [s]."""
-        return 0.0 if self.takeover.running is None else EARLY
+        return 0.0 if self.takeover.running is None else EARLY * self.lead
 
     @property
     def latest(self) -> float:
         """When the motion can still be told [s]."""
         return self.time + (LATE if self.takeover.running is None else 0.0)
 
-    def wait(
-        self, clock: Callable[[], float], should_stop: Callable[[], bool], ahead: float
-    ) -> None:
-        """Return so long before the motion is to be told [s], or as soon as it should stop."""
+    def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
+        """Return when the motion is to be told, or as soon as it should stop."""
         # A simulated clock may stand still.
         end = time.monotonic() + 2 * LEADS[-1]
         while time.monotonic() < end and not should_stop():
-            left = self.time - self.early - ahead - clock()
+            left = self.time - self.early - clock()
             if left <= 0.0:
                 return
             time.sleep(min(1e-3, max(1e-5, left)))

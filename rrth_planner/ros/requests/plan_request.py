@@ -4,7 +4,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 import secrets
 
 from rrth_planner.execution.executing_motion import ExecutingMotion
@@ -12,18 +11,14 @@ from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_motion import plan_motion
+from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.requests.handover import LEADS, Start
 from rrth_planner.ros.requests.incidents import PlanError
-from rrth_planner.ros.requests.revalidation import require_news, Revalidation
-
-# How often both judges are asked about a motion before it is told: the wearer may never stand
-# still.
-MOST_LOOKS = 3
+from rrth_planner.ros.requests.revalidation import Revalidation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +33,6 @@ class PlanOutcome:
     plan : MotionPlan or None
     inputs : PlanInputs or None
     start : Start or None
-    question : PlanQuestion or None
-        What the plan was asked.
     incident : Incident or None
         To be kept in a file, which the answer then names.
 
@@ -50,7 +43,6 @@ class PlanOutcome:
     plan: MotionPlan | None = None
     inputs: PlanInputs | None = None
     start: Start | None = None
-    question: PlanQuestion | None = None
     incident: Incident | None = None
 
     @property
@@ -65,17 +57,17 @@ def plan_request(
     heard: Inputs,
     parameters: PlannerParameters,
     clock: Callable[[], float],
+    planner: Planner,
     should_stop: Callable[[], bool],
+    publish: Callable[[PlanOutcome, Revalidation], bool],
     goal: PointingGoal | None = None,
     running: ExecutingMotion | None = None,
-    catch_up: Callable[[], bool] = lambda: True,
-    tell: Callable[[PlanOutcome, Callable[[], bool]], bool] = lambda _, fits: fits(),
 ) -> PlanOutcome:
     """
-    Return the outcome of a request that begins now, once its motion is told.
+    Return the outcome of a request that begins now, once its motion is published.
 
     A motion for an arm that moves begins with the state that the arm is going to be in shortly,
-    and is told not long before.
+    and is published not long before.
 
     Parameters
     ----------
@@ -84,17 +76,16 @@ def plan_request(
     parameters : PlannerParameters
     clock : callable
         Returns the present time [s].
+    planner : Planner
     should_stop : callable
         Polled while planning; True cancels.
+    publish : callable
+        Gets an outcome with a motion, and what says whether it still fits; publishes the motion,
+        or returns False where it is too late. May raise RequestError.
     goal : PointingGoal, optional
         Of the request; without, the last target.
     running : ExecutingMotion, optional
         The motion that the arm was last told to follow.
-    catch_up : callable, optional
-        Returns when the bodies that came are heard, and whether that is so.
-    tell : callable, optional
-        Gets an outcome with a motion, and what says whether it still fits, and returns that; tells
-        the motion if so. May raise RequestError.
 
     Raises
     ------
@@ -107,45 +98,41 @@ def plan_request(
     try:
         for lead in LEADS:
             question = plan = None
+            require_wanted(should_stop, 'the request was cancelled before its turn')
             now = clock()
             inputs = heard.at(now, parameters, goal)
-            if should_stop():
-                raise RequestError(
-                    ErrorCode.PREEMPTED, 'the request was cancelled before its turn'
-                )
             start = None
             if inputs.is_moving(now) or inputs.pauses(running, now, lead):
-                start = Start(
-                    now + lead, inputs.ahead(running, now + lead, parameters.arm), running
-                )
+                ahead = inputs.ahead(running, now + lead, parameters.arm)
+                start = Start(now + lead, lead, ahead, running)
             question = _question(inputs, parameters, start)
-            plan = plan_motion(**question.arguments, should_stop=should_stop)
+            plan = planner.plan(question, should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
                 incident = disagreement_incident(question, plan.disagreement)
                 return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
+            outcome = PlanOutcome(code, plan.sentence, plan, inputs, start)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
-                return PlanOutcome(code, plan.sentence, plan, inputs)
+                return outcome
             if start is not None:
-                begin = clock()
-                if begin > start.time:
+                if clock() > start.time:
                     continue
-                require_news(catch_up)
-                # That long it may take again.
-                start.wait(clock, should_stop, clock() - begin)
-            outcome = PlanOutcome(code, plan.sentence, plan, inputs, start, question)
-            look = Revalidation(
-                heard, clock, parameters, inputs, plan, start, running, should_stop
-            )
+                start.wait(clock, should_stop)
+            revalidation = Revalidation(heard, clock, parameters, inputs, plan, start, running)
             try:
-                told = _told(outcome, look, tell)
+                require_wanted(should_stop)
+                found = revalidation.disagreement(planner)
+                if found is not None:
+                    incident = disagreement_incident(question, *found)
+                    sentence = f'{incident.sentence}, seed {plan.seed}'
+                    failed = replace(outcome, code=ErrorCode.FAILURE, sentence=sentence)
+                    return replace(failed, incident=incident)
+                if publish(outcome, revalidation):
+                    return outcome
             except ArmHasMoved:
                 if start is not None or running is None or lead == LEADS[-1]:
                     raise
                 # It seemed at rest, and has just begun the motion that it was told.
-                continue
-            if told is not None:
-                return told
         raise RequestError(
             ErrorCode.TIMED_OUT,
             f'the arm moves, and no plan was ready and checked within {LEADS[-1]:g} s to take '
@@ -159,29 +146,12 @@ def plan_request(
         raise PlanError(question, None if plan is None else plan.trajectory) from problem
 
 
-def _told(
-    outcome: PlanOutcome,
-    look: Revalidation,
-    tell: Callable[[PlanOutcome, Callable[[], bool]], bool],
-) -> PlanOutcome | None:
-    """Return the outcome once its motion is told, or why it is not; None: it is too late."""
-    for n_looks in range(1, MOST_LOOKS + 1):
-        if look.should_stop():
-            raise RequestError(ErrorCode.PREEMPTED, 'the request was cancelled')
-        if look.is_late():
-            return None
-        begin = look.clock()
-        seen = look.take()
-        if seen.disagreement is not None:
-            assert outcome.question is not None
-            incident = disagreement_incident(outcome.question, seen.disagreement, seen.scene)
-            sentence = f'{incident.sentence}, seed {look.plan.seed}'
-            return replace(outcome, code=ErrorCode.FAILURE, sentence=sentence, incident=incident)
-        # Another look, and to hear what came meanwhile, takes about as long again.
-        is_last = n_looks == MOST_LOOKS or look.is_late(2.0 * (look.clock() - begin))
-        if tell(outcome, partial(look.still_fits, seen, is_last)):
-            return outcome
-    return None
+def require_wanted(
+    should_stop: Callable[[], bool], sentence: str = 'the request was cancelled'
+) -> None:
+    """Raise RequestError where a request was cancelled."""
+    if should_stop():
+        raise RequestError(ErrorCode.PREEMPTED, sentence)
 
 
 def _question(

@@ -5,33 +5,34 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 import time
 import traceback
-from typing import Any
 
 from nav_msgs.msg import Path
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.diagnostics import PlanReport
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
-from rrth_planner.ros.middleware.executor_barrier import CatchUp
-from rrth_planner.ros.middleware.thread_priority import stand_back
-from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
+from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
+from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
 from rrth_planner.ros.requests.incidents import incident_of, keep, sentence_of
-from rrth_planner.ros.requests.revalidation import busy, require_news
+from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_wanted
+from rrth_planner.ros.requests.revalidation import Revalidation
 from rrth_planner.ros.requests.stop_validation import incident_of_stop
 from rrth_planner.ros.requests.wait_for_rest import Rest
+from trajectory_msgs.msg import JointTrajectory
 
-# So often is a moment sought to tell a motion in.
-MOST_TRIES = 20
+# How often stops are followed up [s].
+PERIOD = 0.02
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -63,9 +64,15 @@ class _Ticket:
 
     is_cancelled = False
 
-    def __init__(self, is_asked: bool = True) -> None:
-        """Begin a request, or what nobody asked for."""
-        self.is_asked = is_asked
+
+@dataclass(frozen=True, slots=True)
+class _Resumption:
+    """A plan for the goal of a motion that was stopped, to be made once the arm rests."""
+
+    ticket: _Ticket
+    goal: PointingGoal
+    rest: Rest
+    n_begun: int
 
 
 class PlanQueue:
@@ -78,10 +85,12 @@ class PlanQueue:
     heard : Inputs
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
-    plan_request : callable
-        `plan_request.plan_request`, which is loaded late.
-    catch_up : CatchUp
-        Returns when the bodies that came are read.
+    publishers : PlanPublishers
+    monitor : ExecutionMonitor
+        Given each motion that is published; its stops are followed up.
+    planner : Planner
+    handled : callable
+        As in `ExecutorBarrier`, of the bodies.
 
     """
 
@@ -90,24 +99,22 @@ class PlanQueue:
         node: Node,
         heard: Inputs,
         reporter: Reporter,
-        plan_request: Callable[..., Any],
-        catch_up: CatchUp,
+        publishers: PlanPublishers,
+        monitor: ExecutionMonitor,
+        planner: Planner,
+        handled: Callable[[], tuple[int, int]],
     ) -> None:
         """Start with nothing to do."""
-        self._catch_up = catch_up
         self._node, self._heard, self._reporter = node, heard, reporter
-        self._plan_request = plan_request
-        self._publishers = PlanPublishers(node)
-        self._worker = ThreadPoolExecutor(
-            max_workers=1, thread_name_prefix='planner', initializer=stand_back
-        )
-        # Held while a motion is published, so that what was cancelled before never is.
-        self._lock = heard.lock
-        self.guard = ExecutionMonitor(node, heard, reporter, self._publishers, self._lock)
-        self.guard.plan_again = self._plan_again
-        self.guard.judge = self._judge
+        self._publishers, self._monitor, self._planner = publishers, monitor, planner
+        self._barrier = ExecutorBarrier(node, handled)
+        self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
+        self._resumption: _Resumption | None = None
         self._is_closed = False
+        # Not the node's clock: simulated time may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
@@ -123,8 +130,7 @@ class PlanQueue:
             if executor is not None:
                 executor.wake()
 
-        with self._lock:
-            self._open.add(ticket)
+        self._open.add(ticket)
         try:
             self._worker.submit(work)
             response: Response = await future
@@ -134,8 +140,7 @@ class PlanQueue:
                 executor.create_task(self.prepare, response.conclude)
             return response
         finally:
-            with self._lock:
-                self._open.discard(ticket)
+            self._open.discard(ticket)
 
     def prepare(self, work: Callable[[], None]) -> None:
         """Have something done in the worker's thread before the requests that follow."""
@@ -147,62 +152,76 @@ class PlanQueue:
                 # The request that needs it will say what is wrong.
                 self._node.get_logger().error(traceback.format_exc())
 
-        with self._lock:
-            if not self._is_closed:
-                self._worker.submit(prepared)
+        if not self._is_closed:
+            self._worker.submit(prepared)
 
     def cancel(self) -> int:
         """End the requests that have published no motion yet; return how many these are."""
-        with self._lock:
-            ended, self._open = self._open, set()
-            for ticket in ended:
-                ticket.is_cancelled = True
+        ended, self._open, self._resumption = self._open, set(), None
+        for ticket in ended:
+            ticket.is_cancelled = True
         return len(ended)
 
     def close(self) -> None:
         """End everything; nothing is published any more, and no request may follow."""
-        with self._lock:
-            self._is_closed = True
+        self._is_closed = True
         self.cancel()
-        self.guard.close()
+        self._monitor.close()
         self._worker.shutdown(wait=True, cancel_futures=True)
+        self._planner.close()
 
     def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
         """Plan and publish; called in the worker's thread."""
         figures, shown, incident = PlanReport(), None, None
-        parameters = self._reporter.parameters
-        n_brakes, running = self.guard.n_brakes, self.guard.running
+        parameters, monitor = self._reporter.parameters, self._monitor
+        n_brakes, running = monitor.n_brakes, monitor.running
+
+        def publish(outcome: PlanOutcome, revalidation: Revalidation) -> bool:
+            assert outcome.trajectory is not None
+            start = 0.0 if outcome.start is None else outcome.start.time
+            msg = self._publishers.motion(outcome.trajectory, parameters, start)
+            try:
+                # In the node's own thread, once all that came is read.
+                return self._barrier.call(
+                    lambda: self._publish(ticket, outcome, revalidation, n_brakes, msg)
+                )
+            except NodeIsBusyError:
+                require_wanted(lambda: ticket.is_cancelled)
+                raise RequestError(
+                    ErrorCode.SENSOR_INFO_STALE,
+                    'the node is busy: the bodies that came while the motion was planned are not '
+                    'read yet',
+                ) from None
+
         try:
-            outcome = self._plan_request(
+            outcome = plan_request(
                 self._heard,
                 parameters,
                 self._now,
-                lambda: self._should_stop(ticket),
+                self._planner,
+                lambda: ticket.is_cancelled,
+                publish,
                 goal,
                 running,
-                self._catch_up,
-                lambda outcome, fits: self._tell(ticket, outcome, fits, parameters, n_brakes),
             )
             code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
             incident = outcome.incident
             if plan is not None:
                 figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if outcome.trajectory is not None:
+            if plan is not None and plan.path is not None and outcome.trajectory is not None:
                 shown = outcome
                 figures = replace(
                     figures,
                     response_time=time.perf_counter() - begin,
-                    duration=plan.trajectory.duration,
+                    duration=outcome.trajectory.duration,
                     length=plan.path.length,
                     clearance=plan.clearance,
                 )
-            elif self._is_cancelled(ticket) and code is not ErrorCode.PREEMPTED:
+            elif ticket.is_cancelled and code is not ErrorCode.PREEMPTED:
                 code, sentence = CANCELLED
         except Exception as problem:
             # Whatever it is, the caller gets an answer, and the node lives on.
             self._node.get_logger().error(traceback.format_exc())
-            with self._lock:
-                self._open.discard(ticket)
             code, sentence, shown = ErrorCode.FAILURE, sentence_of(problem), None
             incident = incident_of(problem)
         if incident is not None:
@@ -214,141 +233,116 @@ class PlanQueue:
             return Path() if shown is None else self._tool_path(shown, parameters)
 
         def conclude() -> None:
-            self._heard.way.give()
             self._reporter.conclude(code, sentence, figures)
-            self._heard.way.give()
             if shown is not None:
                 self._show(shown, parameters)
 
         is_solved = code is ErrorCode.SUCCESS and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
-    def _tell(
+    def _publish(
         self,
         ticket: _Ticket,
-        outcome: Any,
-        fits: Callable[[], bool],
-        parameters: PlannerParameters,
+        outcome: PlanOutcome,
+        revalidation: Revalidation,
         n_brakes: int,
+        msg: JointTrajectory,
     ) -> bool:
-        """Publish a request's motion if it fits, and return that, or raise RequestError."""
-        begin = 0.0 if outcome.start is None else outcome.start.time
-        msg = self._publishers.motion(outcome.trajectory, parameters, begin)
-        for _ in range(MOST_TRIES):
-            # The last of all that may take its time.
-            require_news(self._catch_up)
-            with self._lock:
-                self._require_use(ticket, n_brakes)
-                if not fits():
-                    return False
-                # Where the machine stood still others have come, and wait for the lock.
-                if self._catch_up.is_news():
-                    self._open.discard(ticket)
-                    self.guard.begin(
-                        ExecutingMotion(
-                            trajectory=outcome.trajectory,
-                            start_time=begin or self._now(),
-                            reach=outcome.plan.reach,
-                            escape_time=outcome.plan.escape_time,
-                        ),
-                        outcome.inputs.goal,
-                        parameters,
-                        lambda: self._publishers.tell(msg),
-                    )
-                    return True
-        raise busy()
+        """
+        Publish the motion of a request, and have it monitored; called in the node's own thread.
 
-    def _require_use(self, ticket: _Ticket, n_brakes: int) -> None:
-        """Raise RequestError where a motion is of no use any more; the lock is held."""
-        if ticket.is_cancelled or self._is_closed:
-            raise RequestError(*CANCELLED)
-        if n_brakes != self.guard.n_brakes:
+        Return False where it is too late; raise RequestError where it does not fit any more.
+        """
+        monitor, parameters = self._monitor, revalidation.parameters
+        require_wanted(lambda: ticket.is_cancelled)
+        if n_brakes != monitor.n_brakes:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm was stopped while its motion was planned: {self.guard.cause}',
+                f'the arm was stopped while its motion was planned: {monitor.cause}',
             )
-        if self.guard.due:
+        if monitor.due:
             raise RequestError(
-                ErrorCode.FAILURE, f'a stop of the arm could not be published: {self.guard.due}'
+                ErrorCode.FAILURE, f'a stop of the arm could not be published: {monitor.due}'
             )
+        revalidation.require_fit()
+        if revalidation.is_late():
+            return False
+        trajectory, plan, inputs = outcome.trajectory, outcome.plan, outcome.inputs
+        assert trajectory is not None and plan is not None and inputs is not None
+        # Whoever cancels from here on cancels nothing.
+        self._open.discard(ticket)
+        monitor.begin(
+            ExecutingMotion(
+                trajectory=trajectory,
+                start_time=self._now() if outcome.start is None else outcome.start.time,
+                reach=plan.reach,
+                escape_time=plan.escape_time,
+            ),
+            inputs.goal,
+            parameters,
+            lambda: self._publishers.tell(msg),
+        )
+        return True
 
-    def _should_stop(self, ticket: _Ticket) -> bool:
-        """Return whether a request was cancelled, once whoever hears the wearer is through."""
-        self._heard.way.give()
-        return ticket.is_cancelled
-
-    def _is_cancelled(self, ticket: _Ticket) -> bool:
-        """Return whether a request was cancelled before it ended, without a motion."""
-        with self._lock:
-            self._open.discard(ticket)
-            return ticket.is_cancelled or self._is_closed
-
-    def _plan_again(self, goal: PointingGoal, wait: float) -> None:
-        """Plan for a goal once more as soon as the arm, which brakes, rests."""
-        ticket, n_begun = _Ticket(is_asked=False), self.guard.n_begun
-        rest = Rest(self._heard.joints, self._now, wait)
-
-        def is_wanted() -> bool:
+    def _follow_up(self) -> None:
+        """See to what comes after a stop: the second check of it, and another plan."""
+        for stop in self._monitor.take_stops():
+            self.prepare(partial(self._check_stop, stop))
+            if stop.is_again and stop.goal is not None and not self._is_closed:
+                self._discard_resumption()
+                rest = Rest(self._heard.joints, self._now, stop.trajectory.duration)
+                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_begun)
+                self._open.add(self._resumption.ticket)
+        resumption = self._resumption
+        if resumption is None:
+            return
+        if resumption.n_begun != self._monitor.n_begun:
             # Whoever asked for a motion that has begun since then wants that one.
-            return not ticket.is_cancelled and self.guard.n_begun == n_begun
+            self._discard_resumption()
+        elif resumption.rest.is_over():
+            self._resumption = None
+            self.prepare(partial(self._resume, resumption))
 
-        def work() -> None:
-            # No request waits for the rest of the arm: this comes after it.
-            if not rest.wait(lambda: self._is_asked() or not is_wanted()) and is_wanted():
-                self.prepare(work)
-                return
-            response = None
-            try:
-                if is_wanted():
-                    response = self._work(goal, time.perf_counter(), ticket)
-            finally:
-                with self._lock:
-                    self._open.discard(ticket)
-            if response is None:
-                return
-            response.conclude()
-            if not response.is_solved:
-                self.guard.hold(response.text)
+    def _discard_resumption(self) -> None:
+        if self._resumption is not None:
+            self._open.discard(self._resumption.ticket)
+            self._resumption = None
 
-        with self._lock:
-            self._open.add(ticket)
-        self.prepare(work)
+    def _resume(self, resumption: _Resumption) -> None:
+        """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
+        ticket = resumption.ticket
+        if ticket.is_cancelled or resumption.n_begun != self._monitor.n_begun:
+            self._open.discard(ticket)
+            return
+        response = self._work(resumption.goal, time.perf_counter(), ticket)
+        self._open.discard(ticket)
+        response.conclude()
+        if not response.is_solved:
+            self._monitor.hold(response.text)
 
-    def _is_asked(self) -> bool:
-        """Return whether a request waits for its turn."""
-        with self._lock:
-            return any(ticket.is_asked for ticket in self._open)
+    def _check_stop(self, stop: Stop) -> None:
+        """Have the second checker look at a stop that was published as proven free."""
+        incident = incident_of_stop(stop, self._planner)
+        if incident is not None:
+            noted, file = keep(incident, stop.parameters.incident_folder)
+            self._reporter.incident(file)
+            self._node.get_logger().error(f'the arm brakes, but {incident.sentence}{noted}')
 
-    def _judge(
-        self, stop: Trajectory, scene: Scene, goal: PointingGoal, parameters: PlannerParameters
-    ) -> None:
-        """Have the second judge look at a stop that was published."""
-
-        def work() -> None:
-            incident = incident_of_stop(stop, scene, goal, parameters, self._heard.way.give)
-            if incident is not None:
-                noted, file = keep(incident, parameters.incident_folder)
-                self._reporter.incident(file)
-                self._node.get_logger().error(f'the arm brakes, but {incident.sentence}{noted}')
-
-        self.prepare(work)
-
-    def _tool_path(self, outcome: Any, parameters: PlannerParameters) -> Path:
+    def _tool_path(self, outcome: PlanOutcome, parameters: PlannerParameters) -> Path:
         """Return the tool's path; a failure of this does not unsay the motion."""
+        assert outcome.trajectory is not None
         try:
             return self._publishers.tool_path(outcome.trajectory, parameters)
         except Exception:
             self._node.get_logger().error(traceback.format_exc())
             return Path()
 
-    def _show(self, outcome: Any, parameters: PlannerParameters) -> None:
+    def _show(self, outcome: PlanOutcome, parameters: PlannerParameters) -> None:
         """Publish what shows a motion."""
+        assert outcome.trajectory is not None and outcome.inputs is not None
+        inputs = outcome.inputs
         self._publishers.publish_view(
-            outcome.trajectory,
-            parameters,
-            outcome.inputs.scene,
-            outcome.inputs.goal.target,
-            self._heard.way.give,
+            outcome.trajectory, parameters, inputs.scene, inputs.goal.target
         )
 
     def _now(self) -> float:

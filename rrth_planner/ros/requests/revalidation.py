@@ -1,25 +1,24 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Before a motion is told: whether it still fits wearer and arm, who may have moved since."""
+"""Before a motion is published: whether it still fits wearer and arm, who may have moved since."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from rrth_planner.collision.penetration import box_depths
-from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
+from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
-from rrth_planner.collision.world import arm_world, World
+from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.requests.handover import LEADS, Start
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
@@ -27,32 +26,9 @@ START_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """
-    What a motion was held against.
-
-    Parameters
-    ----------
-    body : WearerBody
-        As it was heard.
-    joints : JointReading
-    scene : Scene
-        Its boxes.
-    disagreement : Disagreement or None
-        What one judge has against the motion and the other has not.
-
-    """
-
-    body: WearerBody
-    joints: JointReading
-    scene: Scene
-    disagreement: Disagreement | None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Revalidation:
     """
-    Holds a planned motion against wearer and arm as they are by now, as often as need be.
+    Checks a planned motion against wearer and arm as they are by now, as often as need be.
 
     Parameters
     ----------
@@ -69,8 +45,6 @@ class Revalidation:
         None: from rest.
     running : ExecutingMotion or None
         The motion that the arm was last told to follow.
-    should_stop : callable
-        Polled between and while the judges look; what it says is for the caller to ask.
 
     """
 
@@ -81,59 +55,47 @@ class Revalidation:
     plan: MotionPlan
     start: Start | None
     running: ExecutingMotion | None
-    should_stop: Callable[[], bool]
 
-    def take(self) -> Seen:
+    def disagreement(self, planner: Planner) -> tuple[Disagreement, Scene] | None:
         """
-        Return what is seen; the judges are asked where the wearer has moved.
+        Return what the second checker has against a motion that the first one finds free.
 
-        Raise RequestError where wearer or arm have moved so that the motion no longer fits.
+        And round which wearer; it is asked only where he has moved. Raise RequestError where the
+        motion no longer fits.
         """
-        now, body = self.clock(), self.heard.body.value
-        present = self.heard.at(now, self.parameters, self.inputs.goal)
-        self._require_arm(present, now)
-        scene = present.scene
+        scene = self.require_fit()
         if _is_same(scene, self.inputs.scene):
-            return Seen(body, present.joints, scene, None)
-        self.should_stop()
-        world = self._require_proof(scene)
-        self.should_stop()
-        motion, escape_time = self._motion, self.plan.escape_time
+            return None
         parameters = self.parameters
-        touch = violation_seen(
+        violation = planner.violation_seen(
             parameters.arm,
             scene,
-            world,
-            motion,
+            self._motion,
             parameters.margin,
+            parameters.ray_guard_length,
             self._reach,
-            escape_time,
-            pause=self.should_stop,
+            self.plan.escape_time,
         )
-        found = None if touch is None else Disagreement(motion, touch, escape_time)
-        return Seen(body, present.joints, scene, found)
+        if violation is None:
+            return None
+        return Disagreement(self._motion, violation, self.plan.escape_time), scene
 
-    def is_late(self, ahead: float = 0.0) -> bool:
-        """Return whether it is too late to tell the motion, or will be so much later [s]."""
-        return self.start is not None and self.clock() + ahead > self.start.latest
+    def is_late(self) -> bool:
+        """Return whether it is too late to publish the motion."""
+        return self.start is not None and self.clock() > self.start.latest
 
-    def still_fits(self, seen: Seen, is_last: bool) -> bool:
+    def require_fit(self) -> Scene:
         """
-        Return whether a motion may be told that fitted what was seen a moment ago.
+        Return the wearer as he is now, of whom the motion is proven free.
 
-        Not when it is too late, nor when the body has changed since. After the last look the
-        certificate alone decides about that body: it is quick, and a lock is held. Raise
-        RequestError where it does not prove the motion free, or the arm has moved.
+        Raise RequestError where it is not, or where the arm is not where the motion needs it.
         """
-        now, body = self.clock(), self.heard.body.value
+        now = self.clock()
         present = self.heard.at(now, self.parameters, self.inputs.goal)
-        if present.joints is not seen.joints:
-            self._require_arm(present, now)
-        if body is not seen.body and not _is_same(present.scene, seen.scene):
-            if not is_last:
-                return False
+        self._require_arm(present, now)
+        if not _is_same(present.scene, self.inputs.scene):
             self._require_proof(present.scene)
-        return not self.is_late()
+        return present.scene
 
     def _require_arm(self, present: PlanInputs, now: float) -> None:
         """Raise ArmHasMoved where the arm is not where the motion needs it."""
@@ -157,8 +119,8 @@ class Revalidation:
                 f'{START_TOLERANCE:g} rad',
             )
 
-    def _require_proof(self, scene: Scene) -> World:
-        """Return the world of a wearer, or raise RequestError where the motion is not free."""
+    def _require_proof(self, scene: Scene) -> None:
+        """Raise RequestError where the motion is not proven free of a wearer."""
         parameters = self.parameters
         world = arm_world(parameters.arm, scene, parameters.margin, parameters.ray_guard_length)
         escape_time = self.plan.escape_time
@@ -172,7 +134,6 @@ class Revalidation:
                 'the wearer moved while the motion was planned, and it is no longer proven free '
                 'of the present body',
             )
-        return world
 
     @property
     def _motion(self) -> Trajectory:
@@ -184,20 +145,6 @@ class Revalidation:
     def _reach(self) -> float:
         target = self.inputs.goal.target
         return reach_to(self.parameters.arm, target, self._motion.positions[-1])
-
-
-def require_news(catch_up: Callable[[], bool]) -> None:
-    """Wait until the bodies that came are heard, or raise RequestError."""
-    if not catch_up():
-        raise busy()
-
-
-def busy() -> RequestError:
-    """Return what is said where bodies that came cannot be heard in time."""
-    return RequestError(
-        ErrorCode.SENSOR_INFO_STALE,
-        'the node is busy: the bodies that came while the motion was planned are not read yet',
-    )
 
 
 def _is_same(one: Scene, other: Scene) -> bool:

@@ -1,51 +1,28 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What python-fcl says of a stop, once it is on its way: a moving arm does not wait for that."""
+"""What the second checker says of a stop, once it is published: a moving arm does not wait."""
 
-from collections.abc import Callable
-
-from rrth_planner.collision.fcl_checker import first_violation
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.io.incident import disagreement_incident, Incident
-from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.monitor.execution_monitor import Stop
 
 
-def incident_of_stop(
-    stop: Trajectory,
-    scene: Scene,
-    goal: PointingGoal,
-    parameters: PlannerParameters,
-    pause: Callable[[], None],
-) -> Incident | None:
-    """
-    Return the record of a stop that is proven free and touches for python-fcl, or None.
-
-    Parameters
-    ----------
-    stop : Trajectory
-        Published.
-    scene : Scene
-        The wearer that it was proven free of.
-    goal : PointingGoal
-        Of the motion that it ends.
-    parameters : PlannerParameters
-    pause : callable
-        As in `fcl_checker.first_violation`.
-
-    """
+def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
+    """Return the record of a stop that is proven free and touches for python-fcl, or None."""
+    if stop.scene is None or stop.goal is None:
+        return None
+    parameters, trajectory = stop.parameters, stop.trajectory
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
-    touch = first_violation(arm, scene, stop, margin, ray, ray, pause)
-    if touch is None:
+    violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray)
+    if violation is None:
         return None
     question = PlanQuestion(
         arm=arm,
-        scene=scene,
-        q_start=stop.positions[0],
-        goal=goal,
+        scene=stop.scene,
+        q_start=trajectory.positions[0],
+        goal=stop.goal,
         limits=parameters.limits,
         options=parameters.options,
         margin=margin,
@@ -53,4 +30,4 @@ def incident_of_stop(
         seed=max(0, parameters.seed),
         escape_depth=parameters.escape_depth,
     )
-    return disagreement_incident(question, Disagreement(stop, touch))
+    return disagreement_incident(question, Disagreement(trajectory, violation))

@@ -12,8 +12,6 @@ from rrth_planner.ros.messages.joint_state import JointReading
 
 # So much longer than its brake an arm may need to come to rest [s].
 LONGEST_SETTLING = 1.0
-# How often the arm is looked at [s].
-PERIOD = 5e-3
 
 
 class Rest:
@@ -39,13 +37,8 @@ class Rest:
         # A simulated clock may stand still.
         self._end = time.monotonic() + brake + LONGEST_SETTLING
 
-    def wait(self, should_stop: Callable[[], bool]) -> bool:
-        """Return whether the arm is at rest or the time for that is over; else it should stop."""
-        while not (is_over := self._is_over()) and not should_stop():
-            time.sleep(PERIOD)
-        return is_over
-
-    def _is_over(self) -> bool:
+    def is_over(self) -> bool:
+        """Return whether the arm is at rest, or the time for that is over."""
         if time.monotonic() >= self._end:
             return True
         reading = self._joints.value

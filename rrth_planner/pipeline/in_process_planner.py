@@ -1,0 +1,36 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What `PlanningProcess` does, done by whoever asks for it."""
+
+from collections.abc import Callable
+from dataclasses import replace
+import gc
+
+from rrth_planner.collision.trajectory_validation import violation_seen
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.planning.options import TreeOptions
+
+
+class InProcessPlanner:
+    """Plans, and asks the second collision checker; the methods are those of `Planner`."""
+
+    violation_seen = staticmethod(violation_seen)
+
+    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
+        """Have everything compiled and loaded for an arm and options."""
+        warm_up(arm, options)
+        # What was loaded lives as long as the process: the collector need not look at it again.
+        gc.collect()
+        gc.freeze()
+
+    def plan(
+        self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
+    ) -> MotionPlan:
+        """Return what `plan_motion` answers to a question, without the search behind it."""
+        return replace(plan_motion(**question.arguments, should_stop=should_stop), search=None)
+
+    def close(self) -> None:
+        """Do nothing."""

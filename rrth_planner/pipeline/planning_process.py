@@ -1,0 +1,255 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Planning in a process of its own, whose interpreter nobody else has to wait for."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, Pipe
+import os
+import pickle
+import subprocess
+import sys
+from typing import Any, Protocol
+
+from rrth_planner.collision.violation import Violation
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.errors import RrthError
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.planning.options import TreeOptions
+
+# How often a caller is asked whether its plan is still wanted [s].
+POLL_PERIOD = 5e-3
+# A process that has not ended by itself after this time is killed [s].
+LONGEST_END = 5.0
+WORKER = 'rrth_planner.pipeline.planning_worker'
+# Sent while the process works: what it works at is not wanted any more.
+STOP = None
+
+
+class PlanningProcessError(RrthError):
+    """The planning process ended while it worked."""
+
+
+class PlanningTraceback(Exception):
+    """Where in the planning process an error was raised: the cause of the same error here."""
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """An error instead of an answer, and where it was raised."""
+
+    problem: Exception
+    where: str
+
+
+class Planner(Protocol):
+    """Who plans and asks the second collision checker, in this process or in another one."""
+
+    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
+        """Return once plans with an arm and options need no time to load."""
+
+    def plan(
+        self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
+    ) -> MotionPlan:
+        """Return what `plan_motion` answers to a question, without the search behind it."""
+
+    def violation_seen(
+        self,
+        arm: ArmModel,
+        scene: Scene,
+        trajectory: Trajectory,
+        margin: float,
+        ray_guard_length: float,
+        reach: float,
+        escape_time: float = 0.0,
+    ) -> Violation | None:
+        """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
+
+    def close(self) -> None:
+        """End what it has begun."""
+
+
+class PlanningProcess:
+    """
+    Plans, and asks the second collision checker, in a process of its own.
+
+    It starts at once and ends with this one, however this one ends. Where it dies it is started
+    again. For one caller at a time.
+
+    Parameters
+    ----------
+    arm : ArmModel
+    options : TreeOptions
+        What is to be ready: the kernels are loaded for them.
+    on_death : callable
+        Called with a sentence when it was found dead.
+
+    """
+
+    def __init__(
+        self,
+        arm: ArmModel,
+        options: TreeOptions,
+        on_death: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        """Start it."""
+        self._warm_up, self._on_death = (arm, options), on_death
+        self._start()
+
+    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
+        """
+        Return once plans with an arm and options need no time to load.
+
+        Raises
+        ------
+        RrthError
+            The arm cannot point.
+
+        """
+        if self._warm_up != (arm, options):
+            self._warm_up = arm, options
+            self._begin('warm_up', arm, options)
+        self._require_ready()
+
+    def plan(
+        self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
+    ) -> MotionPlan:
+        """
+        Return what `plan_motion` answers to a question, without the search behind it.
+
+        Parameters
+        ----------
+        question : PlanQuestion
+        should_stop : callable
+            Polled while it plans; True cancels.
+
+        Raises
+        ------
+        PlanningProcessError
+            It died over this question; the next one finds another process.
+
+        """
+        answer: MotionPlan = self._ask('plan', question, should_stop=should_stop)
+        return answer
+
+    def violation_seen(
+        self,
+        arm: ArmModel,
+        scene: Scene,
+        trajectory: Trajectory,
+        margin: float,
+        ray_guard_length: float,
+        reach: float,
+        escape_time: float = 0.0,
+    ) -> Violation | None:
+        """
+        Return what `trajectory_validation.violation_seen` returns for the same arguments.
+
+        Raises
+        ------
+        PlanningProcessError
+            It died over this motion.
+
+        """
+        answer: Violation | None = self._ask(
+            'violation_seen', arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
+        )
+        return answer
+
+    def close(self) -> None:
+        """End it."""
+        self._line.close()
+        try:
+            self._process.wait(LONGEST_END)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    @property
+    def pid(self) -> int:
+        """The number of the process."""
+        return self._process.pid
+
+    def _start(self) -> None:
+        self._line, end = Pipe()
+        # Not by `multiprocessing`, which would run the script again that this process runs.
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', WORKER, str(end.fileno())],
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
+            pass_fds=[end.fileno()],
+            # Ctrl-C is for all processes of a terminal; this one ends with the one that asks it.
+            start_new_session=True,
+        )
+        end.close()
+        self._is_busy = False
+        self._begin('warm_up', *self._warm_up)
+
+    def _require_ready(self) -> None:
+        """Wait for the end of the warm-up, if that has not been waited for yet."""
+        if self._is_busy:
+            self._end(lambda: False)
+
+    def _ask(
+        self, name: str, *arguments: Any, should_stop: Callable[[], bool] = lambda: False
+    ) -> Any:
+        if self._process.poll() is not None:
+            self._restart('while it had nothing to do')
+        self._require_ready()
+        self._begin(name, *arguments)
+        return self._end(should_stop)
+
+    def _begin(self, name: str, *arguments: Any) -> None:
+        self._is_busy = True
+        # One that has died is found out when its answer is waited for.
+        with suppress(OSError):
+            send(self._line, (name, arguments))
+
+    def _end(self, should_stop: Callable[[], bool]) -> Any:
+        """Return the answer to what was asked last, or raise what it raised."""
+        is_stopped = False
+        try:
+            while not self._line.poll(POLL_PERIOD):
+                if not is_stopped and should_stop():
+                    is_stopped = True
+                    send(self._line, STOP)
+            answer = receive(self._line)
+        except (EOFError, OSError) as problem:
+            raise PlanningProcessError(self._restart('while it worked')) from problem
+        self._is_busy = False
+        if isinstance(answer, Raised):
+            raise answer.problem from PlanningTraceback(answer.where)
+        return answer
+
+    def _restart(self, when: str) -> str:
+        """Start another process in place of one that has died; return what is said of that."""
+        self._line.close()
+        try:
+            code = self._process.wait(LONGEST_END)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        sentence = f'the planning process ended with code {code} {when}; another one is started'
+        self._on_death(sentence)
+        self._start()
+        return sentence
+
+
+def send(line: Connection, value: Any) -> None:
+    """Send a value: its arrays, which a receiver may not write to, follow it."""
+    buffers: list[pickle.PickleBuffer] = []
+    data = pickle.dumps(value, protocol=5, buffer_callback=buffers.append)
+    line.send_bytes(len(buffers).to_bytes(8, 'little') + data)
+    for buffer in buffers:
+        line.send_bytes(buffer.raw())
+
+
+def receive(line: Connection) -> Any:
+    """Return the next value; its arrays are read-only."""
+    head = line.recv_bytes()
+    buffers = [line.recv_bytes() for _ in range(int.from_bytes(head[:8], 'little'))]
+    return pickle.loads(head[8:], buffers=buffers)

@@ -1,0 +1,82 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The process that `PlanningProcess` starts: it plans for who started it, and ends with that."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from multiprocessing.connection import Connection
+import os
+import pickle
+import sys
+import traceback
+from typing import Any
+
+from rrth_planner.model.errors import one_line
+from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+from rrth_planner.pipeline.motion_plan import MotionPlan
+from rrth_planner.pipeline.planning_process import Raised, receive, send, STOP
+from rrth_planner.pipeline.request import PlanQuestion
+
+
+def main() -> None:
+    """Answer what comes by the file descriptor that is named, until nobody is left to ask."""
+    _stand_back()
+    line, planner = Connection(int(sys.argv[1])), InProcessPlanner()
+
+    def plan(question: PlanQuestion) -> MotionPlan:
+        # Whatever comes meanwhile is a STOP, or the end of who asked.
+        return planner.plan(question, line.poll)
+
+    work: dict[str, Callable[..., Any]] = {
+        'warm_up': planner.warm_up,
+        'plan': plan,
+        'violation_seen': planner.violation_seen,
+    }
+    serve(line, work)
+
+
+def serve(line: Connection, work: Mapping[str, Callable[..., Any]]) -> None:
+    """Do the work that is asked for by its name, one after the other."""
+    while True:
+        try:
+            request = receive(line)
+            if request is STOP:
+                # It came after the answer.
+                continue
+            name, arguments = request
+            try:
+                answer = work[name](*arguments)
+            except Exception as problem:
+                answer = _portable(problem)
+            send(line, answer)
+        except (EOFError, OSError):
+            return
+
+
+def _portable(problem: Exception) -> Raised:
+    """Return an error as it can be sent."""
+    where = ''.join(traceback.format_exception(problem))
+    try:
+        pickle.loads(pickle.dumps(problem))
+    except Exception:
+        problem = RuntimeError(one_line(f'{type(problem).__name__}: {problem}'))
+    return Raised(problem, where)
+
+
+def _stand_back() -> None:
+    """
+    Let who asks go before this process, where the system runs them in real time.
+
+    Among equals this one would keep its processor until it sleeps, whoever else wakes up.
+    """
+    if not hasattr(os, 'sched_setparam'):
+        return
+    # A system that forbids it leaves all as it is.
+    with suppress(OSError):
+        priority = os.sched_getparam(0).sched_priority
+        if priority > 1:
+            os.sched_setparam(0, os.sched_param(priority - 1))
+
+
+if __name__ == '__main__':
+    main()
