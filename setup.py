@@ -1,57 +1,125 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
+"""
+The package for colcon and for pip.
+
+colcon installs as ROS does: each executable in `lib/rrth_planner`, found by `ros2 run`, and the
+files beside the code in `share`. A wheel, which pip builds, holds one package with these files in
+it and one command, `rrth`.
+"""
 
 from glob import glob
+import os
+import sys
+from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
 
-package_name = 'rrth_planner'
-share = f'share/{package_name}'
+# colcon --symlink-install starts this file by a link elsewhere.
+ROOT = os.path.dirname(os.path.realpath(__file__))
+# What is beside the code, by folder.
+FILES = {
+    'config': ['*.yaml', '*.xml', 'examples/*', 'maps/*.yaml'],
+    'msg_examples': ['*.yaml'],
+    'rviz': ['*.rviz'],
+    'urdf': ['*.urdf'],
+}
+# What only nodes and figures import of what requirements/run.txt lists.
+NODE = ('matplotlib', 'rosbags')
+IS_WHEEL = not {'bdist_wheel', 'dist_info', 'editable_wheel'}.isdisjoint(sys.argv)
+
+
+def text_of(name):
+    """Return the text of a file of the project."""
+    with open(os.path.join(ROOT, name), encoding='utf-8') as file:
+        return file.read()
+
+
+def requirements(name):
+    """Return what a file of requirements/ lists."""
+    lines = text_of(f'requirements/{name}.txt').splitlines()
+    return [line for line in lines if line and not line.startswith('#')]
+
+
+def shared_files():
+    """Return what ROS expects in `share`: (folder, files) of each."""
+    share, by_folder = f'share/{NAME}', {}
+    patterns = {**FILES, 'launch': ['*.py']}
+    for folder in patterns:
+        for pattern in patterns[folder]:
+            for file in sorted(glob(f'{folder}/{pattern}')):
+                by_folder.setdefault(f'{share}/{os.path.dirname(file)}', []).append(file)
+    return [
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (share, ['package.xml']),
+        *by_folder.items(),
+    ]
+
+
+manifest = ElementTree.fromstring(text_of('package.xml'))
+NAME = manifest.findtext('name')
+packages = find_packages(include=[NAME, f'{NAME}.*'])
+needed = requirements('run')
+figures = [line for line in needed if line.startswith('matplotlib')]
+node = [line for line in needed if line.startswith(NODE)]
+executables = [
+    'planner_node = rrth_planner.ros.planner_node:main',
+    'playback_node = rrth_planner.ros.playback_node:main',
+    'demo = rrth_planner.cli.demo:main',
+    'plan = rrth_planner.cli.plan:main',
+    'plot = rrth_planner.cli.plot:main',
+    'point_at = rrth_planner.cli.point_at:main',
+    'read_urdf = rrth_planner.cli.read_urdf:main',
+    'record = rrth_planner.cli.record:main',
+    'replay = rrth_planner.cli.replay:main',
+    'reproduce = rrth_planner.cli.reproduce:main',
+    'viewer = rrth_planner.cli.viewer:main',
+    'write_urdf = rrth_planner.cli.write_urdf:main',
+]
 
 setup(
-    name=package_name,
-    version='0.1.0',
-    packages=find_packages(include=['rrth_planner', 'rrth_planner.*']),
-    data_files=[
-        ('share/ament_index/resource_index/packages', [f'resource/{package_name}']),
-        (share, ['package.xml']),
-        (f'{share}/launch', sorted(glob('launch/*.py'))),
-        (f'{share}/config', sorted(glob('config/*.yaml') + glob('config/*.xml'))),
-        (f'{share}/config/examples', sorted(glob('config/examples/*'))),
-        (f'{share}/config/maps', sorted(glob('config/maps/*.yaml'))),
-        (f'{share}/urdf', sorted(glob('urdf/*.urdf'))),
-        (f'{share}/rviz', sorted(glob('rviz/*.rviz'))),
-        (f'{share}/msg_examples', sorted(glob('msg_examples/*.yaml'))),
+    name=NAME,
+    version=manifest.findtext('version'),
+    description=manifest.findtext('description'),
+    long_description=text_of('README.md'),
+    long_description_content_type='text/markdown',
+    license='Apache-2.0',
+    maintainer=manifest.findtext('maintainer'),
+    maintainer_email=manifest.find('maintainer').get('email'),
+    project_urls={url.get('type', 'website'): url.text for url in manifest.findall('url')},
+    keywords=['motion planning', 'collision checking', 'wearable robotics', 'RRT', 'ROS 2'],
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Science/Research',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3',
+        'Programming Language :: Python :: 3.10',
+        'Programming Language :: Python :: 3.11',
+        'Programming Language :: Python :: 3.12',
+        'Programming Language :: Python :: 3.13',
+        'Topic :: Scientific/Engineering',
+        'Typing :: Typed',
     ],
+    packages=[*packages, *(f'{NAME}.{folder}' for folder in FILES)] if IS_WHEEL else packages,
+    package_dir={f'{NAME}.{folder}': folder for folder in FILES} if IS_WHEEL else {},
+    package_data={
+        NAME: ['py.typed'],
+        **({f'{NAME}.{folder}': FILES[folder] for folder in FILES} if IS_WHEEL else {}),
+    },
+    data_files=[] if IS_WHEEL else shared_files(),
     python_requires='>=3.10',
-    # Names only: the versions come from rosdep or from requirements/.
-    install_requires=['setuptools', 'numpy', 'numba', 'PyYAML'],
+    install_requires=[line for line in needed if line not in node],
     extras_require={
-        'node': ['python-fcl', 'rosbags', 'matplotlib'],
-        'campaign': ['dask[distributed]', 'pyarrow', 'tqdm', 'matplotlib'],
-        'tools': ['viser', 'mcap-ros2-support', 'yourdfpy', 'trimesh', 'tqdm', 'matplotlib'],
+        'node': node,
+        'ros': [*node, *requirements('ros-wheels')],
+        'campaign': [*requirements('campaign'), *figures],
+        'tools': [*requirements('tools'), *figures],
+        # By it colcon knows that pytest runs the tests.
         'test': ['pytest', 'hypothesis'],
     },
     # The sources of the kernels name the folder of their code, so these must be real files.
     zip_safe=False,
-    maintainer='The rrth_planner authors',
-    maintainer_email='rrth_planner@example.org',
-    description='Motion planner for a body-worn pointing arm.',
-    license='Apache-2.0',
     entry_points={
-        'console_scripts': [
-            'planner_node = rrth_planner.ros.planner_node:main',
-            'playback_node = rrth_planner.ros.playback_node:main',
-            'demo = rrth_planner.cli.demo:main',
-            'plan = rrth_planner.cli.plan:main',
-            'plot = rrth_planner.cli.plot:main',
-            'point_at = rrth_planner.cli.point_at:main',
-            'read_urdf = rrth_planner.cli.read_urdf:main',
-            'record = rrth_planner.cli.record:main',
-            'replay = rrth_planner.cli.replay:main',
-            'reproduce = rrth_planner.cli.reproduce:main',
-            'viewer = rrth_planner.cli.viewer:main',
-            'write_urdf = rrth_planner.cli.write_urdf:main',
-        ],
+        'console_scripts': ['rrth = rrth_planner.cli.rrth:main'] if IS_WHEEL else executables,
     },
 )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 import os
-from pathlib import Path
 import signal
 import sys
 from typing import Any, NoReturn
@@ -16,6 +15,7 @@ from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
+from rrth_planner.cli.demo_options import parser
 from rrth_planner.collision.motion_inspection import inspect_motion
 from rrth_planner.collision.reference_checker import first_contact, least_clearance
 from rrth_planner.io.arm_file import load_arm
@@ -44,7 +44,7 @@ HEADER = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo and return the exit code."""
-    options = _parse(arguments)
+    options = parser().parse_args(arguments)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, _end)
     try:
@@ -56,31 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print('demo interrupted', file=sys.stderr)
         return 130
     return 0
-
-
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog='demo',
-        description='Plan and play motions round a wearer, check them independently, draw them.',
-    )
-    parser.add_argument(
-        '--output', type=Path, default=Path('demo.png'), help='picture to write (%(default)s)'
-    )
-    parser.add_argument('--seed', type=int, default=1, help='of the planner; -1: fresh')
-    parser.add_argument(
-        '--timeout', type=float, default=180.0, help='longest wait for anything [s] (%(default)s)'
-    )
-    parser.add_argument(
-        '--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)'
-    )
-    parser.add_argument(
-        '--targets',
-        nargs='+',
-        default=['front', 'left', 'high'],
-        metavar='NAME',
-        help='msg_examples/target_NAME.yaml each (front left high)',
-    )
-    return parser.parse_args(arguments)
 
 
 def _run(options: argparse.Namespace) -> None:

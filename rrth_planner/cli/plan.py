@@ -4,27 +4,28 @@
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 import json
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
-from rrth_planner.kernels.jit import cache_folder, is_compiled
-from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+
+if TYPE_CHECKING:
+    from rrth_planner.pipeline.motion_plan import MotionPlan
 
 SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 2**31
@@ -47,8 +48,8 @@ of them each joint follows the quintic that fits both. A file whose name ends in
 and a line a point, .yaml says the same as YAML. Without --period there are as few points as fix
 the motion exactly.
 
-example:    ./run exec plan --target 1.5 0.8 0.6 --output motion.csv --period 0.01
-            ./run exec plan --arm config/examples/chest_arm.yaml \\
+example:    %(prog)s --target 1.5 0.8 0.6 --output motion.csv --period 0.01
+            %(prog)s --arm config/examples/chest_arm.yaml \\
                 --body config/examples/seated_body.yaml --target 1 0.5 0 --json
 """
 
@@ -59,10 +60,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except (RrthError, OSError) as problem:
-        print(f'plan: {one_line(str(problem))}', file=sys.stderr)
+        tell('plan', one_line(str(problem)))
         return WRONG
     except KeyboardInterrupt:
-        print('plan: interrupted', file=sys.stderr)
+        tell('plan', 'interrupted')
         return INTERRUPTED
 
 
@@ -74,11 +75,13 @@ def _run(options: argparse.Namespace) -> int:
     arm, scene = load_arm(options.arm), load_wearer(options.body)
     settings = _settings(options, arm)
     q_start, goal = _start(options, arm), PointingGoal(options.target)
+    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(tell, 'plan'))
+    from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+
     # What compiling and loading takes is not planning time.
-    if not is_compiled():
-        print('plan: compiling the planner, takes a minute or two', file=sys.stderr, flush=True)
-        if cache_folder() is not None:
-            compile_kernels()
     warm_up(arm, settings.options)
     seed = settings.seed if settings.seed >= 0 else int(np.random.default_rng().integers(SEEDS))
     plan = plan_motion(
@@ -106,7 +109,7 @@ def _run(options: argparse.Namespace) -> int:
         print('\n'.join(_lines(figures, options.output)))
     if plan.status is PlanStatus.SOLVED:
         return SOLVED
-    print(f'plan: {plan.status.value}: {plan.sentence}', file=sys.stderr)
+    tell('plan', f'{plan.status.value}: {plan.sentence}')
     return REFUSED
 
 
@@ -137,7 +140,7 @@ def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
 
 
-def _figures(arm: ArmModel, q_start: Array, plan: MotionPlan) -> dict[str, Any]:
+def _figures(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any]:
     """Return what there is to say of a plan; a unit ends its name."""
     figures: dict[str, Any] = {
         'status': plan.status.value,
@@ -189,7 +192,7 @@ def _listed(numbers: Any) -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='plan',
+        prog=program('plan'),
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -4,14 +4,15 @@
 
 import argparse
 from collections.abc import Sequence
-from importlib.util import find_spec
+from functools import partial
 from pathlib import Path
 import sys
+from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.execution.recording import section
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
@@ -20,16 +21,16 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-from rrth_planner.visualization.motion_figure import Motion, motion_figure
-from rrth_planner.visualization.recording_figure import recording_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')
-TOOLS = ('rclpy', 'mcap', 'mcap_ros2')
+TOOLS = (ROS, 'mcap', 'mcap_ros2')
 EXAMPLES = """\
-examples:   ./run exec plot plan --target 0.3 1.4 0.4 -o plan.png
-            ./run exec plot recording run.mcap -o run.svg --begin 20 --end 30
+examples:   %(prog)s plan --target 0.3 1.4 0.4 -o plan.png
+            %(prog)s recording run.mcap -o run.svg --begin 20 --end 30
 """
 
 
@@ -38,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         _check_output(options.output)
+        require('tools', 'matplotlib')
         figure = options.draw(options)
         try:
             figure.savefig(options.output, dpi=DOTS_PER_INCH)
@@ -46,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 f'{options.output}: {problem.strerror}, expected to write there'
             ) from problem
     except (RrthError, OSError) as problem:
-        print(f'plot: {one_line(" ".join(str(problem).split()))}', file=sys.stderr)
+        tell('plot', one_line(' '.join(str(problem).split())))
         return 1
     except KeyboardInterrupt:
-        print('plot: interrupted', file=sys.stderr)
+        tell('plot', 'interrupted')
         return 130
     print(options.output)
     return 0
@@ -63,10 +65,17 @@ def _check_output(output: Path) -> None:
         raise OptionsError(f'-o {output}: its folder does not exist, expected one that does')
 
 
-def _draw_plan(options: argparse.Namespace) -> Figure:
+def _draw_plan(options: argparse.Namespace) -> 'Figure':
     arm, settings = _arm_and_settings(options)
     scene, goal = load_wearer(options.body), PointingGoal(options.target)
     q_start = _start(arm, options.start)
+    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(tell, 'plot'))
+    from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+    from rrth_planner.visualization.motion_figure import Motion, motion_figure
+
     warm_up(arm, settings.options)
     plan = plan_motion(
         arm,
@@ -93,22 +102,18 @@ def _draw_plan(options: argparse.Namespace) -> Figure:
     return motion_figure(arm, scene, [motion], settings.limits, settings.ray_guard_length)
 
 
-def _draw_recording(options: argparse.Namespace) -> Figure:
-    missing = [name for name in TOOLS if find_spec(name) is None]
-    if missing:
-        raise OptionsError(
-            f'{", ".join(missing)}: not installed, expected ROS 2 and what '
-            'requirements/tools.txt lists'
-        )
+def _draw_recording(options: argparse.Namespace) -> 'Figure':
+    require('ros,tools', *TOOLS)
     # Not before it is known that they are there; plans are drawn without.
+    from rrth_planner.execution.recording import section
     from rrth_planner.ros.client.recording_reader import RecordingReader
+    from rrth_planner.visualization.recording_figure import recording_figure
 
     arm, settings = _arm_and_settings(options)
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
     for topic, sentence in reader.refused.items():
-        said = one_line(f'plot: {topic}: bad messages are left out: {sentence}')
-        print(said, file=sys.stderr)
+        tell('plot', one_line(f'{topic}: bad messages are left out: {sentence}'))
     if options.begin is not None or options.end is not None:
         last = float(recording.times[-1])
         begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)
@@ -151,7 +156,7 @@ def _seed(given: int) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='plot',
+        prog=program('plot'),
         description='Draw a plan or a recorded run: PNG, SVG or PDF by the ending of the file.',
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,

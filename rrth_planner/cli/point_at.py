@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
-from importlib.util import find_spec
 import json
 from pathlib import Path
 import signal
@@ -19,6 +18,8 @@ from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rrth_planner.cli.point_at_options import parser
+from rrth_planner.cli.program import tell
+from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
@@ -72,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
-        print(f'point_at: {_of_ros_args(problem)}', file=sys.stderr)
+        tell('point_at', _of_ros_args(problem))
         return USAGE
     report = Report(arrived=None if options.no_move else False)
     try:
@@ -93,8 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace, given: list[str], report: Report, stack: ExitStack) -> None:
-    if find_spec('tqdm') is None:
-        raise UsageError('tqdm: not installed, expected what requirements/tools.txt lists')
+    require('tools', 'tqdm')
     # A bad file is said before anything is waited for.
     if options.body is not None:
         _body(options.body, '')
@@ -184,7 +184,7 @@ def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> Ma
 
 def _print(report: Report) -> None:
     if report.name is None or report.exit_code in (NOT_HEARD, NOT_ARRIVED, INTERRUPTED):
-        print(f'point_at: {report.sentence}', file=sys.stderr)
+        tell('point_at', report.sentence)
         return
     stream = sys.stdout if report.exit_code == DONE else sys.stderr
     print(f'{report.name} ({report.code}): {report.sentence}', file=stream)

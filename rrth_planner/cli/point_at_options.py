@@ -6,19 +6,21 @@ import argparse
 import math
 from pathlib import Path
 
+from rrth_planner.cli.program import program
+
 DESCRIPTION = """\
 Have the planner turn the arm so that it points at X Y Z [m], and wait until it does. A planner
 node and an arm (playback_node, or a controller) have to run in the same ROS domain."""
 EPILOG = """\
 examples:
-  point_at 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
-  point_at 0.2 1.4 -0.1                     to the left, a little down
-  point_at 1.5 0.1 0.3 --body config/body.yaml
+  %(prog)s 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
+  %(prog)s 0.2 1.4 -0.1                     to the left, a little down
+  %(prog)s 1.5 0.1 0.3 --body config/body.yaml
                                             tell the planner the wearer's body first
-  point_at 1.5 0.1 0.3 --no-move            say how the arm would move, and let it stand
-  point_at 1.5 0.1 0.3 --json | jq .figures.duration
-  point_at 1.5 0.1 0.3 --timeout 5 || echo "not there: $?"
-  point_at 1.5 0.1 0.3 --ros-args -r __ns:=/left
+  %(prog)s 1.5 0.1 0.3 --no-move            say how the arm would move, and let it stand
+  %(prog)s 1.5 0.1 0.3 --json | jq .figures.duration
+  %(prog)s 1.5 0.1 0.3 --timeout 5 || echo "not there: $?"
+  %(prog)s 1.5 0.1 0.3 --ros-args -r __ns:=/left
 
 exit codes:
   0    the arm has arrived; with --no-move: there is a motion
@@ -41,7 +43,7 @@ that is heard on body_boxes: a publisher that neither latches nor repeats it is 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of everything but the words for ROS."""
     command = argparse.ArgumentParser(
-        prog='point_at',
+        prog=program('point_at'),
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

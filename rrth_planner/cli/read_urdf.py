@@ -8,13 +8,13 @@ from pathlib import Path
 import sys
 
 import numpy as np
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.chain import RAYS, read_chain
 from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError, one_line, RrthError
 from rrth_planner.model.rotation import pose_matrix
-from rrth_planner.planning.pointing_goals import check_pointing_arm
 
 # Bars this much longer than all links together are no links.
 LONG = 2.0
@@ -33,7 +33,7 @@ exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (why, is printed)
           130  interrupted
 
-example:    ./run exec read_urdf config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
+example:    %(prog)s config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
                 --output my_arm.yaml --check 0 -0.5 1 0 0.3 0
 """
 
@@ -49,15 +49,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _import(options)
     except (RrthError, OSError) as problem:
-        print(f'read_urdf: {one_line(str(problem))}', file=sys.stderr)
+        tell('read_urdf', one_line(str(problem)))
         return 2
     except KeyboardInterrupt:
-        print('read_urdf: interrupted', file=sys.stderr)
+        tell('read_urdf', 'interrupted')
         return 130
     return 0
 
 
 def _import(options: argparse.Namespace) -> None:
+    # Not for --help: it has kernels, which take seconds to load and, once, to compile.
+    from rrth_planner.planning.pointing_goals import check_pointing_arm
+
     chain = read_chain(options.file, options.base, options.tool, options.ray)
     found = import_chain(chain, _mount(options.mount), options.radius)
     # As it will be read.
@@ -143,7 +146,7 @@ def _report_ray(found: ImportedArm, q: Array) -> list[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='read_urdf',
+        prog=program('read_urdf'),
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -5,18 +5,22 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 import sys
 import traceback
+from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.collision.checker_comparison import Verdict, verdict_of
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+
+if TYPE_CHECKING:
+    from rrth_planner.collision.checker_comparison import Verdict
+    from rrth_planner.pipeline.motion_plan import MotionPlan
 
 DESCRIPTION = """\
 Play back an incident of the planner: a motion that its certificate had proven free and that
@@ -34,7 +38,7 @@ exit codes: 0  it happens again as recorded
 A plan whose time ran out (time_limit, improve_time) need not be the same on another machine, and
 other versions of the libraries may round differently; where versions differ, that is printed.
 
-example:    ./run exec replay ~/.ros/log/rrth_planner/incident-20261121T213655123456-1f0c2a.yaml
+example:    %(prog)s ~/.ros/log/rrth_planner/incident-20261121T213655123456-1f0c2a.yaml
 """
 
 
@@ -42,7 +46,7 @@ example:    ./run exec replay ~/.ros/log/rrth_planner/incident-20261121T21365512
 class Answer:
     """What planning again led to: a plan, or an error and where it came from."""
 
-    plan: MotionPlan | None = None
+    plan: 'MotionPlan | None' = None
     error: str = ''
     sentence: str = ''
     traceback: str = ''
@@ -69,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         incident = read_incident(options.file)
     except RrthError as problem:
-        print(f'replay: {" ".join(str(problem).split())}', file=sys.stderr)
+        tell('replay', ' '.join(str(problem).split()))
         return 2
     return replay(incident)
 
@@ -104,6 +108,12 @@ def replay(incident: Incident) -> int:
 
 def plan_again(incident: Incident) -> Answer:
     """Return what the question of an incident leads to now."""
+    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(tell, 'replay'))
+    from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+
     question = incident.question
     try:
         # What compiles here must not count as planning time.
@@ -113,8 +123,10 @@ def plan_again(incident: Incident) -> Answer:
         return Answer(None, type(problem).__name__, str(problem), traceback.format_exc())
 
 
-def verdict_of_recorded(incident: Incident, trajectory: Trajectory) -> Verdict:
+def verdict_of_recorded(incident: Incident, trajectory: Trajectory) -> 'Verdict':
     """Return what the judges say now of a motion, round the wearer that it was judged for."""
+    from rrth_planner.collision.checker_comparison import verdict_of
+
     question = incident.question
     return verdict_of(
         question.arm,
@@ -166,7 +178,7 @@ def _print_record(incident: Incident) -> None:
             print(f'  {name}: {before} then, {after} now')
 
 
-def _print_verdict(verdict: Verdict, margin: float) -> None:
+def _print_verdict(verdict: 'Verdict', margin: float) -> None:
     print(f'the recorded motion, distances to keep {margin:g} m:')
     columns = f'{"certificate":>12} {"fcl [m]":>12} {"oracle [m]":>12}  closest for fcl'
     print(f'  {"piece":>5} {"from [s]":>9} {"to [s]":>9} {columns}')
@@ -189,7 +201,7 @@ def _print_verdict(verdict: Verdict, margin: float) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='replay',
+        prog=program('replay'),
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

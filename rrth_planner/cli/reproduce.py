@@ -5,17 +5,21 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 import os
 from pathlib import Path
 import platform
 import sys
+from typing import TYPE_CHECKING
 
-from rrth_planner.model.errors import RrthError
-from rrth_planner.reproduction.experiments import Extent, QUICK, spread_runs, timed_runs
-from rrth_planner.reproduction.run import processor_name, source_digest
+from rrth_planner.cli.program import program, tell
+from rrth_planner.io.extras import require
+from rrth_planner.model.errors import NotInstalledError, OptionsError, RrthError
 
-MISSING = """{}: the reproduction needs more libraries than the planner; install them by
-    pip install -r requirements/campaign.txt"""
+if TYPE_CHECKING:
+    from rrth_planner.reproduction.experiments import Extent
+
+LIBRARIES = ('distributed', 'pyarrow', 'tqdm', 'matplotlib')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,15 +27,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else arguments
     options = _parser().parse_args(arguments)
     try:
-        from rrth_planner.reproduction.cluster import cluster_client, run_campaign
-        from rrth_planner.reproduction.figures.all import draw_pictures
-        from rrth_planner.reproduction.report import report
-        from rrth_planner.reproduction.row_store import read_rows, replace_file
-        from rrth_planner.reproduction.statistics import Rows
-    except ImportError as problem:
-        print(MISSING.format(problem), file=sys.stderr)
+        require('campaign', *LIBRARIES)
+    except NotInstalledError as problem:
+        tell('reproduce', str(problem))
         return 2
-    extent = _extent(options)
+    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+    from rrth_planner.kernels.precompile import prepare_kernels
+
+    prepare_kernels(partial(tell, 'reproduce'))
+    from rrth_planner.reproduction.cluster import cluster_client, run_campaign
+    from rrth_planner.reproduction.experiments import spread_runs, timed_runs
+    from rrth_planner.reproduction.figures.all import draw_pictures
+    from rrth_planner.reproduction.report import report
+    from rrth_planner.reproduction.row_store import read_rows, replace_file
+    from rrth_planner.reproduction.run import processor_name, source_digest
+    from rrth_planner.reproduction.statistics import Rows
+
+    try:
+        extent = _extent(options)
+    except OptionsError as problem:
+        tell('reproduce', str(problem))
+        return 2
     output = options.output or Path('build/reproduction' if options.quick else 'docs')
     data = options.data or output / 'reproduction.parquet'
     try:
@@ -55,14 +71,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'interrupted; the next start goes on from {data}', file=sys.stderr)
         return 130
     except (RrthError, OSError) as problem:
-        print(f'reproduce: {problem}', file=sys.stderr)
+        tell('reproduce', str(problem))
         return 1
     print(f'{target}: {len(rows)} runs of the sources {source_digest()}; rows in {data}')
     return 0
 
 
-def _extent(options: argparse.Namespace) -> Extent:
-    """Return how many runs the command line asks for."""
+def _extent(options: argparse.Namespace) -> 'Extent':
+    """Return how many runs the command line asks for, of which problems."""
+    from rrth_planner.reproduction.experiments import Extent, QUICK
+
+    for name in ('maps', 'targets'):
+        known = getattr(Extent(), name)
+        for given in getattr(options, name) or ():
+            if given not in known:
+                raise OptionsError(f'--{name} {given}, expected some of {", ".join(known)}')
     extent = QUICK if options.quick else Extent()
     if options.runs:
         few, many = min(options.runs), max(options.runs)
@@ -83,7 +106,7 @@ def _extent(options: argparse.Namespace) -> Extent:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='reproduce', description=__doc__)
+    parser = argparse.ArgumentParser(prog=program('reproduce'), description=__doc__)
     parser.add_argument('--quick', action='store_true', help='few runs: a minute or two')
     parser.add_argument(
         '--output',
@@ -103,9 +126,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--seeds', type=_positive, metavar='N', help='runs behind each share and draw (1000)'
     )
-    parser.add_argument('--maps', nargs='+', choices=Extent().maps, help='only these maps')
+    parser.add_argument('--maps', nargs='+', metavar='NAME', help='only these maps')
     parser.add_argument(
-        '--targets', nargs='+', choices=Extent().targets, help='only these targets of the arm'
+        '--targets', nargs='+', metavar='NAME', help='only these targets of the arm'
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(

@@ -5,7 +5,7 @@
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
-from importlib.util import find_spec
+from functools import partial
 from io import StringIO
 import os
 from pathlib import Path
@@ -15,15 +15,14 @@ import sys
 from typing import Any, NoReturn
 import webbrowser
 
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
-from rrth_planner.kernels.jit import cache_folder, is_compiled
-from rrth_planner.kernels.precompile import compile_kernels
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.pipeline.plan_motion import warm_up
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.examples import example_target, start_of
 from rrth_planner.visualization.viewer.screenshot import save_picture
@@ -42,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _run(options, ros_args)
     except (RrthError, OSError) as problem:
-        print(f'viewer: {" ".join(str(problem).split())}', file=sys.stderr)
+        tell('viewer', ' '.join(str(problem).split()))
         return 1
     except KeyboardInterrupt:
         pass
@@ -51,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog='viewer',
+        prog=program('viewer'),
         description='Show the planner in the browser: drag the target, and it plans anew. '
         'Ctrl-C ends it.',
         epilog=f'With --live, what follows {ROS_ARGS} is for ROS: remaps, parameters.',
@@ -96,8 +95,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
     if ros_args and not options.live:
         raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
-    if find_spec('viser') is None:
-        raise OptionsError('viser: not installed, expected for the page (pip install viser)')
+    require('tools', 'viser')
     if options.live:
         _run_live(options, ros_args)
     else:
@@ -106,14 +104,14 @@ def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
 
 def _run_planning(options: argparse.Namespace) -> None:
     """Serve the page that plans itself."""
-    from rrth_planner.visualization.viewer.page import ViewerPage
+    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+    from rrth_planner.kernels.precompile import prepare_kernels
 
     question = _question(options)
-    if not is_compiled():
-        how_often = 'at every start' if cache_folder() is None else 'once for this machine'
-        print(f'Compiling the planner, {how_often}: takes a minute or two.', flush=True)
-        if cache_folder() is not None:
-            compile_kernels()
+    prepare_kernels(partial(tell, 'viewer'))
+    from rrth_planner.pipeline.plan_motion import warm_up
+    from rrth_planner.visualization.viewer.page import ViewerPage
+
     warm_up(question.arm, question.options)
     with _served(options) as (server, url):
         page = ViewerPage(server, question)
@@ -131,8 +129,7 @@ def _run_planning(options: argparse.Namespace) -> None:
 
 def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
     """Serve the page that follows the nodes."""
-    if find_spec('rclpy') is None:
-        raise OptionsError('rclpy: not installed, expected for --live (source ROS 2 Jazzy)')
+    require('ros,tools', ROS)
     if options.screenshot or options.body or options.target or options.set:
         raise OptionsError(
             '--live: given with --screenshot, --body, --target or --set, expected without: the '

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
+from rrth_planner.cli.program import program, tell
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
@@ -26,7 +27,7 @@ says anything: it is written as 0, and has to be filled in for a simulation of f
 exit codes: 0  written
             2  not written (why, is printed)
 
-example:    ./run exec write_urdf --arm my_arm.yaml --output my_arm.urdf
+example:    %(prog)s --arm my_arm.yaml --output my_arm.urdf
 """
 
 
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             _write(options.output, text)
     except RrthError as problem:
-        print(f'write_urdf: {problem}', file=sys.stderr)
+        tell('write_urdf', str(problem))
         return 2
     return 0
 
@@ -78,7 +79,7 @@ def _write(path: Path, text: str) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='write_urdf',
+        prog=program('write_urdf'),
         description=DESCRIPTION,
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -1,11 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files that come with the package, found in a source tree and when installed."""
+"""Files that come with the package, found in a source tree and however it is installed."""
 
 from pathlib import Path
-import sys
 
 from rrth_planner.model.errors import ModelError
+
+PACKAGE = Path(__file__).parents[1]
 
 
 def resource_path(name: str) -> Path:
@@ -20,23 +21,22 @@ def resource_path(name: str) -> Path:
     Raises
     ------
     ModelError
-        It is neither beside the package nor in the share folder of an installation.
+        It is neither in the package, as pip installs it, nor beside it, as in a source tree, nor
+        in its share folder, as colcon installs it.
 
     """
-    folders = [Path(__file__).parents[2], *_share_folders()]
+    folders = [PACKAGE, PACKAGE.parent, *_share_folder()]
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
     raise ModelError(f'file {name}: not found, expected in one of {[str(f) for f in folders]}')
 
 
-def _share_folders() -> list[Path]:
-    folders = [Path(sys.prefix) / 'share' / 'rrth_planner']
+def _share_folder() -> list[Path]:
     try:
         # Only where ROS 2 is: the core also works without.
         from ament_index_python.packages import get_package_share_directory
 
-        folders.insert(0, Path(get_package_share_directory('rrth_planner')))
+        return [Path(get_package_share_directory(PACKAGE.name))]
     except (ImportError, LookupError, OSError):
-        pass
-    return folders
+        return []

@@ -5,6 +5,7 @@
 from collections.abc import Callable
 import contextlib
 import hashlib
+import logging
 import os
 from pathlib import Path
 import sys
@@ -98,12 +99,15 @@ BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
 # The file that says that all kernels of the planner are there.
 COMPLETE = 'complete'
 
+FOLDER = Path(__file__).parent
+_LOGGER = logging.getLogger('rrth_planner')
+
 
 def _cache_folder() -> Path | None:
     """Return the folder of the compiled code, or None where none can be kept."""
     # A kernel of another file may be part of what is kept, so all sources name the folder.
     digest = hashlib.sha256(f'{numba.__version__} {sys.implementation.cache_tag}'.encode())
-    for source in sorted(Path(__file__).parent.rglob('*.py')):
+    for source in sorted(FOLDER.rglob('*.py')):
         digest.update(source.read_bytes())
     root = os.environ.get('RRTH_CACHE_DIR') or os.path.join(
         os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache'),
@@ -130,7 +134,7 @@ def _warn_once(folder: Path | None, problem: Exception) -> None:
         )
 
 
-_has_warned = False
+_has_warned = _has_told = False
 _folder = _cache_folder()
 use_slim_libraries()
 
@@ -159,6 +163,27 @@ def mark_compiled() -> None:
             (_folder / COMPLETE).touch(mode=0o600)
 
 
+def compiling_notice() -> str:
+    """
+    Return, once a process, what to say before kernels are compiled; after that, nothing.
+
+    Who says it, a node or a command, says it in its own way; otherwise the logger `rrth_planner`
+    warns of it when it begins, since its caller is about to wait.
+    """
+    global _has_told
+    if _has_told:
+        return ''
+    _has_told = True
+    how_often = 'at every start' if _folder is None else 'once for this machine'
+    return f'compiling kernels, {how_often}: takes up to two minutes'
+
+
+def _tell(function: Callable[..., Any]) -> None:
+    """Log that kernels are compiled; that of a new arm, or of a test, is no matter of minutes."""
+    if FOLDER in Path(function.__code__.co_filename).parents and (notice := compiling_notice()):
+        _LOGGER.warning(notice)
+
+
 def kernel(
     signature: Any, inline: str = 'never', is_short: bool = False
 ) -> Callable[[Callable[..., Any]], Any]:
@@ -180,8 +205,10 @@ def kernel(
     def decorate(function: Callable[..., Any]) -> Any:
         compiled = njit(**options)(function)
         if not config.DISABLE_JIT:
-            if _folder is not None:
-                compiled._cache = KeptCode(function, _folder, _give_up)
+            if _folder is None:
+                _tell(function)
+            else:
+                compiled._cache = KeptCode(function, _folder, _tell, _give_up)
             compiled.compile(signature)
             compiled.disable_compile()
         return compiled

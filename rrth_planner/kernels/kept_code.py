@@ -103,6 +103,8 @@ class KeptCode(NullCache):
     folder : Path
         Private, and another one for each state of the sources of all kernels: that a kernel of
         another file has changed is not seen here.
+    miss : callable
+        Told of the function whose code is not there, before it is compiled.
     give_up : callable
         Told of an OSError that kept the code from being written.
 
@@ -112,9 +114,11 @@ class KeptCode(NullCache):
         self,
         function: Callable[..., Any],
         folder: Path,
+        miss: Callable[[Callable[..., Any]], None],
         give_up: Callable[[OSError], None],
     ) -> None:
-        self._function, self._folder, self._give_up = function, folder, give_up
+        self._function, self._folder = function, folder
+        self._miss, self._give_up = miss, give_up
 
     def _file(self, signature: Any, codegen: Any) -> Path:
         """Return the file of the code for one signature and processor."""
@@ -130,13 +134,12 @@ class KeptCode(NullCache):
         """Return the code for a signature; None where it is to be compiled."""
         context.refresh()
         data = read_whole(self._file(signature, context.codegen()))
-        if data is None:
-            return None
-        try:
-            return CompileResult._rebuild(context, *pickle.loads(data))
-        except Exception:
-            # Whole, but of other versions of what it is made of.
-            return None
+        # What is whole may be of other versions of what it is made of.
+        with contextlib.suppress(Exception):
+            if data is not None:
+                return CompileResult._rebuild(context, *pickle.loads(data))
+        self._miss(self._function)
+        return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep the code for a signature."""

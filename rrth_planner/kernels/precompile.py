@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiling of what a plan needs, before it is needed: by two processes, kept for all others."""
 
+from collections.abc import Callable
 import os
 from pathlib import Path
 import subprocess
 import sys
+
+from rrth_planner.kernels.jit import cache_folder, compiling_notice, is_compiled
 
 # What either process compiles, about as much each, the one what the other does not ask for soon.
 SHARES = (
@@ -26,6 +29,20 @@ SHARES = (
         'kinematics.goal_selection',
     ),
 )
+
+
+def prepare_kernels(say: Callable[[str], object]) -> None:
+    """
+    Compile the kernels of the default planner if they are not, and have said so before.
+
+    To be called before anything is imported that has kernels.
+    """
+    if is_compiled():
+        return
+    if notice := compiling_notice():
+        say(notice)
+    if cache_folder() is not None:
+        compile_kernels()
 
 
 def compile_kernels() -> bool:

@@ -54,6 +54,10 @@ class OptionsError(RrthError):
     """A planner option or motion limit outside its range."""
 
 
+class NotInstalledError(RrthError):
+    """A library that not every installation has, and that is needed now."""
+
+
 class MessageError(RrthError):
     """Input from the wire that is refused."""
 

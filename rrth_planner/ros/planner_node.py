@@ -21,8 +21,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.kernels.jit import cache_folder, is_compiled
-from rrth_planner.kernels.precompile import compile_kernels
+from rrth_planner.kernels.precompile import prepare_kernels
 from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
 from rrth_planner.pipeline.planning_process import Planner, PlanningProcess
 from rrth_planner.ros.interface.parameters import (
@@ -126,11 +125,7 @@ class PlannerNode(Node):
                 'python-fcl: not installed, expected for the second check of every motion '
                 '(pip install python-fcl)'
             )
-        if not is_compiled():
-            how_often = 'at every start' if cache_folder() is None else 'once for this machine'
-            self.get_logger().info(f'compiling kernels, {how_often}: takes one or two minutes')
-            if cache_folder() is not None:
-                compile_kernels()
+        prepare_kernels(self.get_logger().info)
 
     def _on_death(self, sentence: str) -> None:
         self.get_logger().error(sentence)

@@ -27,7 +27,7 @@ FOLDED = load_yaml(resource_path('config/playback.yaml'))['/**']['ros__parameter
 
 def sentence(said):
     """Return the one line that was said, but for that of a planner that had to be compiled."""
-    (line,) = (line for line in said.splitlines() if 'compiling the planner' not in line)
+    (line,) = (line for line in said.splitlines() if 'compiling kernels' not in line)
     return line
 
 
@@ -148,6 +148,6 @@ def test_an_interrupt_is_a_sentence(monkeypatch, capsys):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plan, 'plan_motion', interrupted)
+    monkeypatch.setattr('rrth_planner.pipeline.plan_motion.plan_motion', interrupted)
     assert plan.main(TARGET) == 130
     assert sentence(capsys.readouterr().err) == 'plan: interrupted'

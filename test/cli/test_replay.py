@@ -201,7 +201,7 @@ def test_an_error_is_reproduced_by_an_error_of_the_same_kind(monkeypatch, capsys
     assert (
         'not reproduced: recorded was ZeroDivisionError, now: solved: ' in capsys.readouterr().out
     )
-    monkeypatch.setattr(replay, 'plan_motion', fail)
+    monkeypatch.setattr('rrth_planner.pipeline.plan_motion.plan_motion', fail)
     assert replay.main([str(path)]) == 0
     assert 'reproduced: ZeroDivisionError, as recorded' in capsys.readouterr().out
 
@@ -253,7 +253,7 @@ def test_the_help_teaches(capsys):
         replay.main(['--help'])
     assert end.value.code == 0
     out = capsys.readouterr().out
-    for word in ('FILE', 'exit codes:', 'needs no ROS', './run exec replay'):
+    for word in ('FILE', 'exit codes:', 'needs no ROS', 'replay ~/.ros'):
         assert word in out
 
 

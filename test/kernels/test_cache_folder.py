@@ -52,6 +52,14 @@ chain_of(rows)(np.zeros(1), 0.0, points, 0)
 print(points[4], *compiled, file=sys.stderr)
 """
 
+# The planner's own kernels, of which these take little time.
+OWN = """
+import sys
+import rrth_planner.kernels.kinematics.trigonometry
+print('done', file=sys.stderr)
+"""
+SILENT = "import logging; logging.getLogger('rrth_planner').setLevel(logging.ERROR)"
+
 
 def run(code, folder, tmp_path):
     """Return the lines that a script writes to stderr; it lies in a file, as numba asks."""
@@ -95,6 +103,15 @@ def test_a_folder_of_ones_own_is_used_without_a_word(tmp_path):
     for made in (folder.parent, folder, first.parent):
         assert made.stat().st_mode & 0o777 == 0o700
     assert first.stat().st_mode & 0o777 == 0o600
+
+
+def test_that_kernels_are_compiled_is_logged_once_a_machine(tmp_path):
+    told = 'compiling kernels, once for this machine: takes up to two minutes'
+    assert run(OWN, tmp_path / 'cache', tmp_path) == [told, 'done']
+    assert run(OWN, tmp_path / 'cache', tmp_path) == ['done']
+    assert run(SILENT + OWN, tmp_path / 'other', tmp_path) == ['done']
+    *_, line, done = run(OWN, '/proc/nothing/here', tmp_path)
+    assert (line, done) == (told.replace('once for this machine', 'at every start'), 'done')
 
 
 @pytest.mark.parametrize('where', ['below a file', '/proc'])

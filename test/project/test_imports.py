@@ -68,15 +68,17 @@ FCL_USERS = {
     'rrth_planner.ros.requests.stop_validation',
 }
 # Modules that import of the project below their top: the node says that it compiles before it
-# imports what has to be compiled, a command which libraries it misses before it imports what needs
-# them, what only one option of a command needs takes seconds to load, and a playback needs
-# kernels for stops only.
+# imports what has to be compiled, a command so too, and which libraries it misses before it
+# imports what needs them, what only one option of a command needs takes seconds to load, and a
+# playback needs kernels for stops only.
 LATE = {
     'rrth_planner.ros.planner_node',
     'rrth_planner.execution.playback',
     *(
         f'rrth_planner.cli.{name}'
-        for name in ('plot', 'point_at', 'record', 'reproduce', 'viewer')
+        for name in (
+            *('plan', 'plot', 'point_at', 'read_urdf', 'record', 'replay', 'reproduce', 'viewer'),
+        )
     ),
 }
 
@@ -161,6 +163,7 @@ def test_the_rooms_are_those_of_the_table():
     assert {path.name for path in ROOT.iterdir() if path.name != '__pycache__'} == {
         *MAY,
         '__init__.py',
+        'py.typed',
     }
 
 

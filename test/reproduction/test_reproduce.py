@@ -40,8 +40,8 @@ def test_the_scheduler_that_is_named_does_the_runs_and_a_bar_shows_how_far_they_
         run.Run(problem='c_shape', algorithm=RRT, options=ALGORITHMS[RRT], seed=seed)
         for seed in range(6)
     ]
-    monkeypatch.setattr('rrth_planner.cli.reproduce.timed_runs', lambda _: asked[:2])
-    monkeypatch.setattr('rrth_planner.cli.reproduce.spread_runs', lambda _: asked[2:])
+    monkeypatch.setattr('rrth_planner.reproduction.experiments.timed_runs', lambda _: asked[:2])
+    monkeypatch.setattr('rrth_planner.reproduction.experiments.spread_runs', lambda _: asked[2:])
     # Six runs fill no table.
     monkeypatch.setattr('rrth_planner.reproduction.report.report', lambda *_: 'told')
     monkeypatch.setattr('rrth_planner.reproduction.figures.all.draw_pictures', lambda *_: {})

@@ -25,7 +25,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
 from rrth_planner.cli.plot import main as plot  # noqa: E402
-from rrth_planner.cli.record import TOPICS  # noqa: E402
+from rrth_planner.cli.record import TOPICS, TYPES  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
 from rrth_planner.ros.messages.definitions import definition_of, type_name  # noqa: E402
@@ -160,7 +160,8 @@ def test_a_recorder_ends_well_and_says_what_it_has(run):
 def test_all_topics_of_a_run_are_there_with_their_types(run):
     with rosbags.AnyReader([run[0]]) as reader:
         types = {c.topic.lstrip('/'): c.msgtype for c in reader.connections}
-    assert types == {topic.lstrip('/'): type_name(kind) for topic, kind in TOPICS.items()}
+    expected = zip(TOPICS, TYPES, strict=True)
+    assert types == {topic.lstrip('/'): type_name(kind) for topic, kind in expected}
 
 
 def test_the_recorded_trajectory_is_the_one_that_was_heard(run):
@@ -369,7 +370,7 @@ def test_a_disk_that_is_full_ends_the_recording_with_one_sentence(tmp_path):
     assert said == f'{path}: File too large, expected to write there'
 
 
-@pytest.mark.parametrize('kind', [*dict.fromkeys([*TOPICS.values(), String])], ids=type_name)
+@pytest.mark.parametrize('kind', [*dict.fromkeys([*TYPES, String])], ids=type_name)
 def test_definitions_are_those_that_others_know(kind):
     name = type_name(kind)
     found = get_types_from_msg(definition_of(kind), name)

@@ -12,7 +12,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue  # n
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
-from rrth_planner.cli import plot  # noqa: E402
 from rrth_planner.cli.plot import main  # noqa: E402
 from rrth_planner.execution.recording import brakes  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
@@ -251,7 +250,7 @@ def test_times_below_zero_count_from_the_end(tmp_path, monkeypatch, arguments, e
         drawn.append(recording.times[[0, -1]])
         return Figure()
 
-    monkeypatch.setattr(plot, 'recording_figure', figure)
+    monkeypatch.setattr('rrth_planner.visualization.recording_figure.recording_figure', figure)
     path = write(tmp_path / 'run.mcap', *STATES)
     assert main(['recording', str(path), *arguments, '-o', str(tmp_path / 'run.png')]) == 0
     np.testing.assert_allclose(drawn, [expected], atol=1e-5)

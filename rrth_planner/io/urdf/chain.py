@@ -4,7 +4,6 @@
 
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.util import find_spec
 import io
 import logging
 import math
@@ -13,6 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from rrth_planner.io.extras import require
 from rrth_planner.io.text_file import load_xml
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
@@ -119,16 +119,12 @@ def read_chain(
     Raises
     ------
     ModelError
-        The file is no URDF, or there is no chain of joints that an arm may have; what reads it is
-        not installed.
+        The file is no URDF, or there is no chain of joints that an arm may have.
+    NotInstalledError
+        What reads it is missing.
 
     """
-    missing = [name for name in TOOLS if find_spec(name) is None]
-    if missing:
-        raise ModelError(
-            f'{", ".join(missing)}: not installed, expected what requirements/tools.txt lists '
-            f'(pip install {" ".join(missing)})'
-        )
+    require('tools', *TOOLS)
     if ray not in RAYS:
         raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
     model = _load(Path(path))

@@ -1,0 +1,34 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the demo is told, and what it tells about itself."""
+
+import argparse
+from pathlib import Path
+
+from rrth_planner.cli.program import program
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all arguments."""
+    command = argparse.ArgumentParser(
+        prog=program('demo'),
+        description='Plan and play motions round a wearer, check them independently, draw them.',
+    )
+    command.add_argument(
+        '--output', type=Path, default=Path('demo.png'), help='picture to write (%(default)s)'
+    )
+    command.add_argument('--seed', type=int, default=1, help='of the planner; -1: fresh')
+    command.add_argument(
+        '--timeout', type=float, default=180.0, help='longest wait for anything [s] (%(default)s)'
+    )
+    command.add_argument(
+        '--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)'
+    )
+    command.add_argument(
+        '--targets',
+        nargs='+',
+        default=['front', 'left', 'high'],
+        metavar='NAME',
+        help='msg_examples/target_NAME.yaml each (front left high)',
+    )
+    return command

@@ -1,0 +1,166 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The one command of an installation by pip: every other command is a subcommand of it."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+import sys
+from typing import Any
+
+from rrth_planner import __version__
+from rrth_planner.cli.program import program, tell
+from rrth_planner.io.extras import require, ROS
+from rrth_planner.io.resources import resource_path
+from rrth_planner.model.errors import NotInstalledError
+
+HELP = ('-h', '--help')
+WRONG = 2
+NODE_HELP = """\
+What follows --ros-args is for ROS: parameters (-p seed:=1, --params-file FILE), remaps, the
+namespace. All parameters, with units, ranges and defaults, are in
+  {}
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """
+    A command and what loading it takes.
+
+    Parameters
+    ----------
+    summary : str
+        What it does, for the list of all.
+    module : str
+        Of the package, with its `main`.
+    parser : str
+        Module with its `parser`, where `module` itself needs ROS to be loaded.
+    settings : str
+        The parameters of a node, which has no arguments of its own.
+    needs : tuple of str
+        Libraries that it does not start without.
+    extras : str
+        What brings these.
+
+    """
+
+    summary: str
+    module: str
+    parser: str = ''
+    settings: str = ''
+    needs: tuple[str, ...] = ()
+    extras: str = ''
+
+
+COMMANDS = {
+    'plan': Command('plan from files to files', 'cli.plan'),
+    'plot': Command('draw a motion or a recording', 'cli.plot'),
+    'viewer': Command('the planner in the browser', 'cli.viewer'),
+    'read_urdf': Command('take over an arm from a URDF', 'cli.read_urdf'),
+    'write_urdf': Command('write the arm as a URDF', 'cli.write_urdf'),
+    'replay': Command('plan again what ended in an incident', 'cli.replay'),
+    'reproduce': Command("regenerate the paper's comparison", 'cli.reproduce'),
+    'planner_node': Command(
+        'the planner as a node',
+        'ros.planner_node',
+        settings='config/planner.yaml',
+        needs=(ROS,),
+        extras='ros',
+    ),
+    'playback_node': Command(
+        'a kinematic arm as a node',
+        'ros.playback_node',
+        settings='config/playback.yaml',
+        needs=(ROS,),
+        extras='ros',
+    ),
+    'point_at': Command(
+        'point the arm and wait until it has arrived',
+        'cli.point_at',
+        parser='cli.point_at_options',
+        needs=(ROS, 'tqdm'),
+        extras='ros,tools',
+    ),
+    'record': Command(
+        'record a run of the nodes as MCAP',
+        'cli.record',
+        parser='cli.record_options',
+        needs=(ROS, 'mcap', 'tqdm'),
+        extras='ros,tools',
+    ),
+    'demo': Command(
+        'both nodes, motions, a wearer who moves; judged and drawn',
+        'cli.demo',
+        parser='cli.demo_options',
+        needs=(ROS, 'matplotlib'),
+        extras='ros',
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given or given[0] not in COMMANDS:
+        # It ends here: by --help, --version or what is wrong.
+        _parser().parse_args(given[:1] or ['--help'])
+    name, rest = given[0], given[1:]
+    command = COMMANDS[name]
+    own = rest[: rest.index('--ros-args')] if '--ros-args' in rest else rest
+    if not set(own).isdisjoint(HELP) and (command.parser or command.settings):
+        _parser_of(name).print_help()
+        return 0
+    try:
+        require(command.extras, *command.needs)
+    except NotInstalledError as problem:
+        tell(name, str(problem))
+        return WRONG
+    return int(_load(command.module).main(rest))
+
+
+def _load(module: str) -> Any:
+    return import_module(f'rrth_planner.{module}')
+
+
+def _parser_of(name: str) -> argparse.ArgumentParser:
+    """Return what a command that needs ROS says of itself where there is none."""
+    command = COMMANDS[name]
+    if command.parser:
+        found = _load(command.parser).parser()
+        assert isinstance(found, argparse.ArgumentParser)
+        return found
+    return argparse.ArgumentParser(
+        prog=program(name),
+        usage='%(prog)s [--ros-args ...]',
+        description=f'{command.summary[0].upper()}{command.summary[1:]}.',
+        epilog=NODE_HELP.format(resource_path(command.settings)),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def _parser() -> argparse.ArgumentParser:
+    lists = {
+        title: '\n'.join(
+            f'  {name:14} {command.summary}'
+            for name, command in COMMANDS.items()
+            if (ROS in command.needs) == is_ros
+        )
+        for title, is_ros in (('commands', False), ('commands that need ROS 2 Jazzy', True))
+    }
+    parser = argparse.ArgumentParser(
+        prog='rrth',
+        usage='%(prog)s COMMAND ...',
+        description='Motion planner for a body-worn pointing arm.',
+        epilog='\n\n'.join(f'{title}:\n{text}' for title, text in lists.items())
+        + '\n\nrrth COMMAND --help says more of each.',
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
+    parser.add_argument('command', metavar='COMMAND', choices=COMMANDS, help='one of these:')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

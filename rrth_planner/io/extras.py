@@ -1,0 +1,37 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Libraries that only some installations have, and the extra of the package that brings them."""
+
+from importlib.util import find_spec
+
+from rrth_planner.model.errors import NotInstalledError
+
+ROS = 'rclpy'
+
+
+def require(extras: str, *libraries: str) -> None:
+    """
+    Check that libraries are installed.
+
+    Parameters
+    ----------
+    extras : str
+        The extras of the package that bring them, as `ros,tools`.
+    libraries : str
+        As they are imported.
+
+    Raises
+    ------
+    NotInstalledError
+        Some are not: which, and what installs them.
+
+    """
+    missing = [name for name in libraries if find_spec(name) is None]
+    if not missing:
+        return
+    them = 'it' if len(missing) == 1 else 'them'
+    how = f"install {them} with: pip install 'rrth_planner[{extras}]'"
+    if ROS in missing:
+        missing[missing.index(ROS)] = f'ROS 2 Jazzy ({ROS})'
+        how = f'source ROS, or {how}'
+    raise NotInstalledError(f'needs {", ".join(missing)}; {how}')
