@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
 import os
 import pickle
+import signal
 import subprocess
 import sys
 from typing import Any, Protocol
@@ -176,15 +177,20 @@ class PlanningProcess:
 
     def _start(self) -> None:
         self._line, end = Pipe()
-        # Not by `multiprocessing`, which would run the script again that this process runs.
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', WORKER, str(end.fileno())],
-            stdin=subprocess.DEVNULL,
-            env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
-            pass_fds=[end.fileno()],
-            # Ctrl-C is for all processes of a terminal; this one ends with the one that asks it.
-            start_new_session=True,
-        )
+        # Ctrl-C is for all processes of a terminal; this one, which begins with the mask of its
+        # parent, ends with who asks it. A session of its own would have a share of the processors
+        # of its own, too, and may starve beside its parent's.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            # Not by `multiprocessing`, which would run the script again that this process runs.
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', WORKER, str(end.fileno())],
+                stdin=subprocess.DEVNULL,
+                env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
+                pass_fds=[end.fileno()],
+            )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         end.close()
         self._is_busy = False
         self._begin('warm_up', *self._warm_up)

@@ -158,6 +158,14 @@ def test_one_that_has_died_is_replaced_before_it_is_asked(process, said):
     assert process.pid != before
 
 
+def test_ctrl_c_does_not_end_it(process):
+    before = process.pid
+    os.kill(before, signal.SIGINT)
+    assert process.plan(question()).status is PlanStatus.SOLVED
+    assert process.pid == before
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, set())
+
+
 def test_an_error_is_raised_here_with_where_it_was_raised_there(process):
     with pytest.raises(AttributeError) as caught:
         process.violation_seen(None, None, None, 0.0, 0.0, 0.0)

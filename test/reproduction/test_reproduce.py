@@ -131,10 +131,13 @@ def test_whether_denser_points_cost_time_is_told_from_the_rows(output, n_slower,
 
 @pytest.mark.parametrize('arguments', [('--runs', '0'), ('--maps', 'moon'), ('--runs', 'ten')])
 def test_a_bad_command_line_is_refused(arguments, capsys):
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    assert end.value.code == 2
-    assert 'reproduce: error' in capsys.readouterr().err
+    # What the parser does not know the command does: names of maps, for which much is loaded.
+    try:
+        code = main(arguments)
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert 'reproduce: ' in capsys.readouterr().err
 
 
 def test_data_that_are_no_campaign_are_refused_in_one_sentence(tmp_path, capsys):
