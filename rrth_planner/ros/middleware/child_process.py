@@ -76,6 +76,11 @@ class ChildProcess:
             self._process.kill()
             self._process.wait()
 
+    @property
+    def pid(self) -> int:
+        """The number of the process."""
+        return self._process.pid
+
     def check(self) -> None:
         """Raise ChildDiedError, with its last words, when it has ended."""
         code = self._process.poll()
