@@ -13,6 +13,7 @@ import subprocess
 import sys
 from typing import Any, Protocol
 
+import numpy as np
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import RrthError
@@ -23,7 +24,9 @@ from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import TreeOptions
 
 # How often a caller is asked whether its plan is still wanted [s].
-POLL_PERIOD = 5e-3
+POLL_PERIOD = 2e-2
+# Of the arrays in a message [bytes].
+ALIGNMENT = 16
 # A process that has not ended by itself after this time is killed [s].
 LONGEST_END = 5.0
 WORKER = 'rrth_planner.pipeline.planning_worker'
@@ -246,16 +249,26 @@ class PlanningProcess:
 
 
 def send(line: Connection, value: Any) -> None:
-    """Send a value: its arrays, which a receiver may not write to, follow it."""
-    buffers: list[pickle.PickleBuffer] = []
-    data = pickle.dumps(value, protocol=5, buffer_callback=buffers.append)
-    line.send_bytes(len(buffers).to_bytes(8, 'little') + data)
-    for buffer in buffers:
-        line.send_bytes(buffer.raw())
+    """Send a value: its arrays, which a receiver may not write to, follow it in the message."""
+    found: list[pickle.PickleBuffer] = []
+    data = pickle.dumps(value, protocol=5, buffer_callback=found.append)
+    parts = [data, *(buffer.raw() for buffer in found)]
+    sizes = [len(part) for part in parts]
+    head = np.array([len(parts), *sizes], dtype=np.int64).tobytes()
+    # Compiled code takes aligned arrays only.
+    padded = (bytes(part) + bytes(-len(part) % ALIGNMENT) for part in (head, *parts))
+    # At once: each call gives up the interpreter, which has to be waited for afterwards.
+    line.send_bytes(b''.join(padded))
 
 
 def receive(line: Connection) -> Any:
     """Return the next value; its arrays are read-only."""
-    head = line.recv_bytes()
-    buffers = [line.recv_bytes() for _ in range(int.from_bytes(head[:8], 'little'))]
-    return pickle.loads(head[8:], buffers=buffers)
+    message = memoryview(line.recv_bytes())
+    n_parts = int.from_bytes(message[:8], sys.byteorder)
+    sizes = np.frombuffer(message, dtype=np.int64, count=n_parts, offset=8)
+    parts, begin = [], 8 * (1 + n_parts)
+    for size in sizes.tolist():
+        begin += -begin % ALIGNMENT
+        parts.append(message[begin : begin + size])
+        begin += size
+    return pickle.loads(parts[0], buffers=parts[1:])

@@ -58,6 +58,11 @@ class PlanPublishers:
         """Return the tool's path along a motion."""
         return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
 
+    def is_view_subscribed(self) -> bool:
+        """Return whether somebody hears what `publish_view` publishes."""
+        views = self._tool_path, self._markers
+        return any(publisher.get_subscription_count() > 0 for publisher in views)
+
     def publish_view(
         self,
         trajectory: Trajectory,

@@ -19,7 +19,6 @@ from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
 from rrth_planner.ros.messages.marker_edits import read_edits
 from rrth_planner.ros.messages.marker_order import MarkerOrder
-from rrth_planner.ros.middleware.breather import Breather
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
@@ -66,7 +65,7 @@ class Listener:
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
         self._inputs = inputs
-        self._order, self._rest = MarkerOrder(), Breather()
+        self._order = MarkerOrder()
         self._subscriptions = [
             self._subscribe(
                 MarkerArray,
@@ -116,7 +115,6 @@ class Listener:
             None if on_late is None else supervised(on_late),
             supervised(refuse),
             decode,
-            self._rest,
         )
 
     def body_progress(self) -> tuple[int, int]:

@@ -148,8 +148,6 @@ class OpenSubscription:
         Gets the MessageError of each message that is too long, or is none of this type.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
-    rest : callable, optional
-        Called after each copy of a message.
 
     """
 
@@ -162,10 +160,9 @@ class OpenSubscription:
         on_late: Callable[[Any, Arrival], None] | None = None,
         on_refusal: Callable[[MessageError], None] = lambda problem: None,
         decode: Callable[[bytes], Any] | None = None,
-        rest: Callable[[], None] = lambda: None,
     ) -> None:
         """Begin to listen."""
-        self._on_refusal, self._decode, self._rest = on_refusal, decode, rest
+        self._on_refusal, self._decode = on_refusal, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._copies = Copies(on_late is not None)
@@ -236,7 +233,6 @@ class OpenSubscription:
             hearer = self._on_message if arrival.is_newer is None else self._on_late
             assert hearer is not None
             self._hand_on(data, hearer, arrival)
-        self._rest()
 
     def _hand_on(
         self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival

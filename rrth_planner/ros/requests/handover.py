@@ -17,6 +17,8 @@ LEADS = (0.05, LONGEST_LEAD)
 EARLY = 0.5
 # So late a motion may be told of which nobody knows how the arm moved until then [s].
 LATE = 0.02
+# Whoever wakes up takes the interpreter from what monitors the arm [s].
+LONGEST_NAP = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,4 +62,4 @@ class Start:
             left = self.time - self.early - clock()
             if left <= 0.0:
                 return
-            time.sleep(min(1e-3, max(1e-5, left)))
+            time.sleep(min(LONGEST_NAP, left))

@@ -31,8 +31,8 @@ from rrth_planner.ros.requests.stop_validation import incident_of_stop
 from rrth_planner.ros.requests.wait_for_rest import Rest
 from trajectory_msgs.msg import JointTrajectory
 
-# How often stops are followed up [s].
-PERIOD = 0.02
+# How often stops are followed up, and motions shown at most [s].
+PERIOD, SHORTEST_SHOW = 0.05, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -111,6 +111,9 @@ class PlanQueue:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None
+        # The newest motion that is still to be shown, and when one was shown last [s].
+        self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
+        self._shown = -SHORTEST_SHOW
         self._is_closed = False
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -235,7 +238,7 @@ class PlanQueue:
         def conclude() -> None:
             self._reporter.conclude(code, sentence, figures)
             if shown is not None:
-                self._show(shown, parameters)
+                self._unseen = shown, parameters
 
         is_solved = code is ErrorCode.SUCCESS and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
@@ -285,7 +288,8 @@ class PlanQueue:
         return True
 
     def _follow_up(self) -> None:
-        """See to what comes after a stop: the second check of it, and another plan."""
+        """See to what comes after a motion, and after a stop: its second check, another plan."""
+        self._show_newest()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
             if stop.is_again and stop.goal is not None and not self._is_closed:
@@ -336,6 +340,21 @@ class PlanQueue:
         except Exception:
             self._node.get_logger().error(traceback.format_exc())
             return Path()
+
+    def _show_newest(self) -> None:
+        """
+        Have the newest motion shown, once somebody looks.
+
+        That takes the interpreter for several milliseconds, which a brake may have to wait for.
+        """
+        present, unseen = time.monotonic(), self._unseen
+        if (
+            unseen is not None
+            and present - self._shown >= SHORTEST_SHOW
+            and self._publishers.is_view_subscribed()
+        ):
+            self._unseen, self._shown = None, present
+            self.prepare(partial(self._show, *unseen))
 
     def _show(self, outcome: PlanOutcome, parameters: PlannerParameters) -> None:
         """Publish what shows a motion."""
