@@ -194,7 +194,7 @@ def test_a_stop_of_any_motion_at_any_pace_stays_on_its_path_and_holds_limits(see
     for before, after in zip(playback.state_at(time), stopped.state_at(time), strict=True):
         np.testing.assert_allclose(after, before, rtol=1e-9, atol=1e-9)
     assert stopped.end_time <= playback.end_time + 1e-8
-    q, v, a = stopped.states_at(np.linspace(time, stopped.end_time, 400))
+    q, v, a = stopped.states_at(np.linspace(time, stopped.end_time, 200))
     phase = (time - 2.0) * scale
     assert path_distance(q, trajectory, phase, trajectory.duration).max() <= 1.001e-4
     # By the clock, what the motion itself does included.
