@@ -20,7 +20,7 @@ from rrth_planner.model.trajectory import (
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
 SLOW, LATEST = 0.05, 0.05
 # An arm that is further from all of its motion, in one joint, does something else [rad].
-ELSEWHERE = 0.1
+FARTHEST_OFF = 0.1
 # A motion is told no earlier before it begins; a clock that was set back may say otherwise [s].
 LONGEST_LEAD = 0.25
 # Places of a motion at which an arm is looked for [s].
@@ -76,7 +76,7 @@ class ExecutingMotion:
             # It takes over from another one, where the arm is still.
             return now - self.start_time
         if len(motion.times) == 1:
-            is_there = np.abs(motion.positions[0] - q).max() <= ELSEWHERE
+            is_there = np.abs(motion.positions[0] - q).max() <= FARTHEST_OFF
             return max(0.0, now - self.start_time) if is_there else None
         # Mostly the arm is where it was told to be, a little late: it began when it heard of it.
         at = self.near(guess, q, SAME_POSITION)
@@ -89,7 +89,7 @@ class ExecutingMotion:
         motion = self.trajectory
         times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
         gaps = positions_at(motion, times) - q
-        if not np.abs(gaps).max(axis=1).min() <= ELSEWHERE:
+        if not np.abs(gaps).max(axis=1).min() <= FARTHEST_OFF:
             return math.nan
         squares = (gaps * gaps).sum(axis=1)
         # A motion may pass a place twice.

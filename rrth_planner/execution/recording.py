@@ -16,7 +16,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 
 # What the guard says while it brakes.
-BRAKING = 'brakes'
+STOPPING = 'stopping'
 # Diagnostics come a tenth of a second after what they tell of, and a little later still [s].
 TOLD_LATE = 0.3
 
@@ -154,7 +154,7 @@ def clearances_seen(recording: Recording, arm: ArmModel, ray_guard_length: float
 
 def brakes(recording: Recording) -> tuple[Told, ...]:
     """Return the motions that were told to stop the arm: in motion, while the guard braked."""
-    since = [time for time, state in recording.guard if state == BRAKING]
+    since = [time for time, state in recording.guard if state == STOPPING]
     return tuple(
         told
         for told in recording.told

@@ -114,8 +114,7 @@ def way_out(
             return Escape(trajectory=best, sentence=_said(world, depths, spares[-1]))
     return Refusal(
         PlanStatus.START_IN_COLLISION,
-        f'{sentence}, and no straight way out of it is proven free; expected a start clear of '
-        'the wearer',
+        f'{sentence}, and no straight escape is proven free; expected a start clear of the wearer',
     )
 
 
@@ -127,9 +126,10 @@ def _said(world: World, depths: Array, hair: float) -> str:
         if depths[bar, box] > -hair:
             depth = max(0.0, float(depths[bar, box]))
             parts.append(
-                f'box "{world.box_names[box]}", {depth:.4f} m deep at {world.bar_names[bar]}'
+                f'box "{world.box_names[box]}", penetration depth {depth:.4f} m at '
+                f'{world.bar_names[bar]}'
             )
-    return f'first leaves {" and ".join(parts)}'
+    return f'escape from {" and ".join(parts)}'
 
 
 def _pushed(

@@ -100,9 +100,7 @@ def plan_motion(
     if refusal is not None and refusal.status is PlanStatus.START_IN_COLLISION:
         if moving is not None:
             said = depth_sentence(world, box_depths(world, q_start), margin)
-            refusal = replace(
-                refusal, sentence=f'{said}, expected an arm that is at rest or clear'
-            )
+            refusal = replace(refusal, sentence=f'{said}, expected an arm at rest or clear of it')
         else:
             out = way_out(
                 world,
@@ -222,7 +220,7 @@ def _solved(
     escape_time = 0.0 if escape is None else escape.trajectory.duration
     clearance = least_clearance(trajectory, grown(world, -margin), escape_time)
     planning_time = time.perf_counter() - begin
-    note = '' if result.is_reproducible else '; the clock ended the improvement'
+    note = '' if result.is_reproducible else '; improvement ended by the time limit'
     if escape is not None:
         q_start = trajectory.positions[:1]
         path = Path(np.concatenate([q_start, path.waypoints]))

@@ -90,6 +90,6 @@ def find_path(
     sentence = {
         PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
         PlanStatus.CANCELLED: CANCELLED.sentence,
-        PlanStatus.SAMPLE_LIMIT: 'the free postures that aim at the target were not reached',
+        PlanStatus.SAMPLE_LIMIT: 'no free goal configuration was reached',
     }[result.status]
     return Refusal(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')

@@ -207,7 +207,7 @@ class PlanningProcess:
         self, name: str, *arguments: Any, should_stop: Callable[[], bool] = lambda: False
     ) -> Any:
         if self._process.poll() is not None:
-            self._restart('while it had nothing to do')
+            self._restart('while idle')
         self._require_ready()
         self._begin(name, *arguments)
         return self._end(should_stop)
@@ -228,7 +228,7 @@ class PlanningProcess:
                     send(self._line, STOP)
             answer = receive(self._line)
         except (EOFError, OSError) as problem:
-            raise PlanningProcessError(self._restart('while it worked')) from problem
+            raise PlanningProcessError(self._restart('while working')) from problem
         self._is_busy = False
         if isinstance(answer, Raised):
             raise answer.problem from PlanningTraceback(answer.where)

@@ -73,7 +73,7 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None
             )
     if world.is_valid(q_start):
         return None
-    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm touches the wearer')
+    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
 
 
 def depth_sentence(world: World, depths: Array, margin: float) -> str:
@@ -98,7 +98,7 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
         where = f'{-distance:.4f} m inside box "{name}"'
     else:
         where = f'about {distance:.4f} m, less than the margin of {margin:g} m, from box "{name}"'
-    return f'{part} is {where}: {depth:.4f} m deep in it with its margin'
+    return f'{part} is {where}: penetration depth {depth:.4f} m including the margin'
 
 
 def lead_refusal(
@@ -133,7 +133,7 @@ def lead_refusal(
         return None
     return Refusal(
         PlanStatus.START_MOVES,
-        'the arm moves, and straight ahead it would touch the wearer before it could stop; '
+        'the arm moves, and straight ahead it would violate the margin before it could stop; '
         'expected an arm at rest or one with room ahead',
     )
 
@@ -147,13 +147,15 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
         if excess <= 0.0:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is inside box "{box.name}", {-excess:.4f} m deep',
+                f'the target ({where}) m is inside box "{box.name}", penetration depth '
+                f'{-excess:.4f} m',
             )
         if excess <= margin:
             return Refusal(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
-                f'margin of {margin:g} m: {margin - excess:.4f} m deep in it with its margin',
+                f'margin of {margin:g} m: penetration depth {margin - excess:.4f} m including the '
+                'margin',
             )
     return None
 
@@ -163,7 +165,7 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
     if goals.n_aiming == 0:
         return Refusal(
             PlanStatus.GOAL_UNREACHABLE,
-            'no posture within the joint limits aims at the target',
+            'no configuration within the joint limits points at the target',
         )
     pairs: Counter[tuple[str, str]] = Counter()
     least: dict[tuple[str, str], float] = {}
@@ -182,10 +184,10 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
         blame = (
-            f'most often {bar} and box "{box}" ({share:.0f} %), at least {least[bar, box]:.4f} m '
-            'deep in it with its margin'
+            f'most often {bar} and box "{box}" ({share:.0f} %), penetration depth '
+            f'at least {least[bar, box]:.4f} m including the margin'
         )
     return Refusal(
         PlanStatus.GOAL_IN_COLLISION,
-        f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',
+        f'all {goals.n_aiming} goal configurations tried violate the margin, {blame}',
     )

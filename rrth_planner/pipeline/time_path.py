@@ -89,13 +89,13 @@ def time_path(
     if not timed:
         return Refusal(
             PlanStatus.START_MOVES,
-            'the arm moves, and from there no motion that was found holds the limits of its '
-            'joints; expected an arm at rest',
+            'the arm moves, and no motion found from its state keeps the limits of its joints; '
+            'expected an arm at rest',
         )
     trajectory = first_proven(timed, world, escape_time)
     if trajectory is None:
         return Refusal(
-            PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
+            PlanStatus.NOT_CERTIFIED, 'a path was found but its trajectory is not proven free'
         )
     if should_stop():
         return CANCELLED

@@ -169,9 +169,7 @@ class PlannerNode(Node):
 
     def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         response.success = True
-        response.message = answer(
-            ErrorCode.SUCCESS, f'requests that are ended by this: {self._queue.cancel()}'
-        )
+        response.message = answer(ErrorCode.SUCCESS, f'requests cancelled: {self._queue.cancel()}')
         return response
 
 

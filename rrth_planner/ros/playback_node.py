@@ -131,7 +131,7 @@ class PlaybackNode(Node):
         try:
             self._on_trajectory(decoded(data, JointTrajectory, MOST_BYTES))
         except MessageError as problem:
-            self.get_logger().warning(f'joint_trajectory refused: {problem}')
+            self.get_logger().warning(f'joint_trajectory rejected: {problem}')
         except Exception:
             # Whatever it is, the arm keeps to what it does.
             self.get_logger().error(traceback.format_exc())
@@ -153,19 +153,21 @@ class PlaybackNode(Node):
                 )
             )
         except RrthError as problem:
-            stays = 'keeps to its motion' if time < self._playback.end_time else 'stays'
-            self.get_logger().warning(f'joint_trajectory refused, the arm {stays}: {problem}')
+            stays = (
+                'continues its motion' if time < self._playback.end_time else 'holds its position'
+            )
+            self.get_logger().warning(f'joint_trajectory rejected, arm {stays}: {problem}')
             return
         self.get_logger().info(
-            f'follows a motion: {len(trajectory.times)} points, at rest in '
+            f'executing a motion: {len(trajectory.times)} points, at rest in '
             f'{self._playback.end_time - time:.2f} s'
         )
 
     def _on_liveliness(self, status: Any) -> None:
         if status.not_alive_count_change > 0 and self._advance()[0] < self._playback.end_time:
             self.get_logger().error(
-                f'the planner is lost, nobody watches over the motion: the arm brakes along its '
-                f'path, at rest in {self._brake():.2f} s'
+                f'planner liveliness lost, the motion is not monitored: stop along the path, at '
+                f'rest in {self._brake():.2f} s'
             )
 
     def _brake(self) -> float:
@@ -178,9 +180,9 @@ class PlaybackNode(Node):
         left = self._brake()
         response.success = True
         response.message = (
-            f'SUCCESS (1): brakes along its path, at rest in {left:.2f} s'
+            f'SUCCESS (1): stop along the path, at rest in {left:.2f} s'
             if left > 0.0
-            else 'SUCCESS (1): at rest already'
+            else 'SUCCESS (1): already at rest'
         )
         self.get_logger().info(f'stop: {response.message}')
         return response

@@ -35,9 +35,9 @@ N_DENSE = 300
 MOST_MARKS = 40
 GUARD_COLOURS = {
     'no motion': '#dfe3e8',
-    'watches the motion': '#8cc5a3',
-    'brakes': '#e07a2f',
-    'holds': '#b5838d',
+    'monitoring': '#8cc5a3',
+    'stopping': '#e07a2f',
+    'holding': '#b5838d',
 }
 OTHER, CLEARANCE = '#c3b5d9', '#30506e'
 
@@ -250,7 +250,7 @@ def _draw_guard(axes: Axes, recording: Recording) -> None:
             axes.axvspan(left, right, color=colour, lw=0)
     axes.set_yticks([])
     axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel('guard', rotation=0, ha='right', va='center')
+    axes.set_ylabel('monitor', rotation=0, ha='right', va='center')
     axes.set_xlabel('time [s]', loc='left')
     handles = [axes.plot([], [], lw=6, color=colour)[0] for colour in shown.values()]
     handles += axes.plot([], [], ls='', marker='v', color=CLEARANCE)

@@ -54,7 +54,7 @@ def stopped_run():
         told=(Told(0.0, way), Told(0.9, stop)),
         bodies=((-0.5, wearer[0]), (0.88, wearer[1])),
         targets=((0.0, np.array([1.5, 0.2, 0.3])),),
-        guard=((0.0, 'watches the motion'), (0.95, 'brakes'), (1.3, 'holds')),
+        guard=((0.0, 'monitoring'), (0.95, 'stopping'), (1.3, 'holding')),
     )
 
 
@@ -117,7 +117,7 @@ def test_a_run_is_drawn_with_its_stop_its_distance_and_the_guard():
     assert distance.get_ylabel().endswith('[m]')
     assert guard.get_xlabel() == 'time [s]'
     names = [text.get_text() for text in guard.get_legend().get_texts()]
-    assert names == ['watches the motion', 'brakes', 'holds', 'the wearer is seen anew']
+    assert names == ['monitoring', 'stopping', 'holding', 'the wearer is seen anew']
     # A band where the arm was stopped, in each of the three curves; the stages of the guard.
     for axes in (position, velocity, distance):
         (band,) = axes.patches

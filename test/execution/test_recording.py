@@ -88,7 +88,7 @@ def test_a_brake_begins_in_motion_while_the_guard_brakes():
     again = Told(2.1, motion(FOLDED + 0.05, FOLDED))
     recording = seen(
         told=(plain, turn, stop, again),
-        guard=((0.0, 'watches the motion'), (2.05, 'brakes'), (2.2, 'holds')),
+        guard=((0.0, 'monitoring'), (2.05, 'stopping'), (2.2, 'holding')),
     )
     assert brakes(recording) == (stop,)
     assert brakes(seen(told=(plain, turn, stop))) == ()

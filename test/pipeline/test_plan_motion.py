@@ -145,12 +145,15 @@ def test_a_target_in_the_wearer_is_refused_by_name():
     for box in wearer().boxes:
         plan = ask(wearer(), FOLDED, box.center)
         assert plan.status is PlanStatus.GOAL_IN_COLLISION
-        assert f'inside box "{box.name}", {0.5 * box.size.min():.4f} m deep' in plan.sentence
+        assert (
+            f'inside box "{box.name}", penetration depth {0.5 * box.size.min():.4f} m'
+            in plan.sentence
+        )
     near = wearer().boxes[0].center + [0.15 + 0.5 * MARGIN, 0.0, 0.0]
     plan = ask(wearer(), FOLDED, near)
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'is 0.0100 m from box "torso"' in plan.sentence
-    assert 'margin of 0.02 m: 0.0100 m deep' in plan.sentence
+    assert 'margin of 0.02 m: penetration depth 0.0100 m' in plan.sentence
 
 
 def test_a_share_of_postures_is_no_more_than_all_of_them():
@@ -167,7 +170,7 @@ def test_a_share_of_postures_is_no_more_than_all_of_them():
     assert share == '100'
     # What the proof says, not a distance that may be greater; of both bars the deeper.
     depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
-    (deep,) = re.findall(r'at least (\d\.\d+) m deep', refusal.sentence)
+    (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', refusal.sentence)
     assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
 
 
@@ -187,7 +190,7 @@ def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_a
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'pointing ray' in plan.sentence
     assert '"wall_' in plan.sentence
-    assert 'm deep in it with its margin' in plan.sentence
+    assert 'm including the margin' in plan.sentence
 
 
 def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
@@ -201,7 +204,7 @@ def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
             continue
         plan = ask(wearer(), q, [1.5, 0.0, 0.3], escape_depth=0.0)
         assert plan.status is PlanStatus.START_IN_COLLISION
-        assert 'm deep in it with its margin, expected less than 0 m' in plan.sentence
+        assert 'm including the margin, expected less than 0 m' in plan.sentence
         bar = next(name for name in world.bar_names if plan.sentence.startswith(name))
         box = next(name for name in world.box_names if f'"{name}"' in plan.sentence)
         pair = world.bar_names.index(bar), world.box_names.index(box)

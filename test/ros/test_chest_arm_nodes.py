@@ -90,7 +90,7 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
             assert pointing_error(arm, end, np.array(target)) < 1e-6
             seen = np.array([state.position for state in client.states[n_states:]])
             assert first_contact(arm, scene, seen, RAY, MARGIN) is None
-    assert not [line for line in said if 'refused' in line or 'ERROR' in line]
+    assert not [line for line in said if 'rejected' in line or 'ERROR' in line]
 
 
 def test_a_start_for_another_number_of_joints_is_refused_in_a_sentence(wait_until):

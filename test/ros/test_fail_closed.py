@@ -216,8 +216,8 @@ def test_a_body_that_is_refused_stops_the_arm_and_says_why(monitored):
     arm.heard.body.accept(refuse, arm.now)
     arm.guard.on_body(arm.heard.body.value, 0)
     assert len(arm.published) == 1
-    assert arm.reporter.guard[0] == 'brakes'
-    assert 'the last body was refused, marker 3 ("shoe")' in arm.reporter.guard[1]
+    assert arm.reporter.guard[0] == 'stopping'
+    assert 'the last body was rejected, marker 3 ("shoe")' in arm.reporter.guard[1]
 
 
 def test_joint_positions_that_are_refused_stop_the_arm(monitored):
@@ -225,7 +225,7 @@ def test_joint_positions_that_are_refused_stop_the_arm(monitored):
     arm.heard.joint_refusal = MessageError('position: nan')
     arm.guard._on_timer()
     assert len(arm.published) == 1
-    assert 'the last joint positions were refused, position: nan' in arm.reporter.guard[1]
+    assert 'the last joint positions were rejected, position: nan' in arm.reporter.guard[1]
 
 
 @pytest.mark.parametrize(('late', 'n_stops'), [(0.049, 0), (0.051, 1)])

@@ -123,14 +123,14 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     assert brake.velocities[0].any()
     assert brake.duration < client.motion(0).duration
     # It goes on by itself, or holds and says so.
-    wait_until(lambda: len(client.motions) == 3 or 'holds' in client.figures.get('guard', ''))
+    wait_until(lambda: len(client.motions) == 3 or 'holding' in client.figures.get('monitor', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
     touch = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
     assert touch is None
-    assert any('the wearer moved into the way' in line for line in said)
-    assert not [line for line in said if 'refused' in line]
-    wait_until(lambda: client.figures['brakes'].startswith('1,'))
+    assert any('not proven free of the wearer' in line for line in said)
+    assert not [line for line in said if 'rejected' in line]
+    wait_until(lambda: client.figures['fail-safe stops'].startswith('1,'))
 
 
 def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wait_until, tell):
@@ -149,7 +149,7 @@ def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wai
     wait_until(lambda: client.speed() == 0.0 and np.allclose(client.states[-1].position, last))
     q = np.array([state.position for state in client.states[n:]])
     assert reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
-    assert not [line for line in said if 'refused' in line]
+    assert not [line for line in said if 'rejected' in line]
 
 
 def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_until):
@@ -167,7 +167,7 @@ def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_unti
 def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, wait_until):
     client, said = scene_of_a_motion('body_timeout:=1.0')
     wait_until(lambda: len(client.motions) == 2)
-    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert any('body_timeout' in line for line in said)
     assert len(client.motions) == 2
@@ -176,6 +176,6 @@ def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, 
 def test_without_replan_the_arm_holds_where_it_stopped(scene_of_a_motion, wait_until):
     client, said = scene_of_a_motion('replan:=false')
     client.body.publish(body(in_the_way(client, 1.6))[0])
-    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert len(client.motions) == 2

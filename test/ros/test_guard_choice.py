@@ -46,7 +46,7 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(watched, ahead, capfd):
     assert watched.said == ['braked']
     assert not stop.velocities[-1].any()
     sentence = watched.reporter.guard[1]
-    assert 'the arm brakes' in sentence
+    assert 'fail-safe stop' in sentence
     assert ('not proven safe either' in sentence) == (ahead < 0.3)
     # What is proven free, and only that, is for the second judge too.
     (kept,) = watched.guard.take_stops()
@@ -238,7 +238,7 @@ def test_an_arm_that_takes_its_motion_late_is_watched_on_that_again(watched):
     watched.now += 0.02
     watched.read(*(row[0] for row in sample(turned, [0.8])[:2]))
     watched.guard._on_timer()
-    assert 'follow what it was told last' in watched.reporter.guard[1]
+    assert 'follows the last commanded motion again' in watched.reporter.guard[1]
     watched.see(watched.hand(0.95, 0.0, turned))
     assert len(watched.published) == 1
 
@@ -321,7 +321,7 @@ def test_an_arm_that_goes_on_is_told_again(watched):
 def test_an_arm_that_is_elsewhere_is_said_aloud(watched):
     watched.run(0.8, lambda after: (watched.motion.positions[0] + 0.5, np.full(4, 0.2)))
     assert watched.published == []
-    assert 'nothing is guarded' in watched.reporter.guard[1]
+    assert 'monitoring suspended' in watched.reporter.guard[1]
 
 
 @pytest.mark.parametrize('replan', [False, True])
@@ -342,6 +342,6 @@ def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(watched, ca
     assert len(watched.published) == 1
     watched.guard.hold('no way to the goal')
     assert watched.guard._state is Watch.HOLDING
-    said = 'the arm holds where it is: no way to the goal'
-    assert watched.reporter.guard == ('holds', said)
+    said = 'arm holds its position: no way to the goal'
+    assert watched.reporter.guard == ('holding', said)
     assert said in capfd.readouterr().err

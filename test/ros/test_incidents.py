@@ -275,12 +275,12 @@ def test_diagnostics_say_everything(start):
             for name in ('body', 'target', 'joints')
             for kind, unit in (
                 *(('age of', ' [s]'), ('good messages,', '')),
-                ('refused messages,', ''),
+                ('rejected messages,', ''),
             )
         ),
     ):
         assert float(stranger.value(name)) >= 0.0, name
-    for name in ('last sentence', 'last incident', 'guard', 'last stop', 'last refusal, body'):
+    for name in ('last sentence', 'last incident', 'monitor', 'last stop', 'last rejection, body'):
         assert isinstance(stranger.value(name), str)
 
 
@@ -305,7 +305,7 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     late = {'code': ErrorCode.TIMED_OUT, 'sentence': 'no path'}
     assert summary(**late) == (DiagnosticStatus.WARN, 'TIMED_OUT (-6): no path')
     heard.target.accept(refuse, 10.0)
-    assert summary(**late) == (DiagnosticStatus.WARN, 'target refused: no point')
+    assert summary(**late) == (DiagnosticStatus.WARN, 'target rejected: no point')
     assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
     broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
     assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken

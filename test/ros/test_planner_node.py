@@ -236,7 +236,7 @@ def test_without_an_input_the_answer_names_its_topic(start, missing):
         ({'joint_states': joints([0.0, 1.0, 0.0, 0.0])}, 'START_STATE_INVALID (-26): joint_2'),
         ({'target': target(0.0, 0.0, 0.0)}, 'GOAL_IN_COLLISION (-12): the target'),
         # Nearer to the axis of the upper arm, in all its postures, than the ray runs beside it.
-        ({'target': target(-0.24, -0.1, 0.5)}, 'NO_IK_SOLUTION (-31): no posture'),
+        ({'target': target(-0.24, -0.1, 0.5)}, 'NO_IK_SOLUTION (-31): no configuration'),
         (
             {'target': target(frame='camera')},
             'FRAME_TRANSFORM_FAILURE (-21): ',
@@ -281,7 +281,10 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(sta
     say_all(planner, stranger, body_boxes=leaned())
     response = stranger.answer()
     assert response.success, response.message
-    assert ', first leaves box "hand/0", 0.0275 m deep at pointing ray' in response.message
+    assert (
+        ', escape from box "hand/0", penetration depth 0.0275 m at pointing ray'
+        in response.message
+    )
     stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
     # The present body, said again, does not stop it.
     stranger.publishers['body_boxes'].publish(leaned())
@@ -300,7 +303,7 @@ def test_deeper_than_escape_depth_is_refused(start):
     assert not response.success
     assert response.message.startswith(
         'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": 0.0275 m '
-        'deep in it with its margin, expected less than 0.01 m (escape_depth)'
+        'including the margin, expected less than 0.01 m (escape_depth)'
     )
     planner.set_parameters([Parameter(name='escape_depth', value=0.03)])
     assert stranger.answer().success
@@ -402,7 +405,7 @@ def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
     say_all(planner, stranger, body_boxes=fenced())
     running, waiting = stranger.ask('plan'), stranger.ask('plan')
     wait_until(lambda: len(planner._queue._open) == 2)
-    assert stranger.answer('cancel').message == 'SUCCESS (1): requests that are ended by this: 2'
+    assert stranger.answer('cancel').message == 'SUCCESS (1): requests cancelled: 2'
     wait_until(lambda: running.done() and waiting.done())
     for future in (running, waiting):
         assert future.result().message.startswith('PREEMPTED (-7): ')
@@ -741,9 +744,9 @@ def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
     say_all(planner, stranger, body_boxes=fenced())
     stop_for(planner)
     stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: stranger.value('guard') == 'holds')
+    stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
     said = stranger.value('last stop')
-    assert said.startswith('the arm holds where it is: PLANNING_FAILED (-1): ')
+    assert said.startswith('arm holds its position: PLANNING_FAILED (-1): ')
     assert not stranger.heard['joint_trajectory']
 
 
@@ -757,7 +760,7 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
         stranger.wait_until(lambda n=n: inputs.joints.n_refused == n)
         message = stranger.answer().message
         assert message.startswith('ROBOT_STATE_STALE (-23): the last message on /test_')
-        assert f'was refused: {inputs.joints.refusal}' in message
+        assert f'was rejected: {inputs.joints.refusal}' in message
     assert inputs.joints.value is good
     assert not stranger.heard['joint_trajectory']
     stranger.publishers['joint_states'].publish(joints())
@@ -935,7 +938,8 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
     stranger.wait_until(lambda: any('lifetime of "a pack"' in line for line in warnings))
     for _ in range(2):
         message = stranger.answer().message
-        assert message.startswith('SENSOR_INFO_STALE (-24): lost parts of the body'), message
+        assert message.startswith('SENSOR_INFO_STALE (-24): the body on'), message
+        assert 'has expired parts: ' in message, message
         assert '"a pack"' in message
     assert sum('lifetime of "a pack"' in line for line in warnings) == 1
     assert not stranger.heard['joint_trajectory']
@@ -1023,8 +1027,8 @@ def test_a_refused_message_is_reported_and_nothing_is_planned_until_a_good_one(
     before = (inputs.body.value, inputs.joints.value)
     stranger.publishers[topic].publish(msg)
     name = {'body_boxes': 'body', 'joint_states': 'joints'}[topic]
-    stranger.wait_until(lambda: stranger.value(f'refused messages, {name}') == '1')
-    assert sentence in stranger.value(f'last refusal, {name}')
+    stranger.wait_until(lambda: stranger.value(f'rejected messages, {name}') == '1')
+    assert sentence in stranger.value(f'last rejection, {name}')
     assert (inputs.body.value, inputs.joints.value) == before
     if topic == 'body_boxes':
         # Of joint positions only those of all joints count.

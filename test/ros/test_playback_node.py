@@ -73,7 +73,7 @@ class Observer(Node):
 
     def wait_for_refusal(self, *words, first):
         """Wait until a line after the first ones is a refusal with some words."""
-        words = ('joint_trajectory refused, ', *words)
+        words = ('joint_trajectory rejected, ', *words)
         wait_until(lambda: any(all(w in line.msg for w in words) for line in self.logs[first:]))
 
 
@@ -255,7 +255,7 @@ def test_whatever_is_refused_is_named_and_moves_nothing(playback, observer):
     for change, words in BAD.values():
         n_logs, n_states = len(observer.logs), len(observer.states)
         observer.motions.publish(changed(change))
-        observer.wait_for_refusal('the arm stays: ', words, first=n_logs)
+        observer.wait_for_refusal('arm holds its position: ', words, first=n_logs)
         observer.wait_for_states(3)
         assert all((state.position == FOLDED).all() for state in observer.states[n_states:])
         assert not any(np.any(state.velocity) for state in observer.states[n_states:])
@@ -273,7 +273,7 @@ def test_a_refused_motion_leaves_the_running_one_alone(playback, observer):
     wait_until(lambda: observer.v.any())
     n_logs = len(observer.logs)
     observer.motions.publish(changed(BAD['not a number'][0]))
-    observer.wait_for_refusal('keeps to its motion', first=n_logs)
+    observer.wait_for_refusal('continues its motion', first=n_logs)
     wait_until(lambda: observer.is_still_at(FOLDED - 0.5))
 
 

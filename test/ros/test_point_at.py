@@ -333,7 +333,7 @@ def test_joint_positions_that_are_none_do_not_count(client):
 def test_an_answer_is_read_back():
     answer = answer_from_text(
         'SUCCESS (1): 2 waypoints, duration 1.426 s, path length 1.9430 rad, least clearance '
-        '-0.0389 m, planning time 3.90 ms, seed 1043618065; the clock ended the improvement'
+        '-0.0389 m, planning time 3.90 ms, seed 1043618065; improvement ended by the time limit'
     )
     assert answer.code is ErrorCode.SUCCESS
     assert answer.figures == {

@@ -236,7 +236,7 @@ def test_a_recording_reads_back_as_a_run(run):
     np.testing.assert_array_equal(aim, [point.x, point.y, point.z])
     states = {state for _, state in found.guard}
     assert states
-    assert states <= {'no motion', 'watches the motion'}
+    assert states <= {'no motion', 'monitoring'}
 
 
 @pytest.mark.parametrize('kind', ['png', 'svg', 'pdf'])

@@ -79,7 +79,7 @@ def told(time, speed=0.0, stamp=0.0):
 def said(time, guard, name='rrth_planner'):
     """Return diagnostics."""
     status = DiagnosticStatus(name=f'{name}: planning', hardware_id='rrth_planner')
-    status.values = [KeyValue(key='guard', value=guard)]
+    status.values = [KeyValue(key='monitor', value=guard)]
     return 'diagnostics', time, DiagnosticArray(status=[status])
 
 
@@ -102,8 +102,8 @@ def test_a_run_is_read_on_one_clock(tmp_path):
         ('target', 0.15, target()),
         told(0.2),
         told(0.5, speed=0.3, stamp=0.45),
-        said(0.2, 'watches the motion'),
-        said(0.5, 'brakes'),
+        said(0.2, 'monitoring'),
+        said(0.5, 'stopping'),
         said(0.4, 'no motion', name='elsewhere/rrth_planner'),
     )
     run = read(path)
@@ -111,7 +111,7 @@ def test_a_run_is_read_on_one_clock(tmp_path):
     np.testing.assert_array_equal(run.velocities[3], np.full(4, 0.1 * 3))
     assert [motion.begin for motion in run.told] == pytest.approx([0.2, 0.45], abs=1e-5)
     assert brakes(run) == (run.told[1],)
-    assert [state for _, state in run.guard] == ['watches the motion', 'brakes']
+    assert [state for _, state in run.guard] == ['monitoring', 'stopping']
     # The hat is there for a quarter of a second.
     assert [time for time, _ in run.bodies] == pytest.approx([0.1, 0.3, 0.55], abs=1e-5)
     assert [len(scene.boxes) for _, scene in run.bodies] == [2, 3, 2]

@@ -86,7 +86,7 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
     moving = [answer for was_moving, answer in answers if was_moving]
     assert len(moving) >= 3
     refused = [a.message for a in moving if not a.success]
-    by_the_arm = [line for line in said if 'refused' in line]
+    by_the_arm = [line for line in said if 'rejected' in line]
     refused += by_the_arm
     assert all(any(place in sentence for place in OFF_COURSE) for sentence in refused), refused
     assert not any(FROM_REST in sentence for sentence in refused), refused

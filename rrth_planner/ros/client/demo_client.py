@@ -47,7 +47,7 @@ class DemoClient(PlannerClient):
         """Wait until the planner can be asked, and the arm can be seen and listens."""
         self.wait_for_state(self._joints_of_arm)
         self.wait_for_planner()
-        self.wait_for(lambda: self.count_arms() > 0, 'an arm that listens to joint_trajectory')
+        self.wait_for(lambda: self.count_arms() > 0, 'a subscriber of joint_trajectory')
 
     def present(self) -> Array:
         """Return the latest joint positions, (dof,) [rad]."""
@@ -58,7 +58,7 @@ class DemoClient(PlannerClient):
         self.watch()
         response = self.ask(self.timeout)
         if not response.success:
-            raise DemoError(f'the planner refused: {response.message}')
+            raise DemoError(f'the planner rejected the request: {response.message}')
         self.wait_for(lambda: bool(self.told), 'joint_trajectory')
         figures = answer_from_text(response.message).figures
         if 'planning_time_ms' not in figures:
@@ -83,7 +83,7 @@ class DemoClient(PlannerClient):
         stopped, has been told how to go on, and has arrived there.
         """
         self.wait_for(
-            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm on its way'
+            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm in motion'
         )
         end = time.monotonic() + after
         while time.monotonic() < end:
@@ -94,7 +94,7 @@ class DemoClient(PlannerClient):
         # The stop begins in motion, what comes after it at rest.
         self.wait_for(
             lambda: len(self.told) > n + 1 and not any(self.told[-1].points[0].velocities),
-            'a stop and a way round',
+            'a stop and a new motion',
         )
         self.wait_for_arrival(joint_trajectory_from_msg(self.told[-1], self._joints_of_arm))
         return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.seen])

@@ -143,12 +143,12 @@ def _why(
     topic = client.resolve_topic_name('joint_trajectory')
     if not _aims_at(arm, motion, target):
         return (
-            'the arm was stopped on its way, and nothing that leads to the target came on '
+            'the arm was stopped, and no motion to the target was published on '
             f'{topic} within {client.timeout:g} s'
         )
     gaps = np.abs(client.positions(arm.joint_names) - motion.positions[-1])
     k = int(np.argmax(gaps))
-    listener = '' if client.count_arms() > 0 else f'; nobody else listens to {topic}'
+    listener = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
     return (
         f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
         f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '

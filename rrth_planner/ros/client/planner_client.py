@@ -152,7 +152,7 @@ class PlannerClient(Node):
         publisher.publish(message)
         # The request that follows takes another way, and must not overtake the message.
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
-            raise NotInTimeError(f'{publisher.topic}: not taken within {self.timeout:g} s')
+            raise NotInTimeError(f'{publisher.topic}: not acknowledged within {self.timeout:g} s')
 
     def _call(self) -> Trigger.Response:
         future = self._plan.call_async(Trigger.Request())

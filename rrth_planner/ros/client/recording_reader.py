@@ -194,8 +194,8 @@ class RecordingReader:
         for heard in self._heard['diagnostics']:
             for status in heard.msg.status:
                 values = {item.key: item.value for item in status.values}
-                if status.hardware_id == 'rrth_planner' and 'guard' in values:
-                    item = (self._when(heard), values['guard'])
+                if status.hardware_id == 'rrth_planner' and 'monitor' in values:
+                    item = (self._when(heard), values['monitor'])
                     said.setdefault(status.name.split(':')[0], []).append(item)
         # All planners of a network share the topic.
         topic = self._topics['joint_trajectory'] or self._topics['joint_states'] or ''

@@ -185,7 +185,7 @@ class ViewerFeed(Node):
             self._refuse(problem)
 
     def _refuse(self, problem: MessageError) -> None:
-        self.get_logger().warning(f'joint_trajectory refused: {problem}')
+        self.get_logger().warning(f'joint_trajectory rejected: {problem}')
 
 
 @contextmanager

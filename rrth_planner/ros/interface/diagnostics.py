@@ -137,13 +137,13 @@ def diagnostics_msg(
         'boxes': str(body.n_boxes),
         'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
     }
-    values['guard'], values['last stop'] = guard
+    values['monitor'], values['last stop'] = guard
     values.update({name: str(figure) for name, figure in figures.items()})
     for name, topic in heard.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
         values[f'good messages, {name}'] = str(topic.n_good)
-        values[f'refused messages, {name}'] = str(topic.n_refused)
-        values[f'last refusal, {name}'] = str(topic.refusal or '')
+        values[f'rejected messages, {name}'] = str(topic.n_refused)
+        values[f'last rejection, {name}'] = str(topic.refusal or '')
     status = DiagnosticStatus(
         level=level,
         name=f'{node_name.lstrip("/")}: planning',
@@ -167,7 +167,7 @@ def _summary(
             return DiagnosticStatus.STALE, f'{topic.topic} is {topic.age(now):.3f} s old'
     refused = [topic for topic in heard.all.values() if topic.is_last_refused]
     if refused:
-        return DiagnosticStatus.WARN, f'{refused[0].topic} refused: {refused[0].refusal}'
+        return DiagnosticStatus.WARN, f'{refused[0].topic} rejected: {refused[0].refusal}'
     missing = [topic.topic for topic in heard.all.values() if topic.received is None]
     if missing:
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'

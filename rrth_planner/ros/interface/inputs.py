@@ -230,7 +230,7 @@ class Inputs:
             # Where the arm was before says nothing of where it is.
             raise RequestError(
                 ErrorCode.ROBOT_STATE_STALE,
-                f'the last message on {self.joints.topic} was refused: {refusal}',
+                f'the last message on {self.joints.topic} was rejected: {refusal}',
             )
         joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
@@ -250,20 +250,20 @@ class Inputs:
             # Where the wearer was before says nothing of where he is.
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
-                f'the last message on {self.body.topic} was refused: {self.body.refusal}',
+                f'the last message on {self.body.topic} was rejected: {self.body.refusal}',
             )
         body = self.body.value.at(now)
         if body.expired:
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
-                f'lost parts of the body on {self.body.topic}, whose lifetime has passed: '
-                f'{body.expired_names}; expected each of them again, or its DELETE',
+                f'the body on {self.body.topic} has expired parts: {body.expired_names}; expected '
+                'each of them again, or its DELETE',
             )
         if body.n_boxes == 0:
             raise RequestError(
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
                 f'the body on {self.body.topic} is empty: every box was deleted; expected at '
-                'least one box of the wearer, since no motion is planned blindly',
+                'least one box of the wearer',
             )
         _require_fresh(
             self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE
@@ -276,7 +276,7 @@ class Inputs:
             # Pointing at the target before it is not what was asked for.
             raise RequestError(
                 code_of_refusal(refusal, ErrorCode.INVALID_GOAL_CONSTRAINTS),
-                f'the last message on {self.target.topic} was refused: {refusal}',
+                f'the last message on {self.target.topic} was rejected: {refusal}',
             )
         return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
 
@@ -291,7 +291,7 @@ def _require(heard: Input[Any], what: str, expected: str) -> Any:
         )
     raise RequestError(
         code_of_refusal(heard.refusal, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
-        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} refused messages: '
+        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} rejected messages: '
         f'{heard.refusal}',
     )
 
@@ -311,12 +311,12 @@ def _require_fresh(
 def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:
     """Return why nobody knows any more how arm and wearer are; empty: it is known."""
     if heard.body.is_last_refused:
-        return f'the last body was refused, {heard.body.refusal}'
+        return f'the last body was rejected, {heard.body.refusal}'
     if heard.joint_refusal is not None:
-        return f'the last joint positions were refused, {heard.joint_refusal}'
+        return f'the last joint positions were rejected, {heard.joint_refusal}'
     body = heard.body.value.at(now)
     if body.expired:
-        return f'lost parts of the body, whose lifetime has passed: {body.expired_names}'
+        return f'the body has expired parts: {body.expired_names}'
     if not body.n_boxes:
         return 'the body is empty'
     age, most = heard.body.age(now), parameters.body_timeout

@@ -29,11 +29,16 @@ def declared(dof: int) -> tuple[Setting, ...]:
     timeout = (0.0, LONGEST_TIMEOUT, 's')
     return (
         Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the wearer', True),
-        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'how to search'),
-        Setting('seed', -1, -1, 2**31 - 1, '-', 'of the random draws; -1: fresh each time'),
+        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'planning algorithm'),
+        Setting('seed', -1, -1, 2**31 - 1, '-', 'random seed; -1: a new one each time'),
         Setting('margin', 0.02, 0.0, 1.0, 'm', 'clearance kept from every box'),
         Setting(
-            'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
+            'ray_guard_length',
+            1.0,
+            0.0,
+            100.0,
+            'm',
+            'length of the pointing ray kept clear in motion',
         ),
         Setting(
             'escape_depth',
@@ -41,24 +46,24 @@ def declared(dof: int) -> tuple[Setting, ...]:
             0.0,
             1.0,
             'm',
-            'an arm at rest less deep in the boxes with their margin first leaves them; 0: never',
+            'an arm at rest, less deep in boxes grown by the margin, escapes; 0: never',
         ),
         Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
         Setting(
             'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
         ),
         Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
-        Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting('body_timeout', 0.0, *timeout, 'an older body is rejected; 0: never'),
         Setting(
             'incident_folder',
             '',
             None,
             None,
             'path',
-            'for files about what never should happen; empty: rrth_planner/ of the ROS logs',
+            'of incident files, to be replayed; empty: rrth_planner/ of the ROS logs',
         ),
-        Setting('replan', True, None, None, '-', 'plan again after a stop for the wearer'),
-        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
+        Setting('replan', True, None, None, '-', 'plan again after a fail-safe stop'),
+        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are rejected; 0: never'),
         *(
             Setting(
                 f.name,

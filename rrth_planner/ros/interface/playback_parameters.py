@@ -24,17 +24,19 @@ SETTINGS = (
     Setting(
         'initial_positions', FOLDED, -1e4, 1e4, 'rad', 'where each joint is at the start', True
     ),
-    Setting('max_velocity', [1.5], 1e-3, 1e6, 'rad/s', f'faster is refused; {EACH}', True),
+    Setting(
+        'max_velocity', [1.5], 1e-3, 1e6, 'rad/s', f'a faster motion is rejected; {EACH}', True
+    ),
     Setting(
         'max_acceleration',
         [4.0],
         1e-3,
         1e6,
         'rad/s^2',
-        f'more is refused, and brakes keep to it; {EACH}',
+        f'a motion with more is rejected, stops keep to it; {EACH}',
         True,
     ),
-    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'brakes keep to it; {EACH}', True),
+    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'stops keep to it; {EACH}', True),
     Setting(
         'time_scale',
         1.0,

@@ -104,8 +104,8 @@ class Reporter:
                     self.report,
                     self.guard,
                     {
-                        'motions held against a new body': self._recertified,
-                        'brakes': self._braked,
+                        'remaining motion checks': self._recertified,
+                        'fail-safe stops': self._braked,
                         'incidents': self._n_incidents,
                         'last incident': self._last_incident,
                     },
@@ -122,8 +122,8 @@ class Reporter:
             self._named.update(key for key, _ in new)
             names = WearerBody(expired=tuple(new)).expired_names
             self._node.get_logger().warning(
-                f'{self._heard.body.topic}: the lifetime of {names} has passed: no motion until '
-                'they come again or are deleted'
+                f'{self._heard.body.topic}: lifetime of {names} expired: no motion until '
+                'published again or deleted'
             )
 
     def refuse(self, code: ErrorCode, sentence: str) -> None:

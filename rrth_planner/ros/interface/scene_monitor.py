@@ -166,7 +166,7 @@ class Listener:
         present = time.monotonic()
         if present - self._warned.get(heard.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
             self._warned[heard.topic] = present
-            self._node.get_logger().warning(f'{heard.topic} refused: {heard.refusal}')
+            self._node.get_logger().warning(f'{heard.topic} rejected: {heard.refusal}')
 
     def _warn_of_empty_frame(self, heard: Input[Any]) -> None:
         if heard.topic not in self._has_warned_of_empty_frame:

@@ -247,5 +247,5 @@ class OpenSubscription:
             hearer(msg, arrival)
         except Exception:
             self._node.get_logger().error(
-                f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+                f'{self.topic_name}: the callback failed on a message\n{traceback.format_exc()}'
             )

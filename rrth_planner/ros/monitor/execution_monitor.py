@@ -20,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.executing_motion import ExecutingMotion, FARTHEST_OFF
 from rrth_planner.execution.remaining_motion import is_still_free, leads_away
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
@@ -39,11 +39,13 @@ from rrth_planner.timing.fast_stop import fast_stop
 PERIOD = 0.02
 # A body that is judged later than this after it came ends in a stop [s].
 LONGEST_WAIT = 0.05
-ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
+OFF_TRAJECTORY = (
+    f'arm is > {FARTHEST_OFF:g} rad from the commanded trajectory: monitoring suspended'
+)
 # By whether the arm was told last what it is seen to follow.
 TURNED = {
-    False: 'the arm did not take its new motion and goes on with the one before, which is watched',
-    True: 'the arm is seen to follow what it was told last, which is watched again',
+    False: 'arm ignored the last commanded motion: monitoring the previous one, which it follows',
+    True: 'arm follows the last commanded motion again: monitoring it',
 }
 
 
@@ -51,9 +53,9 @@ class Watch(Enum):
     """What the guard is doing."""
 
     IDLE = 'no motion'
-    WATCHING = 'watches the motion'
-    BRAKING = 'brakes'
-    HOLDING = 'holds'
+    WATCHING = 'monitoring'
+    BRAKING = 'stopping'
+    HOLDING = 'holding'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +153,7 @@ class ExecutionMonitor:
         tell: Callable[[], None],
     ) -> None:
         if self._is_closed:
-            raise RequestError(ErrorCode.PREEMPTED, 'the planner ends')
+            raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
         before = copy(self._followed), self._parameters, self._goal, self._state
         self._followed.begin(running, self._now())
         self._parameters, self._goal, self._state = parameters, goal, Watch.WATCHING
@@ -175,7 +177,7 @@ class ExecutionMonitor:
         with self._lock:
             self._is_closed = True
             if self._node.context.ok():
-                self.fail('the planner ends', is_again=False)
+                self.fail('the planner is shutting down', is_again=False)
                 if self._state is Watch.BRAKING:
                     self._publishers.flush()
             self._followed.forget()
@@ -254,7 +256,7 @@ class ExecutionMonitor:
         waited = self._waited(arrived)
         if waited > LONGEST_WAIT:
             self.fail(
-                f'a body was judged {waited:.3f} s after it came, expected at most '
+                f'a body was checked {waited:.3f} s after its arrival, expected at most '
                 f'{LONGEST_WAIT:g} s'
             )
 
@@ -291,7 +293,9 @@ class ExecutionMonitor:
         stop = replace(self._stop_of(before, phase, now), start_time=now)
         self._followed.motion = stop
         self._publishers.publish_motion(stop.trajectory, self._parameters, now)
-        self._node.get_logger().error('the arm did not stop as it was told: it is told again')
+        self._node.get_logger().error(
+            'arm did not follow the commanded stop: stop published again'
+        )
 
     def _look_back(self) -> None:
         """Watch the motion before where the arm goes on with that: its controller refused one."""
@@ -312,14 +316,14 @@ class ExecutionMonitor:
             return None
         phase = self._followed.phase(now)
         is_lost = phase is None and self._followed.is_lost(now)
-        if is_lost and self._reporter.guard[1] != ELSEWHERE:
-            self._node.get_logger().error(ELSEWHERE)
-            self._say(self._state, ELSEWHERE)
+        if is_lost and self._reporter.guard[1] != OFF_TRAJECTORY:
+            self._node.get_logger().error(OFF_TRAJECTORY)
+            self._say(self._state, OFF_TRAJECTORY)
         return phase
 
     def _stop(self, phase: float, then: float, scene: Scene, arrived: int) -> None:
         """Stop an arm, that was so far then, for a body in its way; the lock is held."""
-        why = 'the wearer moved into the way'
+        why = 'the remaining motion is not proven free of the wearer'
         # What was looked at since then may have taken its time.
         now = self._now()
         phase += now - then
@@ -343,7 +347,7 @@ class ExecutionMonitor:
             margin=parameters.margin,
             ray_guard_length=parameters.ray_guard_length,
         ):
-            sentence = f'{why}: braking would stay there, going on leads away: the arm goes on'
+            sentence = f'{why}, but it escapes and a stop would not: motion continues'
             if self._reporter.guard[1] != sentence:
                 self._node.get_logger().error(sentence)
             self._say(Watch.WATCHING, sentence)
@@ -413,7 +417,7 @@ class ExecutionMonitor:
 
     def _tell_of_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
         """Say in log and diagnostics why the arm brakes."""
-        sentence = f'{self.cause}: the arm brakes, at rest in {stop.duration:.2f} s{warning}'
+        sentence = f'{self.cause}: fail-safe stop, at rest in {stop.duration:.2f} s{warning}'
         self._say(Watch.BRAKING, sentence)
         # A line each: rclpy raises where one and the same line logs at another severity.
         if warning:
@@ -426,7 +430,7 @@ class ExecutionMonitor:
         parameters = self._parameters
         world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
         clearance = least_clearance(stop, world)
-        return f'; braking is not proven safe either, least clearance {clearance:.4f} m'
+        return f'; the stop is not proven free either, least clearance {clearance:.4f} m'
 
     def hold(self, why: str) -> None:
         """Stay where the arm came to rest, since it cannot go on."""
@@ -434,7 +438,7 @@ class ExecutionMonitor:
             if self._state is Watch.WATCHING:
                 # Another motion has begun since then.
                 return
-            sentence = f'the arm holds where it is: {why}'
+            sentence = f'arm holds its position: {why}'
             self._say(Watch.HOLDING, sentence)
             self._node.get_logger().warning(sentence)
 

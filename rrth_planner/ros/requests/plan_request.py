@@ -135,8 +135,7 @@ def plan_request(
                 # It seemed at rest, and has just begun the motion that it was told.
         raise RequestError(
             ErrorCode.TIMED_OUT,
-            f'the arm moves, and no plan was ready and checked within {LEADS[-1]:g} s to take '
-            'over from its motion',
+            f'the arm moves, and no handover was planned and checked within {LEADS[-1]:g} s',
         )
     except RequestError as problem:
         return PlanOutcome(problem.code, str(problem), plan)

@@ -192,8 +192,8 @@ class PlanQueue:
                 require_wanted(lambda: ticket.is_cancelled)
                 raise RequestError(
                     ErrorCode.SENSOR_INFO_STALE,
-                    'the node is busy: the bodies that came while the motion was planned are not '
-                    'read yet',
+                    'the node is busy: bodies received while the motion was planned are not '
+                    'processed yet',
                 ) from None
 
         try:
@@ -330,7 +330,7 @@ class PlanQueue:
         if incident is not None:
             noted, file = keep(incident, stop.parameters.incident_folder)
             self._reporter.incident(file)
-            self._node.get_logger().error(f'the arm brakes, but {incident.sentence}{noted}')
+            self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
 
     def _tool_path(self, outcome: PlanOutcome, parameters: PlannerParameters) -> Path:
         """Return the tool's path; a failure of this does not unsay the motion."""

@@ -106,13 +106,13 @@ class Revalidation:
             if present.pauses(self.running, now, LEADS[0]):
                 raise ArmHasMoved(
                     ErrorCode.START_STATE_INVALID,
-                    'the arm has begun the motion that it was told, expected an arm at rest',
+                    'the arm has begun its commanded motion, expected an arm at rest',
                 )
         else:
             expected = inputs.ahead(start.running, present.joints.taken, arm).state.positions
         moved = float(np.abs(present.q_start - expected).max())
         if not moved <= START_TOLERANCE:
-            what = 'moved by' if start is None else 'is off its course by'
+            what = 'moved by' if start is None else 'deviates from its trajectory by'
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
@@ -131,8 +131,8 @@ class Revalidation:
         if is_too_deep or not is_proven_free(world, self._motion, self._reach, escape_time):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the wearer moved while the motion was planned, and it is no longer proven free '
-                'of the present body',
+                'the wearer moved while the motion was planned: it is not proven free of the '
+                'present body',
             )
 
     @property
