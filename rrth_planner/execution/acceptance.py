@@ -12,10 +12,10 @@ from rrth_planner.model.bernstein import first_outside, to_bernstein
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
-# Planned limits may be touched; a motion is refused when it goes further than this beyond them.
+# Planned limits may be touched; a motion is rejected when it goes further than this beyond them.
 EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
-# A motion that ends later than this is refused [s].
+# A motion that ends later than this is rejected [s].
 LONGEST_WAIT = 3600.0
 # By number of coefficients; and what differentiation multiplies them with.
 _TO_BERNSTEIN = {size: to_bernstein(size - 1) for size in (4, 5, 6)}
@@ -99,7 +99,7 @@ def accept(
         time_scale=before.time_scale if is_under_way else rules.time_scale,
         before=before if start_time > time else None,
     )
-    # Numbers that overflow become infinite or NaN, which every comparison below refuses.
+    # Numbers that overflow become infinite or NaN, which every comparison below rejects.
     with np.errstate(all='ignore'):
         _check_start(before, new, arm, rules, max(time, start_time))
         _check_limits(new, arm, rules)

@@ -20,7 +20,7 @@ from rrth_planner.model.trajectory import (
 # How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
 SLOW, LATEST = 0.05, 0.05
 # An arm that is further from all of its motion, in one joint, does something else [rad].
-FARTHEST_OFF = 0.1
+MAX_DEVIATION = 0.1
 # A motion is told no earlier before it begins; a clock that was set back may say otherwise [s].
 LONGEST_LEAD = 0.25
 # Places of a motion at which an arm is looked for [s].
@@ -43,7 +43,7 @@ class ExecutingMotion:
     trajectory : Trajectory
     start_time : float
         [s].
-    reach : float
+    target_distance : float
         How much of the pointing ray must be clear at the end [m].
     escape_time : float
         Until then the motion may lead out of the wearer [s].
@@ -52,7 +52,7 @@ class ExecutingMotion:
 
     trajectory: Trajectory
     start_time: float
-    reach: float = 0.0
+    target_distance: float = 0.0
     escape_time: float = 0.0
 
     def phase(self, q: Array, taken: float, now: float) -> float | None:
@@ -76,7 +76,7 @@ class ExecutingMotion:
             # It takes over from another one, where the arm is still.
             return now - self.start_time
         if len(motion.times) == 1:
-            is_there = np.abs(motion.positions[0] - q).max() <= FARTHEST_OFF
+            is_there = np.abs(motion.positions[0] - q).max() <= MAX_DEVIATION
             return max(0.0, now - self.start_time) if is_there else None
         # Mostly the arm is where it was told to be, a little late: it began when it heard of it.
         at = self.near(guess, q, SAME_POSITION)
@@ -89,7 +89,7 @@ class ExecutingMotion:
         motion = self.trajectory
         times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
         gaps = positions_at(motion, times) - q
-        if not np.abs(gaps).max(axis=1).min() <= FARTHEST_OFF:
+        if not np.abs(gaps).max(axis=1).min() <= MAX_DEVIATION:
             return math.nan
         squares = (gaps * gaps).sum(axis=1)
         # A motion may pass a place twice.

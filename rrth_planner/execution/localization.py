@@ -17,7 +17,7 @@ SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
 FASTEST_RATE = 1.05
 
 
-def takeover(
+def predict_start_state(
     positions: Array,
     velocities: Array,
     running: Trajectory | None,

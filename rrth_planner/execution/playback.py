@@ -27,7 +27,7 @@ class Playback:
         What the arm does until then; None: it stands at the first point.
     time_scale : float
         Seconds of the motion per second of the clock [-].
-    is_braking : bool
+    is_stopping : bool
         Whether the motion is a stop.
 
     """
@@ -36,7 +36,7 @@ class Playback:
     start_time: float
     time_scale: float
     before: 'Playback | None' = None
-    is_braking: bool = False
+    is_stopping: bool = False
 
     @property
     def end_time(self) -> float:
@@ -103,7 +103,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
 
     """
     playback = at_present(playback, time)
-    if playback.is_braking or time >= playback.end_time:
+    if playback.is_stopping or time >= playback.end_time:
         return playback
     if time <= playback.start_time:
         return standing(playback.trajectory.positions[0])
@@ -120,4 +120,4 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     # Without the compiler numpy would warn of what a kernel takes for granted.
     with np.errstate(all='ignore'):
         braking = fast_stop(playback.trajectory, phase, in_motion, lead=0.0)
-    return replace(playback, trajectory=braking, start_time=time, is_braking=True)
+    return replace(playback, trajectory=braking, start_time=time, is_stopping=True)

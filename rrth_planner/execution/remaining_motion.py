@@ -30,7 +30,7 @@ SAME_STATE = 1e-11, 1e-9, 1e-6
 REFINEMENTS, TINY = 3, 1e-12
 
 
-def taken_over(
+def with_lead_in(
     before: ExecutingMotion, phase: float, after: ExecutingMotion, now: float
 ) -> ExecutingMotion:
     """
@@ -72,7 +72,7 @@ def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
     )
 
 
-def is_still_free(
+def is_remaining_free(
     running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
@@ -103,10 +103,10 @@ def is_still_free(
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
         checked = running.escape_time
-    return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
+    return _is_end_free(running, checked, arm, scene, margin, ray_guard_length)
 
 
-def leads_away(
+def escapes_by_continuing(
     running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
@@ -125,7 +125,7 @@ def leads_away(
     Parameters
     ----------
     running, phase, arm, scene, margin, ray_guard_length
-        As for `is_still_free`.
+        As for `is_remaining_free`.
 
     """
     trajectory = running.trajectory
@@ -135,7 +135,7 @@ def leads_away(
         return False
     world = arm_world(arm, scene, margin, ray_guard_length)
     return world.is_valid(
-        trajectory.positions[-1], max(ray_guard_length, running.reach)
+        trajectory.positions[-1], max(ray_guard_length, running.target_distance)
     ) and leads_out(trajectory, world, trajectory.duration, phase)
 
 
@@ -157,7 +157,7 @@ def is_place_free(
     )
 
 
-def _is_rest_free(
+def _is_end_free(
     running: ExecutingMotion,
     begin: float,
     arm: ArmModel,
@@ -169,7 +169,9 @@ def _is_rest_free(
     trajectory = running.trajectory
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
+        return world.is_valid(
+            trajectory.positions[0], max(ray_guard_length, running.target_distance)
+        )
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_rest_free(
@@ -178,7 +180,7 @@ def _is_rest_free(
             trajectory.velocities,
             trajectory.accelerations,
             begin,
-            running.reach,
+            running.target_distance,
             FINENESS * RESOLUTION,
             chain,
             robot,

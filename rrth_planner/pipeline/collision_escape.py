@@ -12,14 +12,14 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Rejection
 from rrth_planner.timing.lead_in import LeadIn
 from rrth_planner.timing.parameterization import parameterize
 
 # A way out is no longer than this [rad or m], and is looked for in so many random directions.
 LONGEST, N_DIRECTIONS = 1.5, 48
 # Spacing of the looks for the end of a way, and how often it is then halved [rad].
-LOOK, HALVINGS = 0.03, 6
+SPACING, HALVINGS = 0.03, 6
 # Rounds of pushing the arm out, and of the solution of each of them.
 N_ROUNDS, N_SWEEPS = 12, 200
 # Pairs of a bar and a box that are further apart do not push [m].
@@ -55,7 +55,7 @@ class Escape:
         return LeadIn(trajectory=self.trajectory, speed=0.0, q_stop=self.q_end, allowed=limits)
 
 
-def way_out(
+def plan_escape(
     world: World,
     q_start: Array,
     limits: MotionLimits,
@@ -65,7 +65,7 @@ def way_out(
     escape_depth: float,
     seed: int,
     should_stop: Callable[[], bool],
-) -> Escape | Refusal:
+) -> Escape | Rejection:
     """
     Return the shortest straight motion found that is proven to lead out, or why there is none.
 
@@ -91,7 +91,7 @@ def way_out(
     depths = box_depths(world, q_start)
     sentence = depth_sentence(world, depths, margin)
     if not max(0.0, float(depths.max())) < escape_depth:
-        return Refusal(
+        return Rejection(
             PlanStatus.START_IN_COLLISION,
             f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
         )
@@ -99,8 +99,8 @@ def way_out(
         roomy, rng = grown(world, spare), np.random.default_rng(seed)
         best, longest = None, LONGEST
         # What pushes the arm out directly is mostly the shortest way.
-        for look in (_pushed, _scattered):
-            tries = list(look(roomy, q_start, spare, longest, rng, should_stop))
+        for search in (_pushed, _scattered):
+            tries = list(search(roomy, q_start, spare, longest, rng, should_stop))
             if should_stop():
                 return CANCELLED
             for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
@@ -111,14 +111,14 @@ def way_out(
                     best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
                     break
         if best is not None:
-            return Escape(trajectory=best, sentence=_said(world, depths, spares[-1]))
-    return Refusal(
+            return Escape(trajectory=best, sentence=_escape_sentence(world, depths, spares[-1]))
+    return Rejection(
         PlanStatus.START_IN_COLLISION,
         f'{sentence}, and no straight escape is proven free; expected a start clear of the wearer',
     )
 
 
-def _said(world: World, depths: Array, hair: float) -> str:
+def _escape_sentence(world: World, depths: Array, hair: float) -> str:
     """Say which boxes the arm leaves, the one it is deepest in first."""
     parts = []
     for box in np.argsort(-depths.max(axis=0)).tolist():
@@ -206,11 +206,11 @@ def _scattered(
         if should_stop():
             break
         u = direction / np.linalg.norm(direction)
-        for far in np.arange(LOOK, longest, LOOK).tolist():
+        for far in np.arange(SPACING, longest, SPACING).tolist():
             if not roomy.is_in_bounds(q_start + far * u):
                 break
             if roomy.is_valid(q_start + far * u):
-                near = far - LOOK
+                near = far - SPACING
                 for _ in range(HALVINGS):
                     middle = 0.5 * (near + far)
                     if roomy.is_valid(q_start + middle * u):

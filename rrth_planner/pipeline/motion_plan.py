@@ -32,7 +32,7 @@ class MotionPlan:
     clearance : float
         Least distance of the arm and of the guarded ray from the wearer [m], once out of the
         boxes that it was in; NaN unless solved.
-    reach : float
+    target_distance : float
         Distance from the tool to the target at the end [m]; NaN unless solved.
     disagreement : Disagreement or None
         The motion that the two judges disagree about, where that is why there is none.
@@ -50,7 +50,7 @@ class MotionPlan:
     path: Path | None = None
     trajectory: Trajectory | None = None
     clearance: float = float('nan')
-    reach: float = float('nan')
+    target_distance: float = float('nan')
     disagreement: Disagreement | None = None
     escape_time: float = 0.0
     search: PlanResult | None = None

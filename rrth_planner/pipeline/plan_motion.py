@@ -21,16 +21,16 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.pipeline.collision_escape import Escape, way_out
+from rrth_planner.pipeline.collision_escape import Escape, plan_escape
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_path import find_path, SPARES
 from rrth_planner.pipeline.rejection import (
     CANCELLED,
     depth_sentence,
-    lead_refusal,
-    Refusal,
-    start_refusal,
-    target_refusal,
+    lead_rejection,
+    Rejection,
+    start_rejection,
+    target_rejection,
     within_limits,
 )
 from rrth_planner.pipeline.time_path import time_path
@@ -95,14 +95,16 @@ def plan_motion(
     q_start = within_limits(arm, q_start)
     world = _world_of(arm, scene, margin, ray_guard_length)
     escape, disagreement = None, None
-    leads: Iterable[LeadIn | None | Refusal] = (None,)
-    refusal = start_refusal(arm, grown(world, SPARES[-1]), q_start)
-    if refusal is not None and refusal.status is PlanStatus.START_IN_COLLISION:
+    leads: Iterable[LeadIn | None | Rejection] = (None,)
+    rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
+    if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION:
         if moving is not None:
-            said = depth_sentence(world, box_depths(world, q_start), margin)
-            refusal = replace(refusal, sentence=f'{said}, expected an arm at rest or clear of it')
+            sentence = depth_sentence(world, box_depths(world, q_start), margin)
+            rejection = replace(
+                rejection, sentence=f'{sentence}, expected an arm at rest or clear of it'
+            )
         else:
-            out = way_out(
+            out = plan_escape(
                 world,
                 q_start,
                 limits,
@@ -113,22 +115,22 @@ def plan_motion(
                 should_stop=should_stop,
             )
             if isinstance(out, Escape):
-                refusal, escape = None, out
+                rejection, escape = None, out
                 leads = (out.lead(limits),)
             else:
-                refusal = out
-    if refusal is None:
-        refusal = CANCELLED if should_stop() else target_refusal(scene, goal, margin)
+                rejection = out
+    if rejection is None:
+        rejection = CANCELLED if should_stop() else target_rejection(scene, goal, margin)
     if moving is not None:
         leads = _leads(arm, world, moving, limits)
-    for lead in leads if refusal is None else ():
-        if isinstance(lead, Refusal):
-            refusal = lead
+    for lead in leads if rejection is None else ():
+        if isinstance(lead, Rejection):
+            rejection = lead
             break
         q_from = q_start if lead is None else lead.q_stop
         found = find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
-        if isinstance(found, Refusal):
-            refusal = found
+        if isinstance(found, Rejection):
+            rejection = found
             break
         assert found.path is not None
         timed = time_path(
@@ -138,15 +140,15 @@ def plan_motion(
             return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
         if isinstance(timed, Disagreement):
             disagreement = timed
-            refusal = Refusal(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
+            rejection = Rejection(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
             break
-        refusal = timed
-        if refusal.status is not PlanStatus.START_MOVES:
+        rejection = timed
+        if rejection.status is not PlanStatus.START_MOVES:
             break
-    assert refusal is not None
+    assert rejection is not None
     return MotionPlan(
-        status=refusal.status,
-        sentence=f'{refusal.sentence}, seed {seed}',
+        status=rejection.status,
+        sentence=f'{rejection.sentence}, seed {seed}',
         seed=seed,
         planning_time=time.perf_counter() - begin,
         disagreement=disagreement,
@@ -185,22 +187,22 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
 
 def _leads(
     arm: ArmModel, world: World, moving: StartState, limits: MotionLimits
-) -> Iterator[LeadIn | Refusal]:
+) -> Iterator[LeadIn | Rejection]:
     """
     Yield what an arm in motion may do first: go straight on, or stop along its present motion.
 
     The last of these is why it can do neither.
     """
     straight = lead_in(moving.state, limits)
-    refusal = lead_refusal(arm, world, straight, limits)
-    if refusal is None:
+    rejection = lead_rejection(arm, world, straight, limits)
+    if rejection is None:
         # Rounding may have put a joint past its limit.
         yield replace(straight, q_stop=np.clip(straight.q_stop, *arm.bounds))
     stop = stop_first(moving, limits)
     if stop is not None and certify(stop.trajectory, world).is_proven:
         yield replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
-    elif refusal is not None:
-        yield refusal
+    elif rejection is not None:
+        yield rejection
 
 
 def _solved(
@@ -237,7 +239,7 @@ def _solved(
         path=path,
         trajectory=trajectory,
         clearance=clearance,
-        reach=reach_to(arm, goal.target, path.waypoints[-1]),
+        target_distance=reach_to(arm, goal.target, path.waypoints[-1]),
         escape_time=escape_time,
         search=result,
     )

@@ -12,7 +12,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.pipeline.rejection import CANCELLED, goal_refusal, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, goal_rejection, Rejection
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan, PlanResult
 from rrth_planner.planning.pointing_goals import (
@@ -37,7 +37,7 @@ def find_path(
     seed: int,
     should_stop: Callable[[], bool],
     begin: float,
-) -> PlanResult | Refusal:
+) -> PlanResult | Rejection:
     """
     Return the shortest path found, or why there is none.
 
@@ -83,7 +83,7 @@ def find_path(
     if result is None:
         # The start keeps the smallest spare, so the goals were asked for.
         assert goals is not None
-        return goal_refusal(world, goals)
+        return goal_rejection(world, goals)
     if result.status is PlanStatus.SOLVED:
         return replace(result, is_reproducible=result.is_reproducible and not is_clocked)
     elapsed = time.perf_counter() - begin
@@ -92,4 +92,4 @@ def find_path(
         PlanStatus.CANCELLED: CANCELLED.sentence,
         PlanStatus.SAMPLE_LIMIT: 'no free goal configuration was reached',
     }[result.status]
-    return Refusal(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')
+    return Rejection(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')

@@ -68,7 +68,7 @@ class Planner(Protocol):
         trajectory: Trajectory,
         margin: float,
         ray_guard_length: float,
-        reach: float,
+        target_distance: float,
         escape_time: float = 0.0,
     ) -> Violation | None:
         """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
@@ -147,7 +147,7 @@ class PlanningProcess:
         trajectory: Trajectory,
         margin: float,
         ray_guard_length: float,
-        reach: float,
+        target_distance: float,
         escape_time: float = 0.0,
     ) -> Violation | None:
         """
@@ -160,7 +160,14 @@ class PlanningProcess:
 
         """
         answer: Violation | None = self._ask(
-            'violation_seen', arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
+            'violation_seen',
+            arm,
+            scene,
+            trajectory,
+            margin,
+            ray_guard_length,
+            target_distance,
+            escape_time,
         )
         return answer
 

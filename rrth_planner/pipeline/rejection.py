@@ -25,7 +25,7 @@ EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Rejection:
     """
     A request that ends without a motion.
 
@@ -41,7 +41,7 @@ class Refusal:
     sentence: str
 
 
-CANCELLED = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+CANCELLED = Rejection(PlanStatus.CANCELLED, 'the plan was cancelled')
 
 
 def within_limits(arm: ArmModel, q: Array) -> Array:
@@ -50,7 +50,7 @@ def within_limits(arm: ArmModel, q: Array) -> Array:
     return near if float(np.abs(near - q).max()) <= ROUNDING else q
 
 
-def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None:
+def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | None:
     """
     Return why no motion can start at q_start, or None.
 
@@ -67,13 +67,13 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None
         low, high = arm.bounds[:, k]
         if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
             unit = 'm' if arm.is_prismatic[k] else 'rad'
-            return Refusal(
+            return Rejection(
                 PlanStatus.START_OUT_OF_BOUNDS,
                 f'{name} is at {q_start[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}',
             )
     if world.is_valid(q_start):
         return None
-    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
+    return Rejection(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
 
 
 def depth_sentence(world: World, depths: Array, margin: float) -> str:
@@ -101,16 +101,16 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
     return f'{part} is {where}: penetration depth {depth:.4f} m including the margin'
 
 
-def lead_refusal(
+def lead_rejection(
     arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
-) -> Refusal | None:
+) -> Rejection | None:
     """Return why an arm that moves cannot go straight on until it could rest, or None."""
     fastest = np.abs(lead.trajectory.velocities) / limits.velocity
     k = int(fastest.max(axis=0).argmax())
     if fastest[:, k].max() > 1.0 + EXCESS:
         speed = np.abs(lead.trajectory.velocities[:, k]).max()
         unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves at up to {speed:.3f} {unit}, expected at most '
             f'{limits.velocity[k]:g} {unit} or an arm at rest',
@@ -121,7 +121,7 @@ def lead_refusal(
     k = int(beyond.argmax())
     if beyond[k] > ROUNDING:
         unit = 'm' if arm.is_prismatic[k] else 'rad'
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves too fast to stop straight ahead: it would pass its '
             f'limit by {beyond[k]:.4f} {unit}, expected an arm at rest or further from it',
@@ -131,27 +131,27 @@ def lead_refusal(
         np.clip(lead.trajectory.positions[-1], low, high), np.clip(lead.q_stop, low, high)
     ):
         return None
-    return Refusal(
+    return Rejection(
         PlanStatus.START_MOVES,
         'the arm moves, and straight ahead it would violate the margin before it could stop; '
         'expected an arm at rest or one with room ahead',
     )
 
 
-def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal | None:
+def target_rejection(scene: Scene, goal: PointingGoal, margin: float) -> Rejection | None:
     """Return why a target cannot be pointed at from anywhere, or None."""
     where = ', '.join(f'{value:.3f}' for value in goal.target)
     for box in scene.boxes:
         local = (goal.target - box.center) @ box.rotation
         excess = float((np.abs(local) - 0.5 * box.size).max())
         if excess <= 0.0:
-            return Refusal(
+            return Rejection(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is inside box "{box.name}", penetration depth '
                 f'{-excess:.4f} m',
             )
         if excess <= margin:
-            return Refusal(
+            return Rejection(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
                 f'margin of {margin:g} m: penetration depth {margin - excess:.4f} m including the '
@@ -160,10 +160,10 @@ def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal |
     return None
 
 
-def goal_refusal(world: World, goals: GoalSet) -> Refusal:
+def goal_rejection(world: World, goals: GoalSet) -> Rejection:
     """Return why no posture that aims at the target will do."""
     if goals.n_aiming == 0:
-        return Refusal(
+        return Rejection(
             PlanStatus.GOAL_UNREACHABLE,
             'no configuration within the joint limits points at the target',
         )
@@ -187,7 +187,7 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
             f'most often {bar} and box "{box}" ({share:.0f} %), penetration depth '
             f'at least {least[bar, box]:.4f} m including the margin'
         )
-    return Refusal(
+    return Rejection(
         PlanStatus.GOAL_IN_COLLISION,
         f'all {goals.n_aiming} goal configurations tried violate the margin, {blame}',
     )

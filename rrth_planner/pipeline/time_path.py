@@ -18,7 +18,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape
-from rrth_planner.pipeline.rejection import CANCELLED, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, Rejection
 from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.lead_in import LeadIn, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
@@ -43,7 +43,7 @@ def time_path(
     lead: LeadIn | None,
     escape: Escape | None,
     should_stop: Callable[[], bool],
-) -> Trajectory | Disagreement | Refusal:
+) -> Trajectory | Disagreement | Rejection:
     """
     Return the timed path once both judges agree that it is free, with stops if need be.
 
@@ -87,24 +87,26 @@ def time_path(
     escape_time = 0.0 if escape is None else escape.trajectory.duration
     timed = in_time(path, choices, limits, lead)
     if not timed:
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
             'the arm moves, and no motion found from its state keeps the limits of its joints; '
             'expected an arm at rest',
         )
     trajectory = first_proven(timed, world, escape_time)
     if trajectory is None:
-        return Refusal(
+        return Rejection(
             PlanStatus.NOT_CERTIFIED, 'a path was found but its trajectory is not proven free'
         )
     if should_stop():
         return CANCELLED
-    reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = violation_seen(arm, scene, trajectory, margin, world.ray_length, reach, escape_time)
+    target_distance = reach_to(arm, goal.target, path.waypoints[-1])
+    violation = violation_seen(
+        arm, scene, trajectory, margin, world.ray_length, target_distance, escape_time
+    )
     if should_stop():
         return CANCELLED
-    if touch is not None:
-        return Disagreement(trajectory, touch, escape_time)
+    if violation is not None:
+        return Disagreement(trajectory, violation, escape_time)
     return trajectory
 
 

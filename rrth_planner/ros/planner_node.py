@@ -29,7 +29,7 @@ from rrth_planner.ros.interface.parameters import (
     declare_parameters,
     PlannerParameters,
 )
-from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -40,7 +40,7 @@ SWITCH_INTERVAL = 5e-4
 
 
 class PlannerNode(Node):
-    """Plan a motion that points the arm at a target, from what was heard last, on request."""
+    """Plan a motion that points the arm at a target, from what was inputs last, on request."""
 
     def __init__(self, planner: Planner | None = None, **kwargs: Any) -> None:
         """
@@ -56,7 +56,7 @@ class PlannerNode(Node):
         Raises
         ------
         RrthError
-            A parameter that is refused, an arm that cannot be planned for, no python-fcl.
+            A parameter that is rejected, an arm that cannot be planned for, no python-fcl.
 
         """
         super().__init__(NAME, **kwargs)
@@ -88,26 +88,26 @@ class PlannerNode(Node):
         from rrth_planner.ros.interface.inputs import Inputs
         from rrth_planner.ros.interface.publishers import PlanPublishers
         from rrth_planner.ros.interface.reporter import Reporter
-        from rrth_planner.ros.interface.scene_monitor import Listener
+        from rrth_planner.ros.interface.scene_monitor import SceneMonitor
         from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
         from rrth_planner.ros.requests.request_queue import PlanQueue
 
-        heard = Inputs(
+        inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        publishers, self._reporter = PlanPublishers(self), Reporter(self, heard, parameters)
-        self._monitor = ExecutionMonitor(self, heard, self._reporter, publishers)
-        self._listener = Listener(
-            self, parameters, heard, self._reporter.publish, self._monitor.on_body, self.fail
+        publishers, self._reporter = PlanPublishers(self), Reporter(self, inputs, parameters)
+        self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
+        self._scene_monitor = SceneMonitor(
+            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
         )
         self._queue = PlanQueue(
             self,
-            heard,
+            inputs,
             self._reporter,
             publishers,
             self._monitor,
             self._planner,
-            self._listener.body_progress,
+            self._scene_monitor.body_progress,
         )
 
     def close(self) -> None:
@@ -116,7 +116,7 @@ class PlannerNode(Node):
 
     def fail(self, what: str) -> None:
         """Stop an arm in motion for an error that nobody expected."""
-        self._monitor.fail(what, is_again=False)
+        self._monitor.fail(what, is_replanned=False)
 
     def _compile(self) -> None:
         """Compile all kernels, in processes of their own where they can be kept."""
@@ -156,12 +156,12 @@ class PlannerNode(Node):
                     'start: a pose, expected an empty start (position 0, orientation 0, 0, 0, 1), '
                     'since a plan begins where the arm is'
                 )
-            goal = self._listener.goal(
+            goal = self._scene_monitor.goal(
                 PointStamped(header=request.goal.header, point=request.goal.pose.position)
             )
         except MessageError as problem:
-            code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
-            self._reporter.refuse(code, f'request of get_plan: {problem}')
+            code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+            self._reporter.reject(code, f'request of get_plan: {problem}')
             return response
         found = await self._queue.respond(goal)
         response.plan = found.tool_path()

@@ -60,7 +60,7 @@ class PlaybackNode(Node):
         self._state = JointState(name=list(self._arm.joint_names))
         self._pose = PoseStamped()
         # Since when the messages above say where the arm stands for good [s].
-        self._told_rest = float('inf')
+        self._rest_published = float('inf')
         reliable = QoSProfile(
             depth=1,
             reliability=ReliabilityPolicy.RELIABLE,
@@ -111,17 +111,17 @@ class PlaybackNode(Node):
         return now, stamp
 
     def _follow(self, playback: Playback) -> None:
-        self._playback, self._told_rest = playback, float('inf')
+        self._playback, self._rest_published = playback, float('inf')
 
     def _publish(self) -> None:
         """Say where the arm is at the very time that the messages are stamped with."""
         time, nanoseconds = self._advance()
         # While it stands still only the stamps change.
-        if not time >= self._told_rest:
+        if not time >= self._rest_published:
             q, v, _ = self._playback.state_at(time)
             self._state.position, self._state.velocity = array('d', q), array('d', v)
             self._pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
-            self._told_rest = time if time >= self._playback.end_time else float('inf')
+            self._rest_published = time if time >= self._playback.end_time else float('inf')
         stamp = Time(nanoseconds=nanoseconds).to_msg()
         self._state.header.stamp = self._pose.header.stamp = stamp
         self._joint_states.publish(self._state)
@@ -167,17 +167,17 @@ class PlaybackNode(Node):
         if status.not_alive_count_change > 0 and self._advance()[0] < self._playback.end_time:
             self.get_logger().error(
                 f'planner liveliness lost, the motion is not monitored: stop along the path, at '
-                f'rest in {self._brake():.2f} s'
+                f'rest in {self._stop():.2f} s'
             )
 
-    def _brake(self) -> float:
+    def _stop(self) -> float:
         """Stop along the path; return how long that takes, <= 0.0 at rest [s]."""
         time, _ = self._advance()
         self._follow(stop(self._playback, playback_rules(self, self._arm).limits, time))
         return self._playback.end_time - time
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        left = self._brake()
+        left = self._stop()
         response.success = True
         response.message = (
             f'SUCCESS (1): stop along the path, at rest in {left:.2f} s'

@@ -125,26 +125,26 @@ def test_a_motion_replaces_the_running_one_from_its_present_state():
         ),
     ],
 )
-def test_a_motion_that_does_not_fit_is_refused(move, words):
+def test_a_motion_that_does_not_fit_is_rejected(move, words):
     with pytest.raises(MessageError, match=words):
         taken(standing(FOLDED), move)
 
 
 @pytest.mark.parametrize('size', [1e200, 1e306, 1e308])
-def test_numbers_that_overflow_are_refused_without_a_warning(size, recwarn):
+def test_numbers_that_overflow_are_rejected_without_a_warning(size, recwarn):
     move = Trajectory(
         times=[0.0, 1.0, 2.0],
         positions=[FOLDED, FOLDED, FOLDED],
         velocities=[STILL, [size, -size, size, 0.0], STILL],
         accelerations=[STILL, [-size] * 4, STILL],
     )
-    with pytest.raises(MessageError) as refusal:
+    with pytest.raises(MessageError) as rejection:
         taken(standing(FOLDED), move)
-    assert len(str(refusal.value)) < 200
+    assert len(str(rejection.value)) < 200
     assert not recwarn.list
 
 
-def test_a_motion_that_ends_more_than_an_hour_ahead_is_refused():
+def test_a_motion_that_ends_more_than_an_hour_ahead_is_rejected():
     move = motion(FOLDED, FOLDED - 0.3, duration=10.0)
     accept(standing(FOLDED), move, ARM, rules(), start_time=3589.0, time=0.0)
     with pytest.raises(MessageError, match=r'ends in 3601 s, expected an end within 3600 s'):
@@ -167,7 +167,7 @@ def test_slow_motion_is_held_to_limits_as_it_is_played():
         {'time_scale': np.nan},
     ],
 )
-def test_rules_out_of_range_are_refused_by_name(bad):
+def test_rules_out_of_range_are_rejected_by_name(bad):
     with pytest.raises(OptionsError, match=next(iter(bad))):
         rules(**bad)
 
@@ -315,7 +315,7 @@ def test_in_mid_motion_only_a_motion_from_the_present_state_takes_over(off, word
         return
     with pytest.raises(MessageError, match=words):
         taken(running, turned, 0.8)
-    # What was refused is nowhere: the running motion is a value of its own.
+    # What was rejected is nowhere: the running motion is a value of its own.
     assert (running.state_at(2.0)[0] == FOLDED - 0.5).all()
 
 

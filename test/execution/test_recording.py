@@ -9,12 +9,12 @@ import pytest
 from rrth_planner.collision.reference_checker import least_clearance
 from rrth_planner.execution.recording import (
     at,
-    brakes,
     clearances_seen,
+    commanded_at,
+    commanded_stops,
+    CommandedMotion,
     Recording,
     section,
-    Told,
-    told_at,
 )
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import RecordError
@@ -51,8 +51,8 @@ def scene(*centers):
 
 def test_the_motion_that_began_last_counts_and_its_end_is_held():
     first, second = motion(FOLDED, FOLDED + 0.4), motion(FOLDED + 0.2, FOLDED, v_begin=0.3)
-    recording = seen(told=(Told(0.1, first), Told(0.5, second)))
-    q, v = told_at(recording, np.array([0.0, 0.3, 0.5, 0.9, 1.5, 9.0]))
+    recording = seen(commanded=(CommandedMotion(0.1, first), CommandedMotion(0.5, second)))
+    q, v = commanded_at(recording, np.array([0.0, 0.3, 0.5, 0.9, 1.5, 9.0]))
     assert np.isnan(q[0]).all()
     assert np.isnan(v[0]).all()
     np.testing.assert_array_equal(q[1], sample(first, [0.3 - 0.1])[0][0])
@@ -82,16 +82,16 @@ def test_nobody_there_is_no_distance():
 
 
 def test_a_brake_begins_in_motion_while_the_guard_brakes():
-    plain = Told(0.0, motion(FOLDED, FOLDED + 0.4))
-    turn = Told(0.5, motion(FOLDED + 0.2, FOLDED, v_begin=0.3))
-    stop = Told(2.0, motion(FOLDED, FOLDED + 0.05, v_begin=0.3))
-    again = Told(2.1, motion(FOLDED + 0.05, FOLDED))
+    plain = CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4))
+    turn = CommandedMotion(0.5, motion(FOLDED + 0.2, FOLDED, v_begin=0.3))
+    stop = CommandedMotion(2.0, motion(FOLDED, FOLDED + 0.05, v_begin=0.3))
+    again = CommandedMotion(2.1, motion(FOLDED + 0.05, FOLDED))
     recording = seen(
-        told=(plain, turn, stop, again),
-        guard=((0.0, 'monitoring'), (2.05, 'stopping'), (2.2, 'holding')),
+        commanded=(plain, turn, stop, again),
+        monitor_states=((0.0, 'monitoring'), (2.05, 'stopping'), (2.2, 'holding')),
     )
-    assert brakes(recording) == (stop,)
-    assert brakes(seen(told=(plain, turn, stop))) == ()
+    assert commanded_stops(recording) == (stop,)
+    assert commanded_stops(seen(commanded=(plain, turn, stop))) == ()
 
 
 def test_what_was_the_case_is_what_came_last():
@@ -124,12 +124,12 @@ def test_of_many_changes_few_are_looked_at():
 
 
 def test_a_section_keeps_its_times_and_what_led_to_it():
-    told = (Told(0.0, motion(FOLDED, FOLDED + 0.4)),)
+    told = (CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4)),)
     part = section(seen(told=told), 0.25, 0.75)
     assert part.times[0] >= 0.25
     assert part.times[-1] <= 0.75
     assert len(part.times) == len(part.positions) == len(part.velocities) == 24
-    assert part.told == told
+    assert part.commanded == told
     with pytest.raises(RecordError, match=r'from 3 to 4, expected times between 0\.00 and 1\.00'):
         section(seen(), 3.0, 4.0)
 
@@ -144,7 +144,7 @@ def test_a_section_keeps_its_times_and_what_led_to_it():
         {'velocities': np.zeros((2, 3))},
     ],
 )
-def test_what_is_no_run_is_refused(fields):
+def test_what_is_no_run_is_rejected(fields):
     good = {'times': [0.0, 1.0], 'positions': np.zeros((2, 4)), 'velocities': np.zeros((2, 4))}
     Recording(**good)
     with pytest.raises(RecordError):

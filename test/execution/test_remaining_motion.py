@@ -13,10 +13,10 @@ from rrth_planner.collision.reference_checker import frames, quintic_states
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import (
+    escapes_by_continuing,
     is_place_free,
-    is_still_free,
-    leads_away,
-    taken_over,
+    is_remaining_free,
+    with_lead_in,
 )
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
@@ -94,8 +94,8 @@ def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach)
     scene = Scene((*wearer().boxes, *random_boxes(rng, n_more, spread=3.0, largest=0.2).boxes))
     world = arm_world(arm, scene, MARGIN, RAY)
     is_proven = certify(motion, world, max(phase, 0.0)).is_proven
-    running = ExecutingMotion(trajectory=motion, start_time=0.0, reach=reach)
-    is_free = is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+    running = ExecutingMotion(trajectory=motion, start_time=0.0, target_distance=reach)
+    is_free = is_remaining_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
     assert is_free == (is_proven and world.is_valid(motion.positions[-1], max(reach, RAY)))
 
 
@@ -112,7 +112,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
     where = tool[:3, 3] + rng.uniform(0.0, 0.5) * tool[:3, 2] + rng.normal(0.0, 0.1, 3)
     hand = Box('hand', where, rng.uniform(0.05, 0.2, 3), np.eye(3))
     scene = Scene((*wearer().boxes, hand))
-    is_free = is_still_free(
+    is_free = is_remaining_free(
         ExecutingMotion(trajectory=motion, start_time=0.0),
         phase,
         arm,
@@ -184,8 +184,12 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         if scene is None:
             continue
         running = ExecutingMotion(trajectory=motion, start_time=0.0)
-        assert not is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
-        found = leads_away(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+        assert not is_remaining_free(
+            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
+        )
+        found = escapes_by_continuing(
+            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
+        )
         told[found] += 1
         hand = Scene(scene.boxes[-1:])
         gaps = [reference_checker.least_clearance(arm, hand, row[None], RAY) for row in q]
@@ -194,7 +198,9 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
             assert gaps[-1] >= MARGIN - 1e-6
         # Nearer for a while: going on is no way out.
         assert not (found and min(gaps) < gaps[0] - 1e-3)
-        assert not leads_away(running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY)
+        assert not escapes_by_continuing(
+            running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY
+        )
     assert min(told.values()) >= 5, told
 
 
@@ -231,7 +237,7 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
         )
         after = ExecutingMotion(trajectory=later, start_time=150.0)
         now = 150.0 - begin_ahead
-        whole = taken_over(before, begin - late, after, now)
+        whole = with_lead_in(before, begin - late, after, now)
         # Where nothing moves no place tells the time.
         if np.abs(sample(motion, [at])[1]).max() < 0.05:
             continue
@@ -254,10 +260,10 @@ def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
     half = 0.5 * motion.duration
     later = part_of(motion, half, motion.duration)
     after = ExecutingMotion(trajectory=later, start_time=100.0 + half)
-    assert taken_over(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
+    assert with_lead_in(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
     # Its motion is over before, has not begun, or does not lead there.
-    assert taken_over(before, 0.9 * motion.duration, after, 100.0) is after
-    assert taken_over(before, -0.1, after, 100.0) is after
+    assert with_lead_in(before, 0.9 * motion.duration, after, 100.0) is after
+    assert with_lead_in(before, -0.1, after, 100.0) is after
     aside = Trajectory(
         times=later.times,
         positions=later.positions + [0.0, 1e-4, 0.0, 0.0],
@@ -265,4 +271,4 @@ def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
         accelerations=later.accelerations,
     )
     aside = ExecutingMotion(trajectory=aside, start_time=100.0 + half)
-    assert taken_over(before, half - 0.02, aside, 100.0 + half - 0.02) is aside
+    assert with_lead_in(before, half - 0.02, aside, 100.0 + half - 0.02) is aside

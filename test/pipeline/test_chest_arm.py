@@ -79,7 +79,9 @@ def test_it_plans_round_the_seated_wearer_without_a_touch():
         states = positions_at(trajectory, times)
         assert np.array_equal(states[0], q)
         assert first_contact(arm, scene, states, ray, margin) is None
-        assert first_contact(arm, scene, states[-1:], max(ray, plan.reach), margin) is None
+        assert (
+            first_contact(arm, scene, states[-1:], max(ray, plan.target_distance), margin) is None
+        )
         q = trajectory.positions[-1]
         assert pointing_error(arm, q, target) < 1e-6
     assert n_bent >= 2

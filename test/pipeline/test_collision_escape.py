@@ -14,7 +14,7 @@ from rrth_planner.collision.reference_checker import bar_box_touch, first_contac
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import is_still_free
+from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
@@ -223,7 +223,7 @@ def test_an_arm_whose_shoulder_is_covered_has_no_way_out():
 
 @examples(15)
 @given(SEEDS)
-def test_deeper_is_refused_with_part_box_and_depth(seed):
+def test_deeper_is_rejected_with_part_box_and_depth(seed):
     arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06)
     plan = ask(arm, scene, q_start)
     assert plan.status is PlanStatus.START_IN_COLLISION
@@ -299,7 +299,7 @@ def test_an_arm_beyond_its_limits_is_not_led_out():
     assert ask(arm, scene, q).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_a_hand_that_is_closed_round_the_arm_is_refused():
+def test_a_hand_that_is_closed_round_the_arm_is_rejected():
     arm, scene = pressed()
     hand = scene.boxes[-1]
     others = [
@@ -344,7 +344,7 @@ def test_a_search_for_a_way_out_is_cancelled_in_mid_look(after):
     assert next(n_polls) < after + 8
 
 
-def test_a_target_in_the_wearer_is_refused_wherever_the_arm_is():
+def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED, target=[0.0, 0.0, 0.0])
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
@@ -357,7 +357,7 @@ def second_opinion(arm, scene, world, trajectory):
     )
 
 
-def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
+def test_a_way_out_that_touches_for_the_second_judge_is_rejected(monkeypatch):
     arm, scene = pressed()
     touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
     monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
@@ -405,18 +405,18 @@ def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
     running = ExecutingMotion(
         trajectory=plan.trajectory,
         start_time=0.0,
-        reach=plan.reach,
+        reach=plan.target_distance,
         escape_time=plan.escape_time,
     )
     kept = {'margin': MARGIN, 'ray_guard_length': RAY}
     for phase in np.linspace(0.0, plan.trajectory.duration, 12):
-        assert is_still_free(running, phase, arm, scene, **kept)
-    assert not is_still_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
+        assert is_remaining_free(running, phase, arm, scene, **kept)
+    assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
     # The hand follows the arm further than it goes.
     hand = scene.boxes[-1]
     near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
     followed = Scene((*scene.boxes[:-1], near))
-    assert not is_still_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+    assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
 
 
 def test_an_empty_world_has_no_depth():

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a body and a target to a motion: what is solved is safe, what is refused had to be."""
+"""From a body and a target to a motion: what is solved is safe, what is rejected had to be."""
 
 from dataclasses import replace
 import re
@@ -18,7 +18,7 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
-from rrth_planner.pipeline.rejection import goal_refusal
+from rrth_planner.pipeline.rejection import goal_rejection
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
 from rrth_planner.timing.lead_in import lead_in
@@ -88,7 +88,7 @@ def test_what_is_solved_never_touches_and_ends_on_target(answers):
         assert first_contact(arm, scene, q, RAY, MARGIN) is None
         reach = np.linalg.norm(target - tool_pose(arm, q[-1])[:3, 3])
         assert first_contact(arm, scene, q[-1:], max(RAY, reach), MARGIN) is None
-        assert plan.reach == pytest.approx(reach, abs=1e-9)
+        assert plan.target_distance == pytest.approx(reach, abs=1e-9)
         assert pointing_error(arm, q[-1], target) < 1e-6
         assert np.array_equal(q[0], q_start)
         assert not trajectory.velocities[[0, -1]].any()
@@ -115,14 +115,14 @@ def aiming_postures(arm, scene, target, rng, n):
                 yield q, reach
 
 
-def test_what_is_refused_had_to_be(answers):
+def test_what_is_rejected_had_to_be(answers):
     rng = np.random.default_rng(92)
     arm = table_1_arm()
-    n_refused = 0
+    n_rejected = 0
     for scene, _, target, plan in answers:
         if plan.status is PlanStatus.SOLVED:
             continue
-        n_refused += 1
+        n_rejected += 1
         assert plan.trajectory is None
         assert plan.path is None
         assert np.isnan(plan.clearance)
@@ -138,10 +138,10 @@ def test_what_is_refused_had_to_be(answers):
             for q, reach in aiming_postures(arm, scene, target, rng, 5000):
                 ray = max(RAY, reach)
                 assert dense_touch(arm, scene, MARGIN, ray, line(q, q), 1) >= 0
-    assert n_refused >= 2
+    assert n_rejected >= 2
 
 
-def test_a_target_in_the_wearer_is_refused_by_name():
+def test_a_target_in_the_wearer_is_rejected_by_name():
     for box in wearer().boxes:
         plan = ask(wearer(), FOLDED, box.center)
         assert plan.status is PlanStatus.GOAL_IN_COLLISION
@@ -165,16 +165,16 @@ def test_a_share_of_postures_is_no_more_than_all_of_them():
     goals = GoalSet(
         q_goals=q[:0], n_bent=0, n_aiming=40, q_blocked=q, blocked_reaches=np.full(40, 2.0)
     )
-    refusal = goal_refusal(world, goals)
-    (share,) = re.findall(r'\((\d+) %\)', refusal.sentence)
+    rejection = goal_rejection(world, goals)
+    (share,) = re.findall(r'\((\d+) %\)', rejection.sentence)
     assert share == '100'
     # What the proof says, not a distance that may be greater; of both bars the deeper.
     depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
-    (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', refusal.sentence)
+    (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', rejection.sentence)
     assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
 
 
-def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_and_box():
+def test_a_target_that_every_ray_must_cross_the_wearer_for_is_rejected_with_bar_and_box():
     # A target walled in on all sides but not inside a box.
     target = np.array([1.5, -0.1, 0.4])
     walls = []
@@ -193,7 +193,7 @@ def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_a
     assert 'm including the margin' in plan.sentence
 
 
-def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
+def test_a_start_in_the_wearer_is_rejected_with_bar_and_box():
     rng = np.random.default_rng(93)
     world = wearer_world()
     bare = wearer_world(margin=0.0)
@@ -216,7 +216,7 @@ def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
     assert True in said
 
 
-def test_a_start_beyond_a_limit_is_refused_with_joint_and_limits():
+def test_a_start_beyond_a_limit_is_rejected_with_joint_and_limits():
     arm = table_1_arm()
     for k, name in enumerate(arm.joint_names):
         for side in range(2):

@@ -79,7 +79,11 @@ def test_it_answers_as_this_process_would(process, target):
     here, there = (
         planner.plan(question(target)) for planner in (in_process.InProcessPlanner(), process)
     )
-    assert (there.status, there.reach, there.seed) == (here.status, here.reach, here.seed)
+    assert (there.status, there.target_distance, there.seed) == (
+        here.status,
+        here.target_distance,
+        here.seed,
+    )
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         values = getattr(there.trajectory, name)
         np.testing.assert_array_equal(values, getattr(here.trajectory, name))
@@ -190,7 +194,7 @@ def test_an_error_that_cannot_be_sent_is_told_in_words():
     ours.close()
 
 
-def test_an_arm_that_cannot_point_is_refused(process):
+def test_an_arm_that_cannot_point_is_rejected(process):
     turns = ArmModel(
         joint_names=('turn',),
         is_prismatic=(False,),

@@ -97,7 +97,7 @@ def _destroyed_nodes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(Node, '__init__', noted)
     yield
     for node in list(made):
-        # One that has been destroyed, or was refused before it had begun.
+        # One that has been destroyed, or was rejected before it had begun.
         with suppress(InvalidHandle, AttributeError), node.handle:
             node.destroy_node()
 

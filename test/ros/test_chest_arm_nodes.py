@@ -93,7 +93,7 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
     assert not [line for line in said if 'rejected' in line or 'ERROR' in line]
 
 
-def test_a_start_for_another_number_of_joints_is_refused_in_a_sentence(wait_until):
+def test_a_start_for_another_number_of_joints_is_rejected_in_a_sentence(wait_until):
     said = []
     arguments = ['--ros-args', '-p', f'arm:={resource_path(ARM)}']
     with ChildProcess('rrth_planner.ros.playback_node', arguments, said.append):

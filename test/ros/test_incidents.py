@@ -63,12 +63,12 @@ def replayed(file):
 
 
 def level(stranger):
-    return stranger.heard['/diagnostics'][-1].status[0].level
+    return stranger.received['/diagnostics'][-1].status[0].level
 
 
 def nothing_published(stranger):
     topics = ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers')
-    return not any(stranger.heard[topic] for topic in topics)
+    return not any(stranger.received[topic] for topic in topics)
 
 
 @pytest.mark.parametrize('velocity', [None, [0.3, 0.0, 0.0, -0.2]], ids=['at rest', 'moving'])
@@ -131,7 +131,7 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
 
     def follow_up():
-        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_begun))
+        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_motions))
         stranger.wait_until(lambda: not monitor._stops)
         # Whatever the node's thread is at.
         time.sleep(0.05)
@@ -252,7 +252,9 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkey
     answers.append(stranger.answer())
 
     def lines():
-        return [msg for msg in stranger.heard['/rosout'] if msg.name == name and '): ' in msg.msg]
+        return [
+            msg for msg in stranger.received['/rosout'] if msg.name == name and '): ' in msg.msg
+        ]
 
     stranger.wait_until(lambda: len(lines()) == len(answers))
     assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
@@ -294,7 +296,7 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
         (status,) = diagnostics_msg('', Time(), now, heard, parameters, report).status
         return status.level, status.message
 
-    def refuse():
+    def reject():
         raise MessageError('no point')
 
     assert summary() == (DiagnosticStatus.WARN, 'waiting for body, target, joints')
@@ -304,7 +306,7 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     assert summary(code=ErrorCode.SUCCESS, sentence='so') == (DiagnosticStatus.OK, 'so')
     late = {'code': ErrorCode.TIMED_OUT, 'sentence': 'no path'}
     assert summary(**late) == (DiagnosticStatus.WARN, 'TIMED_OUT (-6): no path')
-    heard.target.accept(refuse, 10.0)
+    heard.target.accept(reject, 10.0)
     assert summary(**late) == (DiagnosticStatus.WARN, 'target rejected: no point')
     assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
     broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
@@ -350,7 +352,7 @@ def test_what_is_in_the_way_is_named_with_the_part_of_the_arm(start):
 def test_postures_that_all_touch_are_told_with_part_and_box(start):
     planner, stranger = start()
     body = samples.wearer()
-    # A wall between the arm and the target, larger than the arm can look past.
+    # A wall between the arm and the target, larger than the arm can point past.
     body.markers.append(samples.box('wall', 7, (1.0, 0.0, 0.0), (0.1, 20.0, 20.0)))
     say_all(planner, stranger, body_boxes=body)
     message = stranger.answer().message

@@ -113,9 +113,9 @@ def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_
         wait_until(lambda: heard[1].joints.received is not None)
         wait_until(lambda: heard[1].target.received is not None)
         assert strangers[1].answer().success
-        wait_until(lambda: all(s.heard['joint_trajectory'] for s in strangers))
+        wait_until(lambda: all(s.received['joint_trajectory'] for s in strangers))
     for stranger, point in zip(strangers, points, strict=True):
-        (msg,) = stranger.heard['joint_trajectory']
+        (msg,) = stranger.received['joint_trajectory']
         q = np.array(msg.points[-1].positions)
         assert pointing_error(load_arm(), q, np.array(point)) < 1e-6
     for planner, stranger in zip(planners, strangers, strict=True):
@@ -167,7 +167,7 @@ def _tf(monkeypatch):
 @pytest.mark.usefixtures('tf')
 def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     planner, stranger = start()
-    buffer = planner._listener._frames._buffer
+    buffer = planner._scene_monitor._frames._buffer
     assert buffer.node is buffer.listener is planner
     # (0.1, -0.5, 0.3) from the camera is (1.5, 0.1, 0.3) from the torso.
     say_all(planner, stranger, target=target(0.1, -0.5, 0.3, 'camera'))
@@ -181,7 +181,7 @@ def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     np.testing.assert_allclose(placed.rotation[:, 0], [0.0, 1.0, 0.0], atol=1e-12)
     assert stranger.answer().success
     stranger.publishers['target'].publish(target(frame='gone'))
-    stranger.wait_until(lambda: inputs.target.is_last_refused)
+    stranger.wait_until(lambda: inputs.target.is_last_rejected)
     message = stranger.answer().message
     assert message.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
     assert 'frame "gone", expected a frame that TF can transform to "torso": ' in message
@@ -224,8 +224,8 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
     say_all(planner, stranger)
     assert seconds(planner) == 0.0
     assert stranger.answer().success
-    n = len(stranger.heard['/diagnostics'])
-    wait_until(lambda: len(stranger.heard['/diagnostics']) > n + 2)
+    n = len(stranger.received['/diagnostics'])
+    wait_until(lambda: len(stranger.received['/diagnostics']) > n + 2)
     set_clock(clock, 100.0, wait_until, planner)
     inputs = inputs_of(planner)
     for now, is_fresh in ((100.0, True), (100.5, True), (101.5, False), (20.0, False)):
@@ -342,15 +342,15 @@ def test_bytes_and_huge_messages_from_the_wire_end_no_node(start, spinning, wait
     for k, (topic, heard) in enumerate(zip(topics, inputs.all.values(), strict=True)):
         before = heard.value
         stranger.publishers[topic].publish(b'\0\1\0\0' + b'\xff' * 40)
-        wait_until(lambda h=heard: h.n_refused == 1)
-        assert 'bytes that are no ' in str(heard.refusal)
+        wait_until(lambda h=heard: h.n_rejected == 1)
+        assert 'bytes that are no ' in str(heard.rejection)
         assert heard.value is before, k
     stranger.publishers['body_boxes'].publish(array(*(box(index=k) for k in range(3000))))
-    wait_until(lambda: inputs.body.n_refused == 2)
-    assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.refusal)
+    wait_until(lambda: inputs.body.n_rejected == 2)
+    assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.rejection)
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: not any(heard.is_last_refused for heard in inputs.all.values()))
+    wait_until(lambda: not any(heard.is_last_rejected for heard in inputs.all.values()))
     assert stranger.answer().success
 
 

@@ -18,7 +18,7 @@ from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E40
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input, Inputs, PlanInputs  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
@@ -141,7 +141,7 @@ def test_the_motion_goes_on_from_where_the_arm_will_be(ask, since):
     motion = _swings()
     outcome, now = ask(motion, since)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    start = outcome.start
+    start = outcome.handover
     assert LEADS[0] <= start.time - BEGIN - since <= LEADS[0] + 0.01
     # Told before it begins, and not long before.
     assert start.time - EARLY * LEADS[0] <= now <= start.time
@@ -156,14 +156,14 @@ def test_the_motion_goes_on_from_where_the_arm_will_be(ask, since):
 def test_where_the_motion_ends_the_next_one_begins_at_rest(ask, since):
     outcome, _ = ask(_swings(), since)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start is None
+    assert outcome.handover is None
 
 
 def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
     outcome, now = ask(_slow(), 3.0, is_known=False)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.takeover.running is None
-    assert abs(now - outcome.start.time) < 5e-3
+    assert outcome.handover.start_state.running is None
+    assert abs(now - outcome.handover.time) < 5e-3
 
 
 def test_a_clock_that_stands_still_is_not_waited_for(ask):
@@ -174,15 +174,15 @@ def test_a_clock_that_stands_still_is_not_waited_for(ask):
     thread.join(30.0)
     ((outcome, _),) = outcomes
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
+    assert outcome.handover.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
 
 
 def test_a_motion_whose_time_has_passed_is_planned_anew(ask):
     # So long the node needs to read what came.
     outcome, now = ask(_slow(), 3.0, reading=0.1)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
-    assert now <= outcome.start.latest
+    assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
+    assert now <= outcome.handover.latest
     outcome, _ = ask(_slow(), 3.0, reading=0.5)
     assert outcome.code is ErrorCode.TIMED_OUT
     assert outcome.trajectory is None
@@ -199,22 +199,22 @@ def test_a_motion_whose_time_has_passed_when_all_is_read_is_planned_anew(ask):
     # It is not late yet when it is looked at.
     outcome, now = ask(_slow(), 3.0, reading=0.03)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time > BEGIN + 3.0 + LEADS[1]
-    assert now <= outcome.start.latest
+    assert outcome.handover.time > BEGIN + 3.0 + LEADS[1]
+    assert now <= outcome.handover.latest
 
 
 def test_a_wearer_who_never_stands_still_does_not_make_a_motion_late(ask):
     # There is time for one more check, but not for two.
     outcome, now = ask(_slow(), 3.0, checking=0.02)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 3.0 + LEADS[0], abs=0.01)
-    assert now <= outcome.start.latest
+    assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[0], abs=0.01)
+    assert now <= outcome.handover.latest
 
 
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):
     # The arm's own rest is all there is to go by.
     outcome, _ = ask(_swings(), 1.0, is_known=False)
-    assert outcome.start is None
+    assert outcome.handover is None
 
 
 def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
@@ -222,20 +222,20 @@ def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
     stop = fast_stop(motion, 0.4, worlds.limits())
     q, v, _ = (row[0] for row in sample(motion, [0.39]))
     reading = JointReading(q, v, BEGIN + 0.39, BEGIN + 0.39, float('inf'))
-    inputs = PlanInputs(worlds.wearer(), TARGET, reading)
+    inputs = InputSnapshot(worlds.wearer(), TARGET, reading)
     running = ExecutingMotion(trajectory=stop, start_time=BEGIN + 0.4)
-    found = inputs.ahead(running, BEGIN + 0.46, worlds.table_1_arm())
+    found = inputs.start_state_at(running, BEGIN + 0.46, worlds.table_1_arm())
     assert found.running is stop
     assert np.abs(found.state.positions - sample(stop, [0.06])[0][0]).max() < 1e-9
     # Where it was before the stop began its own velocity tells.
-    found = inputs.ahead(running, BEGIN + 0.395, worlds.table_1_arm())
+    found = inputs.start_state_at(running, BEGIN + 0.395, worlds.table_1_arm())
     assert np.abs(found.state.positions - (q + 0.005 * v)).max() < 1e-12
 
 
 def test_an_arm_that_begins_to_move_while_a_plan_is_made_is_planned_for_as_it_moves(ask):
     outcome, _ = ask(_swings(), since=-1e-3, reading=0.05)
     assert outcome.code is ErrorCode.SUCCESS
-    assert outcome.start is not None
+    assert outcome.handover is not None
     # By somebody else it is not known how it goes on.
     outcome, _ = ask(_swings(), since=-1e-3, reading=0.05, is_known=False)
     assert outcome.code is ErrorCode.START_STATE_INVALID
@@ -248,4 +248,4 @@ def test_an_arm_that_has_hardly_begun_its_motion_is_not_one_at_rest(ask, pace):
     assert np.abs(pace * sample(motion, [pace * reading])[1]).max() < 0.5 * REST_SPEED
     outcome, _ = ask(motion, since=-1e-3, reading=reading, pace=pace)
     assert outcome.code is ErrorCode.SUCCESS
-    assert outcome.start is not None
+    assert outcome.handover is not None

@@ -74,7 +74,7 @@ class Stranger:
     def __init__(self, namespace, wait_until):
         self.node = Node('stranger', namespace=namespace)
         self.wait_until = wait_until
-        self.heard = {}
+        self.received = {}
         self.publishers = {}
         for name, msg_type in (
             ('joint_trajectory', JointTrajectory),
@@ -89,8 +89,8 @@ class Stranger:
         }
 
     def hear(self, name, msg_type, profile):
-        self.heard[name] = []
-        self.node.create_subscription(msg_type, name, self.heard[name].append, profile)
+        self.received[name] = []
+        self.node.create_subscription(msg_type, name, self.received[name].append, profile)
 
     def say(self, topic, msg, profile=LATCHED):
         publisher = self.node.create_publisher(type(msg), topic, profile)
@@ -109,7 +109,7 @@ class Stranger:
 
     def value(self, key):
         """Return a value of the last diagnostics; they are of all namespaces in a process."""
-        arrays = self.heard['/diagnostics']
+        arrays = self.received['/diagnostics']
         if not arrays:
             return None
         return {v.key: v.value for v in arrays[-1].status[0].values}[key]
@@ -140,7 +140,7 @@ def _start(spinning, wait_until, request):
 
 
 def inputs_of(planner):
-    return planner._listener._inputs
+    return planner._scene_monitor._inputs
 
 
 def say_all(planner, stranger, but=(), **messages):
@@ -151,7 +151,7 @@ def say_all(planner, stranger, but=(), **messages):
     inputs = inputs_of(planner)
     of_topic = dict(zip(TOPICS, (inputs.body, inputs.target, inputs.joints), strict=True))
     stranger.wait_until(
-        lambda: all(of_topic[n].received is not None or of_topic[n].refusal for n in topics)
+        lambda: all(of_topic[n].received is not None or of_topic[n].rejection for n in topics)
     )
 
 
@@ -164,8 +164,8 @@ def test_a_plan_is_published_and_then_answered(start):
     for word in ('waypoints', 'duration', 'path length', 'clearance', 'planning time', 'seed 3'):
         assert word in response.message
     for topic in ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers'):
-        stranger.wait_until(lambda topic=topic: stranger.heard[topic])
-    (msg,) = stranger.heard['joint_trajectory']
+        stranger.wait_until(lambda topic=topic: stranger.received[topic])
+    (msg,) = stranger.received['joint_trajectory']
     assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == (0, 0)
     assert msg.header.frame_id == 'torso'
     trajectory = joint_trajectory_from_msg(msg, JOINTS)
@@ -173,8 +173,8 @@ def test_a_plan_is_published_and_then_answered(start):
     for values in (trajectory.velocities, trajectory.accelerations):
         assert not values[[0, -1]].any()
     assert pointing_error(load_arm(), trajectory.positions[-1], np.array([1.5, 0.1, 0.3])) < 1e-6
-    assert len(stranger.heard['rrth_planner/tool_path'][0].poses) > 1
-    shown = {m.ns for m in stranger.heard['rrth_planner/markers'][0].markers}
+    assert len(stranger.received['rrth_planner/tool_path'][0].poses) > 1
+    shown = {m.ns for m in stranger.received['rrth_planner/markers'][0].markers}
     assert shown == {'', 'body', 'arm_start', 'arm_goal', 'ray', 'tool_path'}
 
 
@@ -186,7 +186,7 @@ def test_get_plan_takes_its_target_and_returns_the_path_of_the_tool(start):
     path = stranger.answer('get_plan', request).plan
     assert path.header.frame_id == 'torso'
     assert len(path.poses) > 1
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
 
 
 @pytest.mark.parametrize(
@@ -211,7 +211,7 @@ def test_get_plan_answers_a_bad_request_with_an_empty_path(start, field, value, 
     setattr(thing, names[-1], value)
     assert not stranger.answer('get_plan', request).plan.poses
     stranger.wait_until(lambda: stranger.value('last code') == code)
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 @pytest.mark.parametrize('missing', TOPICS)
@@ -222,7 +222,7 @@ def test_without_an_input_the_answer_names_its_topic(start, missing):
     assert not response.success
     assert response.message.startswith('UNABLE_TO_AQUIRE_SENSOR_DATA (-5): no ')
     assert f'/{missing}, expected' in response.message
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 @pytest.mark.parametrize(
@@ -263,7 +263,7 @@ def test_each_obstacle_to_planning_has_its_code(start, messages, answer):
     assert not response.success
     assert response.message.startswith(answer)
     stranger.wait_until(lambda: stranger.value('last code') == answer.split(':')[0])
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 def leaned(deeper=0.0):
@@ -285,25 +285,25 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(sta
         ', escape from box "hand/0", penetration depth 0.0275 m at pointing ray'
         in response.message
     )
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     # The present body, said again, does not stop it.
     stranger.publishers['body_boxes'].publish(leaned())
     stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
-    (msg,) = stranger.heard['joint_trajectory']
+    (msg,) = stranger.received['joint_trajectory']
     trajectory = joint_trajectory_from_msg(msg, JOINTS)
     np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
     for values in (trajectory.velocities, trajectory.accelerations):
         assert not values[[0, -1]].any()
 
 
-def test_deeper_than_escape_depth_is_refused(start):
+def test_deeper_than_escape_depth_is_rejected(start):
     planner, stranger = start(escape_depth=0.01)
     say_all(planner, stranger, body_boxes=leaned())
     response = stranger.answer()
     assert not response.success
     assert response.message.startswith(
-        'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": 0.0275 m '
-        'including the margin, expected less than 0.01 m (escape_depth)'
+        'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": '
+        'penetration depth 0.0275 m including the margin, expected less than 0.01 m (escape_depth)'
     )
     planner.set_parameters([Parameter(name='escape_depth', value=0.03)])
     assert stranger.answer().success
@@ -375,14 +375,14 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
     touches.append(Violation(0.001, 0.01, 'pointing ray', 'hand/0'))
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 @pytest.mark.parametrize(
     ('timeout', 'answer'),
     [('body_timeout', 'SENSOR_INFO_STALE (-24)'), ('joint_timeout', 'ROBOT_STATE_STALE (-23)')],
 )
-def test_old_inputs_are_refused_with_their_age(start, timeout, answer):
+def test_old_inputs_are_rejected_with_their_age(start, timeout, answer):
     planner, stranger = start(**{timeout: 1e-6})
     say_all(planner, stranger)
     message = stranger.answer().message
@@ -409,7 +409,7 @@ def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
     wait_until(lambda: running.done() and waiting.done())
     for future in (running, waiting):
         assert future.result().message.startswith('PREEMPTED (-7): ')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     stranger.publishers['body_boxes'].publish(wearer())
     wait_until(lambda: inputs_of(planner).body.value.n_boxes == 2)
     assert stranger.answer().success
@@ -446,7 +446,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
     assert message == f'{sentence}to replay it: ./run exec replay {file}'
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 
 
@@ -480,22 +480,22 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
     assert sentence in message
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 def test_an_arm_that_moves_is_taken_over_from_its_present_velocity(start):
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.3, 0.0, 0.0, -0.2]))
     assert stranger.answer().success
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
-    msg = stranger.heard['joint_trajectory'][-1]
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    msg = stranger.received['joint_trajectory'][-1]
     assert list(msg.points[0].velocities) == [0.3, 0.0, 0.0, -0.2]
     assert not any(msg.points[-1].velocities)
     # It begins at a time that it names, so that what is late on its way does not jump.
     assert msg.header.stamp.sec > 0
 
 
-def test_velocities_that_are_no_numbers_are_refused(start):
+def test_velocities_that_are_no_numbers_are_rejected(start):
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[NAN, 0.0, 0.0, 0.0]))
     assert stranger.answer().message == (
@@ -529,7 +529,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_starts)
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 @pytest.mark.parametrize(
@@ -582,7 +582,7 @@ def test_what_came_but_was_not_read_yet_counts(
     response = stranger.answer()
     assert not response.success
     assert answer in response.message
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 @pytest.mark.parametrize('is_in_the_way', [True, False])
@@ -607,7 +607,7 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
     # The proof alone decides about that one, and about those that follow.
     assert len(checked) == 1
     assert message.startswith('MOTION_PLAN_INVALIDATED' if is_in_the_way else 'SUCCESS')
-    assert bool(stranger.heard['joint_trajectory']) == (not is_in_the_way)
+    assert bool(stranger.received['joint_trajectory']) == (not is_in_the_way)
 
 
 def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
@@ -627,7 +627,7 @@ def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
     assert stranger.answer().success
     assert known[0]
     # Then it is, and the guard stops the arm.
-    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 2)
+    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
 
 
 def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
@@ -648,7 +648,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
     monkeypatch.setattr(ExecutorBarrier, 'call', call_a_busy_node)
     message = stranger.answer().message
     assert message.startswith('SENSOR_INFO_STALE (-24): the node is busy')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 def stop_for(planner):
@@ -657,7 +657,7 @@ def stop_for(planner):
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
-    monitor._stops.append(Stop(over, goal, parameters, None, True, monitor.n_begun))
+    monitor._stops.append(Stop(over, goal, parameters, None, True, monitor.n_motions))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -668,8 +668,8 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
     # Time enough for a plan that does not wait for rest.
     time.sleep(0.2)
     stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
-    (msg,) = stranger.heard['joint_trajectory']
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    (msg,) = stranger.received['joint_trajectory']
     assert list(msg.points[0].positions) == [0.1, *FOLDED[1:]]
     assert not any(msg.points[0].velocities)
     error = pointing_error(load_arm(), np.array(msg.points[-1].positions), [1.5, 0.1, 0.3])
@@ -682,7 +682,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     plan_motion = in_process_planner.plan_motion
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
-        planner._monitor.n_brakes += 1
+        planner._monitor.n_stops += 1
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
@@ -691,7 +691,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     assert message.startswith(
         'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
     )
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 
 
@@ -701,7 +701,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     stop_for(planner)
     stranger.wait_until(lambda: planner._queue._open)
-    planner._monitor.n_begun += 1
+    planner._monitor.n_motions += 1
     stranger.publishers['joint_states'].publish(joints())
     stranger.wait_until(lambda: not planner._queue._open)
     planner._queue._worker.submit(lambda: None).result(30.0)
@@ -730,12 +730,12 @@ def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(star
     queue = planner._queue
     stop_for(planner)
     stranger.wait_until(lambda: queue._open)
-    refused = stranger.answer('get_plan', GetPlan.Request()).plan
-    assert not refused.poses
-    assert not stranger.heard['joint_trajectory']
+    rejected = stranger.answer('get_plan', GetPlan.Request()).plan
+    assert not rejected.poses
+    assert not stranger.received['joint_trajectory']
     assert len(queue._open) == 1
     stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     stranger.wait_until(lambda: not queue._open)
 
 
@@ -747,7 +747,7 @@ def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
     stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
     said = stranger.value('last stop')
     assert said.startswith('arm holds its position: PLANNING_FAILED (-1): ')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 def test_broken_joint_positions_are_not_replaced_by_those_before(start):
@@ -757,14 +757,14 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
     good = inputs.joints.value
     for n, bad in enumerate((joints([NAN] * 4), joints(FOLDED[:3], velocity=[])), 1):
         stranger.publishers['joint_states'].publish(bad)
-        stranger.wait_until(lambda n=n: inputs.joints.n_refused == n)
+        stranger.wait_until(lambda n=n: inputs.joints.n_rejected == n)
         message = stranger.answer().message
         assert message.startswith('ROBOT_STATE_STALE (-23): the last message on /test_')
-        assert f'was rejected: {inputs.joints.refusal}' in message
+        assert f'was rejected: {inputs.joints.rejection}' in message
     assert inputs.joints.value is good
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     stranger.publishers['joint_states'].publish(joints())
-    stranger.wait_until(lambda: inputs.joint_refusal is None)
+    stranger.wait_until(lambda: inputs.joint_rejection is None)
     assert stranger.answer().success
 
 
@@ -790,7 +790,7 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
     monkeypatch.setattr(planner._planner, 'violation_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     (file,) = tmp_path.iterdir()
     incident = read_incident(file)
     # Planned for two boxes, judged for three.
@@ -814,7 +814,7 @@ def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch
     assert 'ended with code -9' in message
     # What was asked is kept, to be asked again.
     assert len(list(tmp_path.iterdir())) == 1
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 
 
@@ -834,9 +834,9 @@ def test_what_was_cancelled_is_never_published(start, monkeypatch):
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
-    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 1)
+    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 1)
 
 
 def test_a_cancel_does_not_count_what_was_published(start, monkeypatch):
@@ -867,10 +867,10 @@ def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
 
     monkeypatch.setattr(queue, '_show', show_late)
     assert stranger.answer().success
-    stranger.wait_until(lambda: stranger.heard['joint_trajectory'])
-    assert not stranger.heard['rrth_planner/markers']
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    assert not stranger.received['rrth_planner/markers']
     is_answered.set()
-    stranger.wait_until(lambda: stranger.heard['rrth_planner/markers'])
+    stranger.wait_until(lambda: stranger.received['rrth_planner/markers'])
 
 
 def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
@@ -901,7 +901,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     monkeypatch.setattr(Revalidation, 'disagreement', close_after_the_last_look)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
 
 
 def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
@@ -942,7 +942,7 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
         assert 'has expired parts: ' in message, message
         assert '"a pack"' in message
     assert sum('lifetime of "a pack"' in line for line in warnings) == 1
-    assert not stranger.heard['joint_trajectory']
+    assert not stranger.received['joint_trajectory']
     gone = box('pack')
     gone.action = Marker.DELETE
     stranger.publishers['body_boxes'].publish(array(gone))
@@ -952,7 +952,7 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
     planner, stranger = start()
-    heard = stranger.heard['/diagnostics']
+    heard = stranger.received['/diagnostics']
     stranger.wait_until(lambda: heard)
     name = planner.get_fully_qualified_name()[1:]
     assert heard[-1].status[0].name == f'{name}: planning'
@@ -970,8 +970,8 @@ def test_the_same_seed_gives_the_same_trajectory(start):
     say_all(planner, stranger)
     assert stranger.answer().success
     assert stranger.answer().success
-    stranger.wait_until(lambda: len(stranger.heard['joint_trajectory']) == 2)
-    one, other = stranger.heard['joint_trajectory']
+    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
+    one, other = stranger.received['joint_trajectory']
     assert one == other
 
 
@@ -989,7 +989,7 @@ def test_publishers_of_every_quality_are_heard_once(start, profile):
     stranger.wait_until(lambda: all(i.received is not None for i in inputs.all.values()))
     if profile is not BEST_EFFORT:
         # What the best-effort reader misses comes by another one.
-        hearers = planner._listener._subscriptions
+        hearers = planner._scene_monitor._subscriptions
         stranger.wait_until(lambda: all(profile.durability in h._reliable for h in hearers))
 
 
@@ -1018,7 +1018,7 @@ def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until)
         ('joint_states', joints(FOLDED[:3], JOINTS[:3]), "no ['joint_4']"),
     ],
 )
-def test_a_refused_message_is_reported_and_nothing_is_planned_until_a_good_one(
+def test_a_rejected_message_is_reported_and_nothing_is_planned_until_a_good_one(
     start, topic, msg, sentence
 ):
     planner, stranger = start()
@@ -1036,7 +1036,7 @@ def test_a_refused_message_is_reported_and_nothing_is_planned_until_a_good_one(
         assert message.startswith('SENSOR_INFO_STALE (-24): the last message on'), message
         assert sentence in message
         stranger.publishers[topic].publish(wearer())
-        stranger.wait_until(lambda: not inputs.body.is_last_refused)
+        stranger.wait_until(lambda: not inputs.body.is_last_rejected)
     assert stranger.answer().success
 
 
@@ -1057,7 +1057,7 @@ def test_what_two_threads_report_is_all_counted(start):
     def work():
         for _ in range(n):
             reporter.conclude(ErrorCode.SUCCESS, 'done', PlanReport())
-            reporter.braked(1e-3)
+            reporter.stop_published(1e-3)
 
     try:
         threads = [Thread(target=work) for _ in range(2)]
@@ -1068,17 +1068,17 @@ def test_what_two_threads_report_is_all_counted(start):
     finally:
         sys.setswitchinterval(interval)
     assert reporter.report.n_requests - n_before == reporter.report.n_solved == 2 * n
-    assert reporter._braked.n == 2 * n
+    assert reporter._stops_published.n == 2 * n
 
 
-def test_a_refused_target_is_not_replaced_by_the_one_before(start):
+def test_a_rejected_target_is_not_replaced_by_the_one_before(start):
     planner, stranger = start()
     say_all(planner, stranger)
     stranger.publishers['target'].publish(target(frame='camera'))
-    stranger.wait_until(lambda: inputs_of(planner).target.n_refused == 1)
+    stranger.wait_until(lambda: inputs_of(planner).target.n_rejected == 1)
     assert stranger.answer().message.startswith('FRAME_TRANSFORM_FAILURE (-21): the last message')
     stranger.publishers['target'].publish(target())
-    stranger.wait_until(lambda: not inputs_of(planner).target.is_last_refused)
+    stranger.wait_until(lambda: not inputs_of(planner).target.is_last_rejected)
     assert stranger.answer().success
 
 
@@ -1089,7 +1089,7 @@ def test_joint_states_of_other_machines_are_ignored(start):
     stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
     heard = inputs_of(planner).joints
     stranger.wait_until(lambda: heard.value.positions[0] == 0.1)
-    assert heard.n_refused == 0
+    assert heard.n_rejected == 0
 
 
 @pytest.fixture(name='process')

@@ -134,7 +134,7 @@ def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
     assert 'mm past the target' in ended.stdout
     wait_until(lambda: len(bystander.motions) == 2)
 
-    # A target that the planner refuses moves nothing.
+    # A target that the planner rejects moves nothing.
     report = report_of(0, 0, 0)
     assert (report['exit_code'], report['name']) == (1, 'GOAL_IN_COLLISION')
     assert 'inside box' in report['sentence']
@@ -155,8 +155,8 @@ def test_planning_without_moving_publishes_nothing(planner, bystander, body):
     assert report['figures']['seed'] == 3
     assert report['figures']['duration'] > 0.5
     assert report['pointing_error'] < 1e-6
-    refused = report_of(0, 0, 0, '--no-move', '--body', body)
-    assert (refused['exit_code'], refused['name']) == (1, 'GOAL_IN_COLLISION')
+    rejected = report_of(0, 0, 0, '--no-move', '--body', body)
+    assert (rejected['exit_code'], rejected['name']) == (1, 'GOAL_IN_COLLISION')
     assert not bystander.motions
     assert not bystander.bodies
 
@@ -301,18 +301,18 @@ def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
     first, message = turn(np.array(FOLDED) + 0.1, 0.1)
     second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
     other = JointTrajectory(joint_names=['wheel'])
-    client.told = [other]
+    client.commanded = [other]
     with pytest.raises(NotInTimeError, match='joint_trajectory: nothing for'):
         announced_motion(client, arm, 0.1)
-    client.told = [other, message, other]
+    client.commanded = [other, message, other]
     assert announced_motion(client, arm, 0.1).positions.tolist() == first.positions.tolist()
     # Afterwards the planner sends the arm elsewhere, and the other machine is told something.
     came = iter([[], [other], [newer, other]])
 
     def take_messages(_):
         time.sleep(0.02)
-        client.told += next(came, [])
-        ours = [msg for msg in client.told if msg.points][-1]
+        client.commanded += next(came, [])
+        ours = [msg for msg in client.commanded if msg.points][-1]
         client._on_state(joints(ours.points[-1].positions), ARRIVAL)
         client._on_state(joints(FOLDED[:2]), ARRIVAL)
 
@@ -327,7 +327,7 @@ def test_joint_positions_that_are_none_do_not_count(client):
     for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
         client._on_state(bad, ARRIVAL)
     assert client.positions(client._joint_names).tolist() == FOLDED
-    assert len(client.seen) == 1
+    assert len(client.observed) == 1
 
 
 def test_an_answer_is_read_back():
@@ -368,7 +368,7 @@ def test_a_body_replaces_every_box_before():
     assert after.n_boxes == len(load_body().boxes)
 
 
-def test_a_file_that_is_no_body_is_refused_by_name(tmp_path):
+def test_a_file_that_is_no_body_is_rejected_by_name(tmp_path):
     file = tmp_path / 'boxes.yaml'
     for text in ('boxes: []', 'markers: 7', 'markers: [{nothing: 1}]', '[]', '}{'):
         file.write_text(text)

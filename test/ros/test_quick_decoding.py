@@ -77,7 +77,7 @@ def test_every_field_comes_through(msg):
 
 @worlds.examples(200)
 @given(msg=ARRAYS, data=st.data())
-def test_what_is_no_message_is_refused_as_by_rclpy(msg, data):
+def test_what_is_no_message_is_rejected_as_by_rclpy(msg, data):
     whole = bytearray(serialize_message(msg))
     for _ in range(data.draw(st.integers(0, 3))):
         whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))

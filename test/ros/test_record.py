@@ -96,8 +96,8 @@ def nanoseconds(stamp):
 def _run(ros_context, tmp_path_factory):
     """Record one motion of planner and playback; return the file and what a node heard."""
     path = tmp_path_factory.mktemp('run') / 'run.mcap'
-    node, lines, told, states = Node('test_client'), [], [], []
-    node.create_subscription(JointTrajectory, 'joint_trajectory', told.append, LATCHED)
+    node, lines, motion, states = Node('test_client'), [], [], []
+    node.create_subscription(JointTrajectory, 'joint_trajectory', motion.append, LATCHED)
     node.create_subscription(JointState, 'joint_states', states.append, 10)
     bodies = node.create_publisher(MarkerArray, 'body_boxes', LATCHED)
     targets = node.create_publisher(PointStamped, 'target', BEST_EFFORT)
@@ -131,20 +131,20 @@ def _run(ros_context, tmp_path_factory):
                 line = process.stdout.readline()
                 assert line, process.stderr.read()
                 missing.discard(line.strip())
-            while not told:
+            while not motion:
                 targets.publish(target())
                 time.sleep(0.3)
                 answer = plan.call_async(Trigger.Request())
                 wait_until(answer.done)
                 if answer.result().success:
-                    wait_until(lambda: told)
-            q_end = np.array(told[0].points[-1].positions)
+                    wait_until(lambda: motion)
+            q_end = np.array(motion[0].points[-1].positions)
             wait_until(lambda: np.abs(np.array(states[-1].position) - q_end).max() < 1e-6)
             # The file has seen the arm at rest, and the planner's second of diagnostics.
             time.sleep(1.5)
         words = process.communicate()
     node.destroy_node()
-    return path, told[0], process.returncode, words
+    return path, motion[0], process.returncode, words
 
 
 def test_a_recorder_ends_well_and_says_what_it_has(run):
@@ -218,20 +218,20 @@ def test_a_recording_reads_back_as_a_run(run):
     arm = load_arm()
     reader = RecordingReader(path, arm, 'torso')
     found = reader.recording()
-    assert not reader.refused
+    assert not reader.rejected
     expected = joint_trajectory_from_msg(heard, arm.joint_names)
-    (told,) = found.told
+    (motion,) = found.commanded
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         np.testing.assert_array_equal(
-            getattr(told.trajectory, name), getattr(expected, name), name
+            getattr(motion.trajectory, name), getattr(expected, name), name
         )
     np.testing.assert_allclose(found.positions[-1], expected.positions[-1], atol=1e-6)
     # The playback follows to the bit, from when it heard of the motion, which is a little later.
-    late = found.times[np.flatnonzero(found.velocities.any(axis=1))[0]] - told.begin
+    late = found.times[np.flatnonzero(found.velocities.any(axis=1))[0]] - motion.begin
     assert late > 0.0
     (since, scene), (_, aim) = found.bodies[-1], found.targets[-1]
     assert [box.name for box in scene.boxes] == ['torso/0', 'head/0']
-    assert since < told.begin
+    assert since < motion.begin
     point = target().point
     np.testing.assert_array_equal(aim, [point.x, point.y, point.z])
     states = {state for _, state in found.guard}
@@ -275,7 +275,7 @@ def test_names_follow_namespace_and_remaps_and_types_are_looked_up(tmp_path, spi
     assert x == sorted(set(x))
 
 
-def refusal(*arguments, **options):
+def rejection(*arguments, **options):
     """Return the one sentence of a recorder that ends with code 1."""
     ended = subprocess.run(
         [*MODULE, *map(str, arguments)],
@@ -292,7 +292,7 @@ def refusal(*arguments, **options):
 
 def test_a_recorder_that_hears_nothing_says_so_and_leaves_no_file(tmp_path):
     path = tmp_path / 'run.mcap'
-    said = refusal('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
+    said = rejection('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
     assert 'nothing was heard' in said
     assert 'ROS_DOMAIN_ID' in said
     assert not path.exists()
@@ -301,12 +301,12 @@ def test_a_recorder_that_hears_nothing_says_so_and_leaves_no_file(tmp_path):
 def test_a_file_is_never_overwritten(tmp_path):
     path = tmp_path / 'run.mcap'
     path.write_text('precious')
-    assert 'exists already' in refusal('-o', path, '--duration', 0.5)
+    assert 'exists already' in rejection('-o', path, '--duration', 0.5)
     assert path.read_text() == 'precious'
 
 
 def test_a_folder_that_is_missing_is_named(tmp_path):
-    said = refusal('-o', tmp_path / 'nowhere' / 'run.mcap', '--duration', 0.5)
+    said = rejection('-o', tmp_path / 'nowhere' / 'run.mcap', '--duration', 0.5)
     assert 'No such file or directory' in said
 
 
@@ -317,16 +317,16 @@ def test_a_folder_that_is_missing_is_named(tmp_path):
         (['--ros-args', '-r', 'nonsense'], 'nonsense'),
     ],
 )
-def test_names_that_are_none_are_refused(tmp_path, arguments, words):
+def test_names_that_are_none_are_rejected(tmp_path, arguments, words):
     path = tmp_path / 'run.mcap'
-    said = refusal('-o', path, '--duration', 0.5, *arguments)
+    said = rejection('-o', path, '--duration', 0.5, *arguments)
     assert words in said
     assert '.c:' not in said
     assert not path.exists()
 
 
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'soon'])
-def test_a_bad_duration_is_refused(value):
+def test_a_bad_duration_is_rejected(value):
     ended = subprocess.run(
         [*MODULE, f'--duration={value}'], capture_output=True, text=True, timeout=LONGEST_WAIT
     )

@@ -384,11 +384,11 @@ def test_processors_are_kept_awake_where_their_host_takes_them_away(
     assert lose_time_asleep() is is_so
 
 
-def test_where_idle_priority_is_refused_nothing_is_kept_awake(monkeypatch):
-    def refuse(*_):
+def test_where_idle_priority_is_rejected_nothing_is_kept_awake(monkeypatch):
+    def reject(*_):
         raise PermissionError
 
-    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    monkeypatch.setattr(os, 'sched_setscheduler', reject)
     ours, theirs = Pipe()
     # It would not return otherwise: nobody ends it.
     assert stay_awake(theirs) is None

@@ -178,19 +178,19 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
 
 
 @pytest.mark.usefixtures('ros_context')
-def test_a_body_that_comes_late_is_no_younger_for_it_and_unsays_no_refusal():
+def test_a_body_that_comes_late_is_no_younger_for_it_and_unsays_no_rejection():
     heard = Input('body', WearerBody())
 
-    def refuse():
+    def reject():
         raise MessageError('no box')
 
     assert heard.accept(WearerBody, 1.0)
-    assert not heard.accept(refuse, 2.0)
+    assert not heard.accept(reject, 2.0)
     assert not heard.accept(WearerBody, 3.0, is_news=False)
-    assert heard.is_last_refused
+    assert heard.is_last_rejected
     assert heard.age(4.0) == 3.0
     assert heard.accept(WearerBody, 4.0)
-    assert not heard.is_last_refused
+    assert not heard.is_last_rejected
 
 
 @pytest.mark.usefixtures('ros_context')

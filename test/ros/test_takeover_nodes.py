@@ -25,7 +25,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TARGETS = ((2.0, 0.3, 0.4), (1.0, 1.5, 0.8), (1.5, -0.8, 1.2), (2.5, 0.8, 0.2), (0.8, 0.4, 2.0))
 ROUNDS = 2
 # At 500 Hz and half the pace a busy machine holds up the arm's own process: the planner sees that,
-# or the arm refuses what comes too late. Never is a motion from rest told to an arm that moves.
+# or the arm rejects what comes too late. Never is a motion from rest told to an arm that moves.
 MOST_HELD_UP, OFF_COURSE = 3, ('the arm is off its course by', 'the motion begins at ')
 FROM_REST = 'begins at velocity 0,'
 
@@ -85,12 +85,12 @@ def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
         wait_until(lambda: client.speed() == 0.0)
     moving = [answer for was_moving, answer in answers if was_moving]
     assert len(moving) >= 3
-    refused = [a.message for a in moving if not a.success]
+    rejected = [a.message for a in moving if not a.success]
     by_the_arm = [line for line in said if 'rejected' in line]
-    refused += by_the_arm
-    assert all(any(place in sentence for place in OFF_COURSE) for sentence in refused), refused
-    assert not any(FROM_REST in sentence for sentence in refused), refused
-    assert len(refused) <= (MOST_HELD_UP if settings else 0), refused
+    rejected += by_the_arm
+    assert all(any(place in sentence for place in OFF_COURSE) for sentence in rejected), rejected
+    assert not any(FROM_REST in sentence for sentence in rejected), rejected
+    assert len(rejected) <= (MOST_HELD_UP if settings else 0), rejected
     stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in client.states])
     q, v = (
         np.array([getattr(s, name) for s in client.states]) for name in ('position', 'velocity')

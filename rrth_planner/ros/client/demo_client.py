@@ -55,15 +55,15 @@ class DemoClient(PlannerClient):
 
     def ask_for_motion(self) -> tuple[Trajectory, float]:
         """Return the motion that the planner publishes, and its planning time [ms]."""
-        self.watch()
+        self.clear_history()
         response = self.ask(self.timeout)
         if not response.success:
             raise DemoError(f'the planner rejected the request: {response.message}')
-        self.wait_for(lambda: bool(self.told), 'joint_trajectory')
+        self.wait_for(lambda: bool(self.commanded), 'joint_trajectory')
         figures = answer_from_text(response.message).figures
         if 'planning_time_ms' not in figures:
             raise DemoError(f'no planning time in the answer "{response.message}"')
-        trajectory = joint_trajectory_from_msg(self.told[-1], self._joints_of_arm)
+        trajectory = joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm)
         return trajectory, figures['planning_time_ms']
 
     def wait_for_arrival(self, trajectory: Trajectory) -> None:
@@ -88,13 +88,15 @@ class DemoClient(PlannerClient):
         end = time.monotonic() + after
         while time.monotonic() < end:
             self.take_messages(0.005)
-        n = len(self.told)
-        self.seen = []
-        self.tell_body(body)
+        n = len(self.commanded)
+        self.observed = []
+        self.publish_body(body)
         # The stop begins in motion, what comes after it at rest.
         self.wait_for(
-            lambda: len(self.told) > n + 1 and not any(self.told[-1].points[0].velocities),
+            lambda: (
+                len(self.commanded) > n + 1 and not any(self.commanded[-1].points[0].velocities)
+            ),
             'a stop and a new motion',
         )
-        self.wait_for_arrival(joint_trajectory_from_msg(self.told[-1], self._joints_of_arm))
-        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.seen])
+        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm))
+        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.observed])

@@ -34,7 +34,7 @@ def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> T
 
     def is_heard() -> bool:
         # What an earlier request left on the latched topic may come first.
-        motions = _motions_of(client.told, arm)
+        motions = _motions_of(client.commanded, arm)
         found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
         return bool(found)
 
@@ -89,13 +89,16 @@ def _follow(
     tolerance: float,
     bar: Any,
 ) -> None:
-    n_told = len(client.told)
+    n_commanded = len(client.commanded)
     begin = present = time.monotonic()
     arrived_at: float | None = None
     while present - begin <= motion.duration + client.timeout:
         client.take_messages(0.02)
         present = time.monotonic()
-        newer, n_told = _motions_of(client.told[n_told:], arm), len(client.told)
+        newer, n_commanded = (
+            _motions_of(client.commanded[n_commanded:], arm),
+            len(client.commanded),
+        )
         if newer:
             # The wearer moved, and the planner stopped the arm or sent it another way.
             motion, begin, arrived_at = newer[-1], present, None
@@ -113,10 +116,10 @@ def _follow(
     raise NotInTimeError(_why(client, arm, motion, target, tolerance))
 
 
-def _motions_of(told: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
+def _motions_of(commanded: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
     """Return the motions of this arm; the topic may carry another machine's, or nonsense."""
     motions = []
-    for msg in told:
+    for msg in commanded:
         with suppress(MessageError):
             motions.append(joint_trajectory_from_msg(msg, arm.joint_names))
     return motions

@@ -59,8 +59,8 @@ class PlannerClient(Node):
         self._joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
         # All that the arm was told, and where it was, since `watch` was called.
-        self.told: list[JointTrajectory] = []
-        self.seen: list[JointState] = []
+        self.commanded: list[JointTrajectory] = []
+        self.observed: list[JointState] = []
         self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
@@ -120,13 +120,13 @@ class PlannerClient(Node):
             return True
         return all(abs(self.state.velocity[names.index(n)]) <= speed for n in joint_names)
 
-    def tell_body(self, body: MarkerArray) -> None:
+    def publish_body(self, body: MarkerArray) -> None:
         """Publish the wearer's body; return once the planner has it."""
-        self._tell(self._body, body)
+        self._publish(self._body, body)
 
-    def tell_target(self, target: PointStamped) -> None:
+    def publish_target(self, target: PointStamped) -> None:
         """Publish a target; return once the planner has it."""
-        self._tell(self._target, target)
+        self._publish(self._target, target)
 
     def ask(self, patience: float) -> Trigger.Response:
         """Return the planner's answer; ask it again while it has not heard everything [s]."""
@@ -137,15 +137,15 @@ class PlannerClient(Node):
             answer = self._call()
         return answer
 
-    def watch(self) -> None:
+    def clear_history(self) -> None:
         """Begin to write down what the arm is told and where it is."""
-        self.told, self.seen = [], []
+        self.commanded, self.observed = [], []
 
     def count_arms(self) -> int:
         """Return how many others hear what an arm is told."""
         return self.count_subscribers('joint_trajectory') - 1
 
-    def _tell(self, publisher: Any, message: Any) -> None:
+    def _publish(self, publisher: Any, message: Any) -> None:
         self.wait_for(
             lambda: is_heard(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
@@ -172,10 +172,10 @@ class PlannerClient(Node):
             # Of other joints, or nonsense: the arm is where it was seen last.
             return
         self.state = msg
-        self.seen.append(msg)
+        self.observed.append(msg)
 
     def _on_motion(self, msg: JointTrajectory) -> None:
-        self.told.append(msg)
+        self.commanded.append(msg)
 
 
 def is_heard(node: Node, publisher: Publisher) -> bool:

@@ -118,9 +118,9 @@ class RawSubscription(OpenSubscription):
     """Hears the same as its parent, and hands on the bytes."""
 
     def _hand_on(
-        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
+        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
-        hearer(data, arrival)
+        callback(data, arrival)
 
 
 class Recorder(Node):
@@ -146,7 +146,7 @@ class Recorder(Node):
         self._file = file
         # Why the recording cannot go on; raised by `check`, outside of callbacks.
         self._problem: RrthError | None = None
-        self._heard: list[OpenSubscription] = []
+        self._topics: list[OpenSubscription] = []
         self._missing: list[str] = []
         for topic in topics:
             if topic in known:
@@ -176,7 +176,7 @@ class Recorder(Node):
                     self._problem = problem
 
         # What was latched before is part of the recording too, whatever has come since.
-        self._heard.append(RawSubscription(self, msg_type, topic, write, on_late=write))
+        self._topics.append(RawSubscription(self, msg_type, topic, write, on_late=write))
 
     def _look_for_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}

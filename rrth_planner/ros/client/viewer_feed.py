@@ -26,7 +26,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
-from rrth_planner.ros.interface.scene_monitor import Listener
+from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -57,7 +57,7 @@ class ViewerFeed(Node):
         Raises
         ------
         RrthError, ParameterException
-            A parameter that is refused.
+            A parameter that is rejected.
 
         """
         super().__init__(NAME, **kwargs)
@@ -65,12 +65,12 @@ class ViewerFeed(Node):
         self.arm, self.margin = parameters.arm, parameters.margin
         self.ray_guard_length = parameters.ray_guard_length
         self._frame = parameters.base_frame
-        self._heard = Inputs(
+        self._inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        self._listener = Listener(self, parameters, self._heard)
+        self._scene_monitor = SceneMonitor(self, parameters, self._inputs)
         self._motions = OpenSubscription(
-            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._refuse
+            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._reject
         )
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
@@ -90,7 +90,7 @@ class ViewerFeed(Node):
     def scene(self) -> Scene:
         """The wearer in the base frame."""
         now = self.get_clock().now().nanoseconds * 1e-9
-        body = self._heard.body.value.at(now)
+        body = self._inputs.body.value.at(now)
         if body is not self._shown[0]:
             self._shown = (body, scene_of(body))
         return self._shown[1]
@@ -98,13 +98,13 @@ class ViewerFeed(Node):
     @property
     def target(self) -> Array | None:
         """In the base frame, (3,) [m]."""
-        goal = self._heard.target.value
+        goal = self._inputs.target.value
         return None if goal is None else goal.target
 
     @property
     def positions(self) -> Array | None:
         """Of the joints, (dof,) [rad]."""
-        reading = self._heard.joints.value
+        reading = self._inputs.joints.value
         return None if reading is None else reading.positions
 
     @property
@@ -115,9 +115,11 @@ class ViewerFeed(Node):
     @property
     def said(self) -> str:
         """The last answer of the planner, or what is still missing."""
-        heard = self._heard
+        inputs = self._inputs
         missing = [
-            topic.topic for topic in (heard.body, heard.target, heard.joints) if not topic.n_good
+            topic.topic
+            for topic in (inputs.body, inputs.target, inputs.joints)
+            if not topic.n_good
         ]
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
@@ -182,9 +184,9 @@ class ViewerFeed(Node):
         try:
             self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:
-            self._refuse(problem)
+            self._reject(problem)
 
-    def _refuse(self, problem: MessageError) -> None:
+    def _reject(self, problem: MessageError) -> None:
         self.get_logger().warning(f'joint_trajectory rejected: {problem}')
 
 
@@ -207,7 +209,7 @@ def following(
     Raises
     ------
     RrthError
-        An argument or a parameter that is refused.
+        An argument or a parameter that is rejected.
 
     """
     own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner has heard: the last good body, target and joint positions, and refusals."""
+"""What the planner has source: the last good body, target and joint positions, and rejections."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.localization import sharp_phase_of, takeover
+from rrth_planner.execution.localization import predict_start_state, sharp_phase_of
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
@@ -18,11 +18,11 @@ from rrth_planner.model.start_state import StartState
 from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
-from rrth_planner.ros.messages.error_codes import code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
-# A message from further ahead was heard before the clock was set back: nobody knows when [s].
+# A message from further ahead was source before the clock was set back: nobody knows when [s].
 CLOCK_STEP = 0.1
 
 
@@ -41,7 +41,7 @@ class ArmHasMoved(RequestError):
 
 class Input(Generic[T]):
     """
-    The last good value of one topic; a refused message changes nothing but the counts.
+    The last good value of one topic; a rejected message changes nothing but the counts.
 
     Parameters
     ----------
@@ -53,28 +53,28 @@ class Input(Generic[T]):
     """
 
     def __init__(self, topic: str, empty: T) -> None:
-        """Begin with nothing heard."""
+        """Begin with nothing source."""
         self.topic = topic
         self.value = empty
         self.received: float | None = None
-        self.n_good, self.n_refused = 0, 0
-        self.refusal: MessageError | None = None
-        self.is_last_refused = False
+        self.n_good, self.n_rejected = 0, 0
+        self.rejection: MessageError | None = None
+        self.is_last_rejected = False
 
     def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
         """
-        Take what `read` returns, heard at a time [s]; return False when it refuses.
+        Take what `read` returns, source at a time [s]; return False when it rejects.
 
         is_news: False where something newer has come before; then it is no younger for this, and a
-        refusal of that newer one stands.
+        rejection of that newer one stands.
         """
         try:
             self.value = read()
         except MessageError as problem:
-            self._refuse(problem)
+            self._reject(problem)
             return False
         except Exception as problem:
-            self._refuse(
+            self._reject(
                 MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
             )
             raise
@@ -82,12 +82,12 @@ class Input(Generic[T]):
         if is_news or self.received is None:
             self.received = now
         if is_news:
-            self.is_last_refused = False
-        return not self.is_last_refused
+            self.is_last_rejected = False
+        return not self.is_last_rejected
 
-    def _refuse(self, problem: MessageError) -> None:
-        self.n_refused += 1
-        self.refusal, self.is_last_refused = problem, True
+    def _reject(self, problem: MessageError) -> None:
+        self.n_rejected += 1
+        self.rejection, self.is_last_rejected = problem, True
 
     def age(self, now: float) -> float:
         """Return the time since the last good message; inf before it, or where unknown [s]."""
@@ -97,7 +97,7 @@ class Input(Generic[T]):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlanInputs:
+class InputSnapshot:
     """What one plan begins with: copies, which later messages do not change."""
 
     scene: Scene
@@ -124,18 +124,20 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
 
-    def pauses(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
+    def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, to go on in less than a span [s]."""
         if running is None or self.is_moving(now):
             return False
-        followed = self._followed(running)
-        if followed is None:
+        located = self._localize(running)
+        if located is None:
             return False
-        phase, rate = followed
+        phase, rate = located
         then = running.start_time + phase + rate * (now - self.joints.taken)
         return running.will_move(then, rate * span)
 
-    def ahead(self, running: ExecutingMotion | None, time: float, arm: ArmModel) -> StartState:
+    def start_state_at(
+        self, running: ExecutingMotion | None, time: float, arm: ArmModel
+    ) -> StartState:
         """Return what an arm that moves will do at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
@@ -148,10 +150,10 @@ class PlanInputs:
             # The arm was not on it yet: a stop, for one, may just have been told.
             known = joints.taken - running.start_time, 1.0
         elif running is not None and not self.is_moving(joints.taken):
-            known = self._followed(running)
+            known = self._localize(running)
         # Speeds that overflow belong to no motion.
         with np.errstate(all='ignore'):
-            found = takeover(
+            found = predict_start_state(
                 joints.positions,
                 joints.velocities,
                 None if running is None else running.trajectory,
@@ -166,7 +168,7 @@ class PlanInputs:
             )
         return found
 
-    def _followed(self, running: ExecutingMotion) -> tuple[float, float] | None:
+    def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
         """Return the time within a motion where an arm hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities
@@ -189,12 +191,12 @@ class Inputs:
     """The three topics that a plan needs."""
 
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
-        """Begin with nothing heard."""
+        """Begin with nothing source."""
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
-        # Why the last message with all joints was refused; None: it was good.
-        self.joint_refusal: MessageError | None = None
+        # Why the last message with all joints was rejected; None: it was good.
+        self.joint_rejection: MessageError | None = None
 
     @property
     def all(self) -> dict[str, Input[Any]]:
@@ -203,7 +205,7 @@ class Inputs:
 
     def at(
         self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
-    ) -> PlanInputs:
+    ) -> InputSnapshot:
         """
         Return what a plan that begins now goes by.
 
@@ -219,18 +221,18 @@ class Inputs:
         Raises
         ------
         RequestError
-            Something is missing, too old or, as the last target or joint positions, refused.
+            Something is missing, too old or, as the last target or joint positions, rejected.
 
         """
         scene = self._scene(now, parameters)
         if goal is None:
             goal = self._goal()
-        refusal = self.joint_refusal
-        if refusal is not None:
+        rejection = self.joint_rejection
+        if rejection is not None:
             # Where the arm was before says nothing of where it is.
             raise RequestError(
                 ErrorCode.ROBOT_STATE_STALE,
-                f'the last message on {self.joints.topic} was rejected: {refusal}',
+                f'the last message on {self.joints.topic} was rejected: {rejection}',
             )
         joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
@@ -242,15 +244,15 @@ class Inputs:
             'joint_timeout',
             ErrorCode.ROBOT_STATE_STALE,
         )
-        return PlanInputs(scene, goal, joints)
+        return InputSnapshot(scene, goal, joints)
 
     def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
         _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
-        if self.body.is_last_refused:
+        if self.body.is_last_rejected:
             # Where the wearer was before says nothing of where he is.
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
-                f'the last message on {self.body.topic} was rejected: {self.body.refusal}',
+                f'the last message on {self.body.topic} was rejected: {self.body.rejection}',
             )
         body = self.body.value.at(now)
         if body.expired:
@@ -271,58 +273,58 @@ class Inputs:
         return scene_of(body)
 
     def _goal(self) -> PointingGoal:
-        refusal = self.target.refusal
-        if self.target.is_last_refused and refusal is not None:
+        rejection = self.target.rejection
+        if self.target.is_last_rejected and rejection is not None:
             # Pointing at the target before it is not what was asked for.
             raise RequestError(
-                code_of_refusal(refusal, ErrorCode.INVALID_GOAL_CONSTRAINTS),
-                f'the last message on {self.target.topic} was rejected: {refusal}',
+                code_of_rejection(rejection, ErrorCode.INVALID_GOAL_CONSTRAINTS),
+                f'the last message on {self.target.topic} was rejected: {rejection}',
             )
         return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
 
 
-def _require(heard: Input[Any], what: str, expected: str) -> Any:
-    if heard.received is not None:
-        return heard.value
-    if heard.refusal is None:
+def _require(source: Input[Any], what: str, expected: str) -> Any:
+    if source.received is not None:
+        return source.value
+    if source.rejection is None:
         raise RequestError(
             ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-            f'no {what} yet on {heard.topic}, expected {expected}',
+            f'no {what} yet on {source.topic}, expected {expected}',
         )
     raise RequestError(
-        code_of_refusal(heard.refusal, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
-        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} rejected messages: '
-        f'{heard.refusal}',
+        code_of_rejection(source.rejection, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
+        f'no good {what} yet on {source.topic}; the last of {source.n_rejected} rejected '
+        f'messages: {source.rejection}',
     )
 
 
 def _require_fresh(
-    heard: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
+    source: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
 ) -> None:
-    age = heard.age(now)
+    age = source.age(now)
     if timeout > 0.0 and age > timeout:
         raise RequestError(
             code,
-            f'the last good message on {heard.topic} is {age:.3f} s old, expected at most '
+            f'the last good message on {source.topic} is {age:.3f} s old, expected at most '
             f'{timeout:g} s ({name})',
         )
 
 
-def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:
+def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
     """Return why nobody knows any more how arm and wearer are; empty: it is known."""
-    if heard.body.is_last_refused:
-        return f'the last body was rejected, {heard.body.refusal}'
-    if heard.joint_refusal is not None:
-        return f'the last joint positions were rejected, {heard.joint_refusal}'
-    body = heard.body.value.at(now)
+    if source.body.is_last_rejected:
+        return f'the last body was rejected, {source.body.rejection}'
+    if source.joint_rejection is not None:
+        return f'the last joint positions were rejected, {source.joint_rejection}'
+    body = source.body.value.at(now)
     if body.expired:
         return f'the body has expired parts: {body.expired_names}'
     if not body.n_boxes:
         return 'the body is empty'
-    age, most = heard.body.age(now), parameters.body_timeout
+    age, most = source.body.age(now), parameters.body_timeout
     if 0.0 < most < age:
         return f'the body is {age:.3f} s old, expected at most {most:g} s (body_timeout)'
-    age, most = heard.joints.age(now), parameters.joint_timeout
+    age, most = source.joints.age(now), parameters.joint_timeout
     if 0.0 < most < age:
         return (
             f'the last joint positions are {age:.3f} s old, expected at most {most:g} s '

@@ -15,7 +15,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
-from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, refuse_unknown, Setting
+from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
@@ -123,7 +123,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     Raises
     ------
     OptionsError
-        The first value that is refused: its name, what was given, what is expected, the unit.
+        The first value that is rejected: its name, what was given, what is expected, the unit.
 
     """
     settings = settings_from_values(values, arm.dof)
@@ -142,20 +142,20 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
 
 def declare_parameters(node: Node) -> PlannerParameters:
     """
-    Declare all parameters on a node, and let it refuse bad values from now on.
+    Declare all parameters on a node, and let it reject bad values from now on.
 
     Raises
     ------
     RrthError
-        A value that the node was started with is refused, or describes no arm.
+        A value that the node was started with is rejected, or describes no arm.
 
     """
     declare(node, (ARM,))
     arm = load_arm(node.get_parameter(ARM.name).value)
-    refuse_unknown(node, (ARM, *declared(arm.dof)))
+    reject_unknown(node, (ARM, *declared(arm.dof)))
     declare(node, declared(arm.dof))
 
-    def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
+    def reject_bad(changes: Sequence[Parameter]) -> SetParametersResult:
         values = _values(node, arm) | {change.name: change.value for change in changes}
         try:
             parameters_from_values(values, arm)
@@ -163,7 +163,7 @@ def declare_parameters(node: Node) -> PlannerParameters:
             return SetParametersResult(successful=False, reason=str(problem))
         return SetParametersResult(successful=True)
 
-    node.add_on_set_parameters_callback(refuse_bad)
+    node.add_on_set_parameters_callback(reject_bad)
     return current_parameters(node, arm)
 
 

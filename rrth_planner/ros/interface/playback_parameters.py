@@ -12,7 +12,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, refuse_unknown, Setting
+from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 FOLDED = [0.0, -0.35, np.pi / 2, np.pi / 2]
 EACH = 'a value for each joint, or one for all'
@@ -63,10 +63,10 @@ def declare_playback_parameters(node: Node) -> ArmModel:
     Raises
     ------
     RrthError
-        A value that the node was started with is refused, or describes no arm.
+        A value that the node was started with is rejected, or describes no arm.
 
     """
-    refuse_unknown(node, SETTINGS)
+    reject_unknown(node, SETTINGS)
     declare(node, SETTINGS)
     arm = load_arm(node.get_parameter(ARM.name).value)
     playback_rules(node, arm)

@@ -32,7 +32,7 @@ class PlanPublishers:
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
-        self.tell(self.motion(trajectory, parameters, begin))
+        self.publish(self.motion(trajectory, parameters, begin))
 
     def motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
@@ -42,7 +42,7 @@ class PlanPublishers:
             trajectory, parameters.arm.joint_names, parameters.base_frame, begin
         )
 
-    def tell(self, msg: JointTrajectory) -> None:
+    def publish(self, msg: JointTrajectory) -> None:
         """Publish the message of a motion."""
         self._trajectory.publish(msg)
 

@@ -43,8 +43,8 @@ CODE_OF_STATUS = {
 }
 
 
-def code_of_refusal(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
-    """Return what a refused message comes to: its frame is at fault, or else something other."""
+def code_of_rejection(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
+    """Return what a rejected message comes to: its frame is at fault, or else something other."""
     return ErrorCode.FRAME_TRANSFORM_FAILURE if isinstance(problem, FrameError) else otherwise
 
 

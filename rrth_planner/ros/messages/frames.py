@@ -58,7 +58,7 @@ class Frames:
         self._buffer = None
         if tf2_ros is not None:
             self._buffer = tf2_ros.Buffer(node=node)
-            self._listener = tf2_ros.TransformListener(self._buffer, node)
+            self._scene_monitor = tf2_ros.TransformListener(self._buffer, node)
 
     def lookup(self, frame: str) -> Array:
         """

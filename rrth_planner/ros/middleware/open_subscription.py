@@ -144,7 +144,7 @@ class OpenSubscription:
     on_late : callable, optional
         Gets each message that comes late, and its Arrival; without, these are dropped, since the
         last one wins.
-    on_refusal : callable, optional
+    on_rejection : callable, optional
         Gets the MessageError of each message that is too long, or is none of this type.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
@@ -158,11 +158,11 @@ class OpenSubscription:
         topic: str,
         on_message: Callable[[Any, Arrival], None],
         on_late: Callable[[Any, Arrival], None] | None = None,
-        on_refusal: Callable[[MessageError], None] = lambda problem: None,
+        on_rejection: Callable[[MessageError], None] = lambda problem: None,
         decode: Callable[[bytes], Any] | None = None,
     ) -> None:
         """Begin to listen."""
-        self._on_refusal, self._decode = on_refusal, decode
+        self._on_rejection, self._decode = on_rejection, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._copies = Copies(on_late is not None)
@@ -174,13 +174,13 @@ class OpenSubscription:
                 profile,
                 self._on_live,
                 SubscriptionEventCallbacks(
-                    matched=lambda _: self.look_at_publishers(), use_default_callbacks=False
+                    matched=lambda _: self.match_publishers(), use_default_callbacks=False
                 ),
             )
         except UnsupportedEventTypeError:
             self._live = self._subscribe(profile, self._on_live, None)
             self._timer = node.create_timer(
-                POLL_PERIOD, self.look_at_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
+                POLL_PERIOD, self.match_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
             )
         self.topic_name = self._live.topic_name
 
@@ -192,7 +192,7 @@ class OpenSubscription:
         """
         return self._n_read, self._live_came
 
-    def look_at_publishers(self) -> None:
+    def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
         for info in self._node.get_publishers_info_by_topic(self.topic_name):
             durability = info.qos_profile.durability
@@ -230,21 +230,21 @@ class OpenSubscription:
         received = info.get('received_timestamp') or time.time_ns()
         arrival = self._copies.take(sent, received, reader)
         if arrival is not None:
-            hearer = self._on_message if arrival.is_newer is None else self._on_late
-            assert hearer is not None
-            self._hand_on(data, hearer, arrival)
+            callback = self._on_message if arrival.is_newer is None else self._on_late
+            assert callback is not None
+            self._hand_on(data, callback, arrival)
 
     def _hand_on(
-        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
+        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
         """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
         try:
             msg = decoded(data, self._msg_type, decode=self._decode)
         except MessageError as problem:
-            self._on_refusal(problem)
+            self._on_rejection(problem)
             return
         try:
-            hearer(msg, arrival)
+            callback(msg, arrival)
         except Exception:
             self._node.get_logger().error(
                 f'{self.topic_name}: the callback failed on a message\n{traceback.format_exc()}'

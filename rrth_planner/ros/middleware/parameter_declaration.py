@@ -37,7 +37,7 @@ class Setting:
 
     @property
     def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows; a step other than 0 would refuse values."""
+        """What `ros2 param describe` shows; a step other than 0 would reject values."""
         msg = ParameterDescriptor(
             description=f'{self.description} [{self.unit}]', read_only=self.is_read_only
         )
@@ -86,7 +86,7 @@ ARM = Setting(
 )
 
 
-def refuse_unknown(node: Node, known: Sequence[Setting]) -> None:
+def reject_unknown(node: Node, known: Sequence[Setting]) -> None:
     """Raise OptionsError when a node was started with a parameter that it does not have."""
     names = [*(setting.name for setting in known), *OF_ROS]
     for name in _overrides(node):

@@ -18,11 +18,11 @@ EARLY = 0.5
 # So late a motion may be told of which nobody knows how the arm moved until then [s].
 LATE = 0.02
 # Whoever wakes up takes the interpreter from what monitors the arm [s].
-LONGEST_NAP = 0.02
+LONGEST_SLEEP = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class Handover:
     """
     Where a motion of an arm that moves begins.
 
@@ -32,7 +32,7 @@ class Start:
         [s].
     lead : float
         So long before that it was planned for [s].
-    takeover : StartState
+    start_state : StartState
         What the arm does then.
     running : ExecutingMotion or None
         The motion that it was last told to follow.
@@ -41,25 +41,25 @@ class Start:
 
     time: float
     lead: float
-    takeover: StartState
+    start_state: StartState
     running: ExecutingMotion | None
 
     @property
-    def early(self) -> float:
+    def publish_ahead(self) -> float:
         """How long before it begins the motion is told, if all goes well [s]."""
-        return 0.0 if self.takeover.running is None else EARLY * self.lead
+        return 0.0 if self.start_state.running is None else EARLY * self.lead
 
     @property
-    def latest(self) -> float:
+    def deadline(self) -> float:
         """When the motion can still be told [s]."""
-        return self.time + (LATE if self.takeover.running is None else 0.0)
+        return self.time + (LATE if self.start_state.running is None else 0.0)
 
     def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
         """Return when the motion is to be told, or as soon as it should stop."""
         # A simulated clock may stand still.
         end = time.monotonic() + 2 * LEADS[-1]
         while time.monotonic() < end and not should_stop():
-            left = self.time - self.early - clock()
+            left = self.time - self.publish_ahead - clock()
             if left <= 0.0:
                 return
-            time.sleep(min(LONGEST_NAP, left))
+            time.sleep(min(LONGEST_SLEEP, left))

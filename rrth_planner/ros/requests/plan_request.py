@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""One request: from what was heard to an outcome with a code, whatever happens."""
+"""One request: from what was inputs to an outcome with a code, whatever happens."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +13,10 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
-from rrth_planner.ros.requests.handover import LEADS, Start
+from rrth_planner.ros.requests.handover import Handover, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
 from rrth_planner.ros.requests.revalidation import Revalidation
 
@@ -31,8 +31,8 @@ class PlanOutcome:
     code : ErrorCode
     sentence : str
     plan : MotionPlan or None
-    inputs : PlanInputs or None
-    start : Start or None
+    snapshot : InputSnapshot or None
+    handover : Handover or None
     incident : Incident or None
         To be kept in a file, which the answer then names.
 
@@ -41,8 +41,8 @@ class PlanOutcome:
     code: ErrorCode
     sentence: str
     plan: MotionPlan | None = None
-    inputs: PlanInputs | None = None
-    start: Start | None = None
+    snapshot: InputSnapshot | None = None
+    handover: Handover | None = None
     incident: Incident | None = None
 
     @property
@@ -54,7 +54,7 @@ class PlanOutcome:
 
 
 def plan_request(
-    heard: Inputs,
+    inputs: Inputs,
     parameters: PlannerParameters,
     clock: Callable[[], float],
     planner: Planner,
@@ -71,7 +71,7 @@ def plan_request(
 
     Parameters
     ----------
-    heard : Inputs
+    inputs : Inputs
         What a plan begins with is copied from here at once; at the end it is looked at again.
     parameters : PlannerParameters
     clock : callable
@@ -100,25 +100,27 @@ def plan_request(
             question = plan = None
             require_wanted(should_stop, 'the request was cancelled before its turn')
             now = clock()
-            inputs = heard.at(now, parameters, goal)
-            start = None
-            if inputs.is_moving(now) or inputs.pauses(running, now, lead):
-                ahead = inputs.ahead(running, now + lead, parameters.arm)
-                start = Start(now + lead, lead, ahead, running)
-            question = _question(inputs, parameters, start)
+            snapshot = inputs.at(now, parameters, goal)
+            handover = None
+            if snapshot.is_moving(now) or snapshot.is_about_to_move(running, now, lead):
+                ahead = snapshot.start_state_at(running, now + lead, parameters.arm)
+                handover = Handover(now + lead, lead, ahead, running)
+            question = _question(snapshot, parameters, handover)
             plan = planner.plan(question, should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
                 incident = disagreement_incident(question, plan.disagreement)
-                return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
-            outcome = PlanOutcome(code, plan.sentence, plan, inputs, start)
+                return PlanOutcome(code, plan.sentence, plan, snapshot, incident=incident)
+            outcome = PlanOutcome(code, plan.sentence, plan, snapshot, handover)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return outcome
-            if start is not None:
-                if clock() > start.time:
+            if handover is not None:
+                if clock() > handover.time:
                     continue
-                start.wait(clock, should_stop)
-            revalidation = Revalidation(heard, clock, parameters, inputs, plan, start, running)
+                handover.wait(clock, should_stop)
+            revalidation = Revalidation(
+                inputs, clock, parameters, snapshot, plan, handover, running
+            )
             try:
                 require_wanted(should_stop)
                 found = revalidation.disagreement(planner)
@@ -130,7 +132,7 @@ def plan_request(
                 if publish(outcome, revalidation):
                     return outcome
             except ArmHasMoved:
-                if start is not None or running is None or lead == LEADS[-1]:
+                if handover is not None or running is None or lead == LEADS[-1]:
                     raise
                 # It seemed at rest, and has just begun the motion that it was told.
         raise RequestError(
@@ -154,18 +156,18 @@ def require_wanted(
 
 
 def _question(
-    inputs: PlanInputs, parameters: PlannerParameters, start: Start | None
+    snapshot: InputSnapshot, parameters: PlannerParameters, handover: Handover | None
 ) -> PlanQuestion:
     return PlanQuestion(
         arm=parameters.arm,
-        scene=inputs.scene,
-        q_start=inputs.q_start if start is None else start.takeover.state.positions,
-        goal=inputs.goal,
+        scene=snapshot.scene,
+        q_start=snapshot.q_start if handover is None else handover.start_state.state.positions,
+        goal=snapshot.goal,
         limits=parameters.limits,
         options=parameters.options,
         margin=parameters.margin,
         ray_guard_length=parameters.ray_guard_length,
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
-        moving=None if start is None else start.takeover,
+        moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
     )

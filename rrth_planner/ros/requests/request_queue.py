@@ -72,7 +72,7 @@ class _Resumption:
     ticket: _Ticket
     goal: PointingGoal
     rest: Rest
-    n_begun: int
+    n_motions: int
 
 
 class PlanQueue:
@@ -82,7 +82,7 @@ class PlanQueue:
     Parameters
     ----------
     node : Node
-    heard : Inputs
+    inputs : Inputs
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
     publishers : PlanPublishers
@@ -97,7 +97,7 @@ class PlanQueue:
     def __init__(
         self,
         node: Node,
-        heard: Inputs,
+        inputs: Inputs,
         reporter: Reporter,
         publishers: PlanPublishers,
         monitor: ExecutionMonitor,
@@ -105,7 +105,7 @@ class PlanQueue:
         handled: Callable[[], tuple[int, int]],
     ) -> None:
         """Start with nothing to do."""
-        self._node, self._heard, self._reporter = node, heard, reporter
+        self._node, self._inputs, self._reporter = node, inputs, reporter
         self._publishers, self._monitor, self._planner = publishers, monitor, planner
         self._barrier = ExecutorBarrier(node, handled)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
@@ -177,16 +177,16 @@ class PlanQueue:
         """Plan and publish; called in the worker's thread."""
         figures, shown, incident = PlanReport(), None, None
         parameters, monitor = self._reporter.parameters, self._monitor
-        n_brakes, running = monitor.n_brakes, monitor.running
+        n_stops, running = monitor.n_stops, monitor.running
 
         def publish(outcome: PlanOutcome, revalidation: Revalidation) -> bool:
             assert outcome.trajectory is not None
-            start = 0.0 if outcome.start is None else outcome.start.time
+            start = 0.0 if outcome.handover is None else outcome.handover.time
             msg = self._publishers.motion(outcome.trajectory, parameters, start)
             try:
                 # In the node's own thread, once all that came is read.
                 return self._barrier.call(
-                    lambda: self._publish(ticket, outcome, revalidation, n_brakes, msg)
+                    lambda: self._publish(ticket, outcome, revalidation, n_stops, msg)
                 )
             except NodeIsBusyError:
                 require_wanted(lambda: ticket.is_cancelled)
@@ -198,7 +198,7 @@ class PlanQueue:
 
         try:
             outcome = plan_request(
-                self._heard,
+                self._inputs,
                 parameters,
                 self._now,
                 self._planner,
@@ -248,7 +248,7 @@ class PlanQueue:
         ticket: _Ticket,
         outcome: PlanOutcome,
         revalidation: Revalidation,
-        n_brakes: int,
+        n_stops: int,
         msg: JointTrajectory,
     ) -> bool:
         """
@@ -258,32 +258,33 @@ class PlanQueue:
         """
         monitor, parameters = self._monitor, revalidation.parameters
         require_wanted(lambda: ticket.is_cancelled)
-        if n_brakes != monitor.n_brakes:
+        if n_stops != monitor.n_stops:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm was stopped while its motion was planned: {monitor.cause}',
+                f'the arm was stopped while its motion was planned: {monitor.stop_reason}',
             )
-        if monitor.due:
+        if monitor.pending_stop:
             raise RequestError(
-                ErrorCode.FAILURE, f'a stop of the arm could not be published: {monitor.due}'
+                ErrorCode.FAILURE,
+                f'a stop of the arm could not be published: {monitor.pending_stop}',
             )
         revalidation.require_fit()
         if revalidation.is_late():
             return False
-        trajectory, plan, inputs = outcome.trajectory, outcome.plan, outcome.inputs
-        assert trajectory is not None and plan is not None and inputs is not None
+        trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
+        assert trajectory is not None and plan is not None and snapshot is not None
         # Whoever cancels from here on cancels nothing.
         self._open.discard(ticket)
         monitor.begin(
             ExecutingMotion(
                 trajectory=trajectory,
-                start_time=self._now() if outcome.start is None else outcome.start.time,
-                reach=plan.reach,
+                start_time=self._now() if outcome.handover is None else outcome.handover.time,
+                target_distance=plan.target_distance,
                 escape_time=plan.escape_time,
             ),
-            inputs.goal,
+            snapshot.goal,
             parameters,
-            lambda: self._publishers.tell(msg),
+            lambda: self._publishers.publish(msg),
         )
         return True
 
@@ -292,15 +293,15 @@ class PlanQueue:
         self._show_newest()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
-            if stop.is_again and stop.goal is not None and not self._is_closed:
+            if stop.is_replanned and stop.goal is not None and not self._is_closed:
                 self._discard_resumption()
-                rest = Rest(self._heard.joints, self._now, stop.trajectory.duration)
-                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_begun)
+                rest = Rest(self._inputs.joints, self._now, stop.trajectory.duration)
+                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_motions)
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
         if resumption is None:
             return
-        if resumption.n_begun != self._monitor.n_begun:
+        if resumption.n_motions != self._monitor.n_motions:
             # Whoever asked for a motion that has begun since then wants that one.
             self._discard_resumption()
         elif resumption.rest.is_over():
@@ -315,7 +316,7 @@ class PlanQueue:
     def _resume(self, resumption: _Resumption) -> None:
         """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
         ticket = resumption.ticket
-        if ticket.is_cancelled or resumption.n_begun != self._monitor.n_begun:
+        if ticket.is_cancelled or resumption.n_motions != self._monitor.n_motions:
             self._open.discard(ticket)
             return
         response = self._work(resumption.goal, time.perf_counter(), ticket)
@@ -358,10 +359,10 @@ class PlanQueue:
 
     def _show(self, outcome: PlanOutcome, parameters: PlannerParameters) -> None:
         """Publish what shows a motion."""
-        assert outcome.trajectory is not None and outcome.inputs is not None
-        inputs = outcome.inputs
+        assert outcome.trajectory is not None and outcome.snapshot is not None
+        snapshot = outcome.snapshot
         self._publishers.publish_view(
-            outcome.trajectory, parameters, inputs.scene, inputs.goal.target
+            outcome.trajectory, parameters, snapshot.scene, snapshot.goal.target
         )
 
     def _now(self) -> float:

@@ -16,10 +16,10 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.requests.handover import LEADS, Start
+from rrth_planner.ros.requests.handover import Handover, LEADS
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3
@@ -32,28 +32,28 @@ class Revalidation:
 
     Parameters
     ----------
-    heard : Inputs
-        What is heard now.
+    inputs : Inputs
+        What is inputs now.
     clock : callable
         Returns the present time [s].
     parameters : PlannerParameters
-    inputs : PlanInputs
+    snapshot : InputSnapshot
         What it was planned for.
     plan : MotionPlan
         With a motion.
-    start : Start or None
+    handover : Handover or None
         None: from rest.
     running : ExecutingMotion or None
         The motion that the arm was last told to follow.
 
     """
 
-    heard: Inputs
+    inputs: Inputs
     clock: Callable[[], float]
     parameters: PlannerParameters
-    inputs: PlanInputs
+    snapshot: InputSnapshot
     plan: MotionPlan
-    start: Start | None
+    handover: Handover | None
     running: ExecutingMotion | None
 
     def disagreement(self, planner: Planner) -> tuple[Disagreement, Scene] | None:
@@ -64,7 +64,7 @@ class Revalidation:
         motion no longer fits.
         """
         scene = self.require_fit()
-        if _is_same(scene, self.inputs.scene):
+        if _is_same(scene, self.snapshot.scene):
             return None
         parameters = self.parameters
         violation = planner.violation_seen(
@@ -73,7 +73,7 @@ class Revalidation:
             self._motion,
             parameters.margin,
             parameters.ray_guard_length,
-            self._reach,
+            self._target_distance,
             self.plan.escape_time,
         )
         if violation is None:
@@ -82,7 +82,7 @@ class Revalidation:
 
     def is_late(self) -> bool:
         """Return whether it is too late to publish the motion."""
-        return self.start is not None and self.clock() > self.start.latest
+        return self.handover is not None and self.clock() > self.handover.deadline
 
     def require_fit(self) -> Scene:
         """
@@ -91,28 +91,30 @@ class Revalidation:
         Raise RequestError where it is not, or where the arm is not where the motion needs it.
         """
         now = self.clock()
-        present = self.heard.at(now, self.parameters, self.inputs.goal)
+        present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
-        if not _is_same(present.scene, self.inputs.scene):
+        if not _is_same(present.scene, self.snapshot.scene):
             self._require_proof(present.scene)
         return present.scene
 
-    def _require_arm(self, present: PlanInputs, now: float) -> None:
+    def _require_arm(self, present: InputSnapshot, now: float) -> None:
         """Raise ArmHasMoved where the arm is not where the motion needs it."""
-        inputs, start, arm = self.inputs, self.start, self.parameters.arm
-        expected = inputs.q_start
-        if start is None:
+        snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
+        expected = snapshot.q_start
+        if handover is None:
             present.require_rest(now, arm)
-            if present.pauses(self.running, now, LEADS[0]):
+            if present.is_about_to_move(self.running, now, LEADS[0]):
                 raise ArmHasMoved(
                     ErrorCode.START_STATE_INVALID,
                     'the arm has begun its commanded motion, expected an arm at rest',
                 )
         else:
-            expected = inputs.ahead(start.running, present.joints.taken, arm).state.positions
+            expected = snapshot.start_state_at(
+                handover.running, present.joints.taken, arm
+            ).state.positions
         moved = float(np.abs(present.q_start - expected).max())
         if not moved <= START_TOLERANCE:
-            what = 'moved by' if start is None else 'deviates from its trajectory by'
+            what = 'moved by' if handover is None else 'deviates from its trajectory by'
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
@@ -128,7 +130,9 @@ class Revalidation:
             escape_time > 0.0
             and box_depths(world, self._motion.positions[0]).max() >= parameters.escape_depth
         )
-        if is_too_deep or not is_proven_free(world, self._motion, self._reach, escape_time):
+        if is_too_deep or not is_proven_free(
+            world, self._motion, self._target_distance, escape_time
+        ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 'the wearer moved while the motion was planned: it is not proven free of the '
@@ -142,8 +146,8 @@ class Revalidation:
         return trajectory
 
     @property
-    def _reach(self) -> float:
-        target = self.inputs.goal.target
+    def _target_distance(self) -> float:
+        target = self.snapshot.goal.target
         return reach_to(self.parameters.arm, target, self._motion.positions[-1])
 
 

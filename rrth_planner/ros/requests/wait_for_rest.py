@@ -10,7 +10,7 @@ from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
 
-# So much longer than its brake an arm may need to come to rest [s].
+# So much longer than its stop_duration an arm may need to come to rest [s].
 LONGEST_SETTLING = 1.0
 
 
@@ -24,18 +24,18 @@ class Rest:
         Where the arm is.
     clock : callable
         Returns the time by which its readings are dated [s].
-    brake : float
+    stop_duration : float
         How long it brakes from now on; what was read before says nothing of its rest [s].
 
     """
 
     def __init__(
-        self, joints: Input[JointReading | None], clock: Callable[[], float], brake: float
+        self, joints: Input[JointReading | None], clock: Callable[[], float], stop_duration: float
     ) -> None:
-        """Begin to brake."""
-        self._joints, self._begin = joints, clock() + brake
+        """Begin to stop_duration."""
+        self._joints, self._begin = joints, clock() + stop_duration
         # A simulated clock may stand still.
-        self._end = time.monotonic() + brake + LONGEST_SETTLING
+        self._end = time.monotonic() + stop_duration + LONGEST_SETTLING
 
     def is_over(self) -> bool:
         """Return whether the arm is at rest, or the time for that is over."""

@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import ASIDE, goes_on, LATE  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LATE  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402
 from worlds import examples, limits  # noqa: E402
@@ -38,7 +38,7 @@ def _seen_to_go_on(before, stop, arm, span):
     for time in times:
         q, v = arm(time)
         reading = JointReading(q, v, BEGIN + time, BEGIN + time, float('inf'))
-        if goes_on(reading, before, stop):
+        if has_missed_stop(reading, before, stop):
             found.append(float(time))
     return found
 
