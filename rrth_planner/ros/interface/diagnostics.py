@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the planner is doing, as diagnostics."""
+"""The diagnostics of the planner."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,7 +56,7 @@ class PlanReport:
 
 
 class Figures:
-    """How often something was done, and how long it took the last time, mostly and at most [s]."""
+    """A count, and statistics of a duration: the last, quantiles, the greatest [s]."""
 
     def __init__(self) -> None:
         """Begin with nothing done."""
@@ -116,9 +116,9 @@ def diagnostics_msg(
         For the timeouts.
     report : PlanReport
     monitor_state : tuple of str
-        What the guard of the running motion does, and why.
+        The state of the monitor, and its reason.
     figures : mapping
-        Of what it did, and of incidents, by name.
+        Further values by their keys.
 
     """
     body = inputs.body.value.at(now)

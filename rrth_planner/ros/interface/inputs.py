@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner has source: the last good body, target and joint positions, and rejections."""
+"""The latest good body, target and joint positions, and the last rejections."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
-# A message from further ahead was source before the clock was set back: nobody knows when [s].
+# A message from further ahead came before the clock was set back, at an unknown time [s].
 CLOCK_STEP = 0.1
 
 
@@ -36,7 +36,7 @@ class RequestError(RrthError):
 
 
 class ArmHasMoved(RequestError):
-    """The arm is not where a motion needs it."""
+    """The arm is not at the start of the motion."""
 
 
 class Input(Generic[T]):
@@ -46,14 +46,14 @@ class Input(Generic[T]):
     Parameters
     ----------
     topic : str
-        Its resolved name, for sentences.
+        Its resolved name, for messages.
     empty : object
         The value before the first message.
 
     """
 
     def __init__(self, topic: str, empty: T) -> None:
-        """Begin with nothing source."""
+        """Begin without a message."""
         self.topic = topic
         self.value = empty
         self.received: float | None = None
@@ -63,10 +63,10 @@ class Input(Generic[T]):
 
     def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
         """
-        Take what `read` returns, source at a time [s]; return False when it rejects.
+        Take what `read` returns, received at a time [s]; return False where that raises.
 
-        is_news: False where something newer has come before; then it is no younger for this, and a
-        rejection of that newer one stands.
+        is_news: False where a newer message came before; then the age does not change, and a
+        rejection of the newer one stands.
         """
         try:
             self.value = read()
@@ -98,7 +98,7 @@ class Input(Generic[T]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputSnapshot:
-    """What one plan begins with: copies, which later messages do not change."""
+    """The inputs of one plan: a copy, which later messages do not change."""
 
     scene: Scene
     goal: PointingGoal
@@ -106,7 +106,7 @@ class InputSnapshot:
 
     @property
     def q_start(self) -> Array:
-        """Where the arm is, shape (dof,) [rad]."""
+        """Of the reading, shape (dof,) [rad]."""
         return self.joints.positions
 
     def is_moving(self, now: float) -> bool:
@@ -125,7 +125,7 @@ class InputSnapshot:
             )
 
     def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
-        """Return whether the arm rests within its motion, to go on in less than a span [s]."""
+        """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
         if running is None or self.is_moving(now):
             return False
         located = self._localize(running)
@@ -138,7 +138,7 @@ class InputSnapshot:
     def start_state_at(
         self, running: ExecutingMotion | None, time: float, arm: ArmModel
     ) -> StartState:
-        """Return what an arm that moves will do at a time [s], or raise RequestError."""
+        """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
             raise RequestError(
@@ -147,11 +147,11 @@ class InputSnapshot:
             )
         known = None
         if running is not None and joints.taken < running.start_time <= time:
-            # The arm was not on it yet: a stop, for one, may just have been told.
+            # The arm was not on it yet: a stop, say, may just have been published.
             known = joints.taken - running.start_time, 1.0
         elif running is not None and not self.is_moving(joints.taken):
             known = self._localize(running)
-        # Speeds that overflow belong to no motion.
+        # Velocities that overflow match no motion.
         with np.errstate(all='ignore'):
             found = predict_start_state(
                 joints.positions,
@@ -169,14 +169,14 @@ class InputSnapshot:
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
-        """Return the time within a motion where an arm hardly moves [s], and its rate."""
+        """Return the time within a motion of an arm that hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities
-        # An arm that follows its motion slowly hardly moves for long: it only seems on time.
+        # An arm that executes its motion slowly may seem on time while it hardly moves.
         with np.errstate(all='ignore'):
             found = sharp_phase_of(q, v, running.trajectory)
         if found is None and running.is_on_time(q, v, joints.taken):
-            # No velocity tells how far an arm has come that rests for a moment.
+            # An arm at rest for a moment has no velocity to locate it by.
             found = joints.taken - running.start_time, 1.0
         return found
 
@@ -191,23 +191,23 @@ class Inputs:
     """The three topics that a plan needs."""
 
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
-        """Begin with nothing source."""
+        """Begin without a message."""
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
-        # Why the last message with all joints was rejected; None: it was good.
+        # Why the last message with all joints was rejected; None: it was not.
         self.joint_rejection: MessageError | None = None
 
     @property
     def all(self) -> dict[str, Input[Any]]:
-        """The topics by the names that diagnostics give them."""
+        """The inputs by their names in diagnostics."""
         return {'body': self.body, 'target': self.target, 'joints': self.joints}
 
     def at(
         self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
     ) -> InputSnapshot:
         """
-        Return what a plan that begins now goes by.
+        Return the inputs of a plan that begins now.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Inputs:
             goal = self._goal()
         rejection = self.joint_rejection
         if rejection is not None:
-            # Where the arm was before says nothing of where it is.
+            # Earlier positions say nothing about the present ones.
             raise RequestError(
                 ErrorCode.ROBOT_STATE_STALE,
                 f'the last message on {self.joints.topic} was rejected: {rejection}',
@@ -249,7 +249,7 @@ class Inputs:
     def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
         _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
         if self.body.is_last_rejected:
-            # Where the wearer was before says nothing of where he is.
+            # An earlier body says nothing about the present one.
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
                 f'the last message on {self.body.topic} was rejected: {self.body.rejection}',
@@ -275,7 +275,7 @@ class Inputs:
     def _goal(self) -> PointingGoal:
         rejection = self.target.rejection
         if self.target.is_last_rejected and rejection is not None:
-            # Pointing at the target before it is not what was asked for.
+            # The target before it is not the requested one.
             raise RequestError(
                 code_of_rejection(rejection, ErrorCode.INVALID_GOAL_CONSTRAINTS),
                 f'the last message on {self.target.topic} was rejected: {rejection}',
@@ -311,7 +311,7 @@ def _require_fresh(
 
 
 def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
-    """Return why nobody knows any more how arm and wearer are; empty: it is known."""
+    """Return why an input is stale or rejected; empty: none is."""
     if source.body.is_last_rejected:
         return f'the last body was rejected, {source.body.rejection}'
     if source.joint_rejection is not None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner may be told: fields of the core's options as ROS parameters, and back."""
+"""The parameters of the planner: fields of the core's options as ROS parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields

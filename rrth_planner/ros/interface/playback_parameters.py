@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the playback may be told, as ROS parameters."""
+"""The parameters of the playback."""
 
 from collections.abc import Sequence
 

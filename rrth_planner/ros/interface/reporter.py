@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Tell how requests ended: to the log, and to diagnostics."""
+"""Report the outcomes of requests and the state of the monitor: log and diagnostics."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
 PERIOD = 1.0
-# So many boxes are remembered as named.
+# So many boxes are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
@@ -43,11 +43,11 @@ class Reporter:
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # What the guard of the running motion does, and why.
+        # The state of the monitor, and its reason.
         self.monitor_state = ('no motion', '')
         self._remaining_motion_checks, self._stops_published = Figures(), Figures()
         self._n_incidents, self._last_incident = 0, ''
-        # Of what is counted and published: by the executor's thread, and by the worker's.
+        # Of what the threads of executor and worker count and publish.
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -60,12 +60,12 @@ class Reporter:
         ]
 
     def remaining_motion_checked(self, elapsed: float) -> None:
-        """Count that a running motion was held against a new body, and how long it took [s]."""
+        """Count a check of the remaining motion against a new body, and its time [s]."""
         with self._lock:
             self._remaining_motion_checks.add(elapsed)
 
     def stop_published(self, elapsed: float) -> None:
-        """Count a brake, and how long after the body's arrival it was published [s]."""
+        """Count a fail-safe stop, and how long after the body's arrival it was published [s]."""
         with self._lock:
             self._stops_published.add(elapsed)
 
@@ -113,7 +113,7 @@ class Reporter:
             )
 
     def _warn_of_expired(self, now: float) -> None:
-        """Name in the log, once, the boxes whose lifetime has passed."""
+        """Log each expired box once."""
         expired = self._inputs.body.value.at(now).expired
         new = [(key, part) for key, part in expired if key not in self._named]
         if new:
@@ -127,7 +127,7 @@ class Reporter:
             )
 
     def reject(self, code: ErrorCode, sentence: str) -> None:
-        """Log and publish how a request ended that nothing was planned for."""
+        """Log and publish the rejection of a request."""
         self.conclude(code, sentence, PlanReport())
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Keep the planner's inputs up to date with the three topics that it hears."""
+"""Subscriptions that keep the inputs of the planner up to date."""
 
 from collections.abc import Callable
 import time
@@ -29,21 +29,21 @@ WARNING_PERIOD = 5.0
 
 class SceneMonitor:
     """
-    Read messages into the inputs; a rejected one changes nothing, and is warned about.
+    Reads messages into the inputs; a rejected one changes no value, and is logged.
 
     Parameters
     ----------
     node : Node
     parameters : PlannerParameters
-        For what never changes: the arm and the base frame.
+        For the constant ones: the arm and the base frame.
     inputs : Inputs
         Kept up to date.
     on_change : callable, optional
-        Called when a topic is source for the first time, is rejected, or is good again.
+        Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
-        Called after each body, with what is known since then of the wearer, and when it came [ns].
+        Called after each body, with the wearer since then, and its time of arrival [ns].
     on_error : callable, optional
-        Called after an error that nobody expected, with what it is.
+        Called after an unexpected error, with its name and message.
 
     """
 
@@ -56,7 +56,7 @@ class SceneMonitor:
         on_body: Callable[[WearerBody, int], None] = lambda body, arrived: None,
         on_error: Callable[[str], None] = lambda what: None,
     ) -> None:
-        """Begin to listen."""
+        """Subscribe."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame = parameters.base_frame
@@ -73,7 +73,7 @@ class SceneMonitor:
                 inputs.body,
                 self._on_body,
                 on_late=self._on_body,
-                # A person waits for it.
+                # The monitor waits for it.
                 decode=quick_decoder(MarkerArray),
             ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
@@ -118,7 +118,7 @@ class SceneMonitor:
         )
 
     def body_progress(self) -> tuple[int, int]:
-        """Return what `OpenSubscription.progress` says of the bodies."""
+        """Return `OpenSubscription.progress` of the bodies."""
         return self._subscriptions[0].progress()
 
     def goal(self, msg: PointStamped) -> PointingGoal:
@@ -143,7 +143,7 @@ class SceneMonitor:
         self._take(self._inputs.target, lambda: self.goal(msg), self._now())
 
     def _on_joints(self, msg: JointState, _: Arrival) -> None:
-        # Other machines share this topic; a message without any joint of ours is none of ours.
+        # Other machines share this topic: messages without any joint of the arm are ignored.
         if not has_joint_of(msg, self._joint_names):
             return
         now, source = self._now(), self._inputs.joints

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""One request: from what was inputs to an outcome with a code, whatever happens."""
+"""One request: from the latest inputs to an outcome with a code, even after an error."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ from rrth_planner.ros.requests.revalidation import Revalidation
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanOutcome:
     """
-    How a request ended: code and sentence; the rest where there was any.
+    How a request ended: code, sentence and, where known, the rest.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PlanOutcome:
     snapshot : InputSnapshot or None
     handover : Handover or None
     incident : Incident or None
-        To be kept in a file, which the answer then names.
+        To be written to a file, which the answer names.
 
     """
 
@@ -47,7 +47,7 @@ class PlanOutcome:
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The motion that is told; None unless the request succeeded."""
+        """The motion to publish; None unless the request succeeded."""
         if self.plan is None or self.code is not ErrorCode.SUCCESS:
             return None
         return self.plan.trajectory
@@ -66,13 +66,13 @@ def plan_request(
     """
     Return the outcome of a request that begins now, once its motion is published.
 
-    A motion for an arm that moves begins with the state that the arm is going to be in shortly,
-    and is published not long before.
+    Where the arm moves, the motion begins with its predicted state at the handover, and is
+    published shortly before.
 
     Parameters
     ----------
     inputs : Inputs
-        What a plan begins with is copied from here at once; at the end it is looked at again.
+        Copied at the beginning; checked again before the motion is published.
     parameters : PlannerParameters
     clock : callable
         Returns the present time [s].
@@ -80,17 +80,17 @@ def plan_request(
     should_stop : callable
         Polled while planning; True cancels.
     publish : callable
-        Gets an outcome with a motion, and what says whether it still fits; publishes the motion,
-        or returns False where it is too late. May raise RequestError.
+        Takes an outcome with a motion, and its revalidation; publishes the motion, or returns
+        False where it is too late. May raise RequestError.
     goal : PointingGoal, optional
         Of the request; without, the last target.
     running : ExecutingMotion, optional
-        The motion that the arm was last told to follow.
+        The last commanded motion.
 
     Raises
     ------
     PlanError
-        Of an error that nobody expected, once it is known what was asked.
+        On an unexpected error, once the question is known.
 
     """
     question: PlanQuestion | None = None
@@ -134,7 +134,7 @@ def plan_request(
             except ArmHasMoved:
                 if handover is not None or running is None or lead == LEADS[-1]:
                     raise
-                # It seemed at rest, and has just begun the motion that it was told.
+                # It seemed at rest, and has just begun its commanded motion.
         raise RequestError(
             ErrorCode.TIMED_OUT,
             f'the arm moves, and no handover was planned and checked within {LEADS[-1]:g} s',

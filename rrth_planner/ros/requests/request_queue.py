@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests one after the other, in a thread of their own, so that the node hears meanwhile."""
+"""Requests one after the other, in a worker thread, while the node receives messages."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +31,7 @@ from rrth_planner.ros.requests.stop_validation import incident_of_stop
 from rrth_planner.ros.requests.wait_for_rest import Rest
 from trajectory_msgs.msg import JointTrajectory
 
-# How often stops are followed up, and motions shown at most [s].
+# Period of the work after a stop, and shortest one between motions shown [s].
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
@@ -39,7 +39,7 @@ CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
     """
-    What a request is answered.
+    The response to a request.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Response:
     tool_path : callable
         Returns the tool's path; empty where no motion was published.
     conclude : callable
-        What is left to do when it has been answered: to show and to report it.
+        Called after the answer is sent: shows and reports the motion.
 
     """
 
@@ -87,7 +87,7 @@ class PlanQueue:
         Its parameters, as they are when a request's turn begins, are those of the plan.
     publishers : PlanPublishers
     monitor : ExecutionMonitor
-        Given each motion that is published; its stops are followed up.
+        Monitors each published motion; its stops are checked again here, and replanned.
     planner : Planner
     handled : callable
         As in `ExecutorBarrier`, of the bodies.
@@ -111,7 +111,7 @@ class PlanQueue:
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None
-        # The newest motion that is still to be shown, and when one was shown last [s].
+        # The newest motion that is not shown yet, and when one was last shown [s].
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
@@ -139,34 +139,34 @@ class PlanQueue:
             response: Response = await future
             executor = self._node.executor
             if executor is not None:
-                # As a task of its own: the answer is sent before the executor comes to it.
+                # As a task of its own: the answer is sent before it runs.
                 executor.create_task(self.prepare, response.conclude)
             return response
         finally:
             self._open.discard(ticket)
 
     def prepare(self, work: Callable[[], None]) -> None:
-        """Have something done in the worker's thread before the requests that follow."""
+        """Run something in the worker thread before the requests that follow."""
 
         def prepared() -> None:
             try:
                 work()
             except Exception:
-                # The request that needs it will say what is wrong.
+                # The request that needs it will report the error.
                 self._node.get_logger().error(traceback.format_exc())
 
         if not self._is_closed:
             self._worker.submit(prepared)
 
     def cancel(self) -> int:
-        """End the requests that have published no motion yet; return how many these are."""
+        """Cancel the requests that have published no motion yet; return their number."""
         ended, self._open, self._resumption = self._open, set(), None
         for ticket in ended:
             ticket.is_cancelled = True
         return len(ended)
 
     def close(self) -> None:
-        """End everything; nothing is published any more, and no request may follow."""
+        """End everything; nothing is published afterwards, and no request may follow."""
         self._is_closed = True
         self.cancel()
         self._monitor.close()
@@ -184,7 +184,7 @@ class PlanQueue:
             start = 0.0 if outcome.handover is None else outcome.handover.time
             msg = self._publishers.motion(outcome.trajectory, parameters, start)
             try:
-                # In the node's own thread, once all that came is read.
+                # In the node's own thread, once all received messages are processed.
                 return self._barrier.call(
                     lambda: self._publish(ticket, outcome, revalidation, n_stops, msg)
                 )
@@ -223,7 +223,7 @@ class PlanQueue:
             elif ticket.is_cancelled and code is not ErrorCode.PREEMPTED:
                 code, sentence = CANCELLED
         except Exception as problem:
-            # Whatever it is, the caller gets an answer, and the node lives on.
+            # After any error the caller gets an answer, and the node continues.
             self._node.get_logger().error(traceback.format_exc())
             code, sentence, shown = ErrorCode.FAILURE, sentence_of(problem), None
             incident = incident_of(problem)
@@ -254,7 +254,7 @@ class PlanQueue:
         """
         Publish the motion of a request, and have it monitored; called in the node's own thread.
 
-        Return False where it is too late; raise RequestError where it does not fit any more.
+        Return False where it is too late; raise RequestError where it is no longer valid.
         """
         monitor, parameters = self._monitor, revalidation.parameters
         require_wanted(lambda: ticket.is_cancelled)
@@ -273,7 +273,7 @@ class PlanQueue:
             return False
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
-        # Whoever cancels from here on cancels nothing.
+        # From here on the request cannot be cancelled.
         self._open.discard(ticket)
         monitor.begin(
             ExecutingMotion(
@@ -289,7 +289,7 @@ class PlanQueue:
         return True
 
     def _follow_up(self) -> None:
-        """See to what comes after a motion, and after a stop: its second check, another plan."""
+        """Show the newest motion; after a stop, check it a second time and plan again."""
         self._show_newest()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
@@ -302,7 +302,7 @@ class PlanQueue:
         if resumption is None:
             return
         if resumption.n_motions != self._monitor.n_motions:
-            # Whoever asked for a motion that has begun since then wants that one.
+            # A motion that was requested since then has priority.
             self._discard_resumption()
         elif resumption.rest.is_over():
             self._resumption = None
@@ -326,7 +326,7 @@ class PlanQueue:
             self._monitor.hold(response.text)
 
     def _check_stop(self, stop: Stop) -> None:
-        """Have the second checker look at a stop that was published as proven free."""
+        """Have the second checker check a stop that was published as proven free."""
         incident = incident_of_stop(stop, self._planner)
         if incident is not None:
             noted, file = keep(incident, stop.parameters.incident_folder)
@@ -334,7 +334,7 @@ class PlanQueue:
             self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
 
     def _tool_path(self, outcome: PlanOutcome, parameters: PlannerParameters) -> Path:
-        """Return the tool's path; a failure of this does not unsay the motion."""
+        """Return the tool's path; empty after an error, since the motion is published already."""
         assert outcome.trajectory is not None
         try:
             return self._publishers.tool_path(outcome.trajectory, parameters)
@@ -344,9 +344,9 @@ class PlanQueue:
 
     def _show_newest(self) -> None:
         """
-        Have the newest motion shown, once somebody looks.
+        Have the newest motion shown, if there is a subscriber.
 
-        That takes the interpreter for several milliseconds, which a brake may have to wait for.
+        That takes the interpreter for several milliseconds, which could delay a stop.
         """
         present, unseen = time.monotonic(), self._unseen
         if (

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Before a motion is published: whether it still fits wearer and arm, who may have moved since."""
+"""Revalidation of a planned motion against the latest inputs, just before it is published."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,23 +28,23 @@ START_TOLERANCE = 1e-3
 @dataclass(frozen=True, slots=True, eq=False)
 class Revalidation:
     """
-    Checks a planned motion against wearer and arm as they are by now, as often as need be.
+    Checks a planned motion against wearer and arm as they are now; may be repeated.
 
     Parameters
     ----------
     inputs : Inputs
-        What is inputs now.
+        The latest ones.
     clock : callable
         Returns the present time [s].
     parameters : PlannerParameters
     snapshot : InputSnapshot
-        What it was planned for.
+        The inputs of the plan.
     plan : MotionPlan
         With a motion.
     handover : Handover or None
         None: from rest.
     running : ExecutingMotion or None
-        The motion that the arm was last told to follow.
+        The last commanded motion.
 
     """
 
@@ -58,10 +58,10 @@ class Revalidation:
 
     def disagreement(self, planner: Planner) -> tuple[Disagreement, Scene] | None:
         """
-        Return what the second checker has against a motion that the first one finds free.
+        Return the violation that only the second checker finds, and in which scene.
 
-        And round which wearer; it is asked only where he has moved. Raise RequestError where the
-        motion no longer fits.
+        It is asked only where the wearer has moved. Raise RequestError where the motion is no
+        longer valid.
         """
         scene = self.require_fit()
         if _is_same(scene, self.snapshot.scene):
@@ -86,9 +86,9 @@ class Revalidation:
 
     def require_fit(self) -> Scene:
         """
-        Return the wearer as he is now, of whom the motion is proven free.
+        Return the present wearer, of whom the motion is proven free.
 
-        Raise RequestError where it is not, or where the arm is not where the motion needs it.
+        Raise RequestError where it is not, or where the arm is not at the start of the motion.
         """
         now = self.clock()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
@@ -98,7 +98,7 @@ class Revalidation:
         return present.scene
 
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
-        """Raise ArmHasMoved where the arm is not where the motion needs it."""
+        """Raise ArmHasMoved where the arm is not at the start of the motion."""
         snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
         expected = snapshot.q_start
         if handover is None:
