@@ -13,7 +13,7 @@ pytest.importorskip('rosbags')
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.messages import fast_decoding  # noqa: E402
-from rrth_planner.ros.messages.fast_decoding import quick_decoder  # noqa: E402
+from rrth_planner.ros.messages.fast_decoding import fast_decoder  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import read_edits  # noqa: E402
 from rrth_planner.ros.middleware.open_subscription import decoded  # noqa: E402
 from samples import array, box, wearer  # noqa: E402
@@ -28,7 +28,7 @@ from visualization_msgs.msg import (  # noqa: E402
 )
 import worlds  # noqa: E402
 
-DECODE = quick_decoder(MarkerArray)
+DECODE = fast_decoder(MarkerArray)
 COLORS = st.builds(ColorRGBA, r=st.floats(width=32), a=st.floats(width=32))
 BYTES = st.binary(max_size=5).map(list)
 
@@ -124,6 +124,6 @@ def test_without_rosbags_or_the_definition_rclpy_decodes(monkeypatch, missing):
         monkeypatch.setitem(sys.modules, 'rosbags.typesys', None)
     else:
         monkeypatch.setattr(fast_decoding, 'definition_of', not_found)
-    found = quick_decoder(MarkerArray)(serialize_message(wearer()))
+    found = fast_decoder(MarkerArray)(serialize_message(wearer()))
     assert found == wearer()
     assert isinstance(found.markers[0], Marker)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The node of the demo: what a program that uses planner and playback has to do."""
+"""The node of the demo: a client of planner and playback."""
 
 from collections.abc import Callable
 import time
@@ -21,12 +21,12 @@ STILL = 1e-6
 
 
 class DemoError(RrthError):
-    """Something that ends the demo."""
+    """An error that ends the demo."""
 
 
 class DemoClient(PlannerClient):
     """
-    Tells the planner body and target, asks for motions, and follows the arm.
+    Publishes body and target, requests motions, and follows the arm.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class DemoClient(PlannerClient):
     timeout : float
         Longest wait for anything [s].
     check : callable
-        Raises when going on waiting makes no sense.
+        Raises where waiting is useless.
 
     """
 
@@ -44,7 +44,7 @@ class DemoClient(PlannerClient):
         self._joints_of_arm = arm.joint_names
 
     def wait_for_nodes(self) -> None:
-        """Wait until the planner can be asked, and the arm can be seen and listens."""
+        """Wait for the planner, for joint states, and for a subscriber of the motions."""
         self.wait_for_state(self._joints_of_arm)
         self.wait_for_planner()
         self.wait_for(lambda: self.count_arms() > 0, 'a subscriber of joint_trajectory')
@@ -77,10 +77,10 @@ class DemoClient(PlannerClient):
 
     def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
         """
-        Publish another body so long after the arm set off [s]; return where the arm was from then.
+        Publish another body so long after the arm set off [s]; return its states from then on.
 
-        Waits until the arm has left where it starts, (dof,) [rad], and then until it has been
-        stopped, has been told how to go on, and has arrived there.
+        Waits until the arm has left q_start, (dof,) [rad], and then until it was stopped, got a
+        new motion, and has arrived at its end.
         """
         self.wait_for(
             lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm in motion'

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plan as the planner would, with its parameters and what it hears, and publish nothing."""
+"""Plan as the planner would, with its parameters and inputs, and publish nothing."""
 
 from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
@@ -30,7 +30,7 @@ def plan_without_moving(
     Parameters
     ----------
     client : PlannerClient
-        Hears where the arm is.
+        Receives the joint states.
     parameters : PlannerParameters
         Of the planner.
     target : PointStamped

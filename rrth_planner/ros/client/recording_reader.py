@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read a recording of a run from an MCAP file, whichever recorder wrote it."""
+"""Read a recorded run from an MCAP file of any recorder."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,7 +36,7 @@ SAME_CLOCK = 1.0
 
 
 class RecordedMessage(NamedTuple):
-    """A message of a file, when it was sent and when it came [ns]."""
+    """A message of a file, with the times of sending and reception [ns]."""
 
     msg: Any
     sent: int
@@ -45,13 +45,13 @@ class RecordedMessage(NamedTuple):
 
 class RecordingReader:
     """
-    The messages of a file, read as the nodes read them.
+    The messages of a file, checked as by the nodes.
 
     Parameters
     ----------
     path : Path
     arm : ArmModel
-        Whose joints are looked for.
+        The arm of the run.
     base_frame : str
         Of the planner; messages in other frames are rejected.
     namespace : str, optional
@@ -98,7 +98,7 @@ class RecordingReader:
         positions = np.array([readings[i].positions for i in order])
         velocities = np.array([readings[i].velocities for i in order])
         if not np.isfinite(velocities).all():
-            # What a driver does not know: then as the positions change.
+            # Where a driver has no velocities they are the differences of the positions.
             changes = np.gradient(positions, times, axis=0) if len(times) > 1 else 0.0 * positions
             velocities = np.where(np.isfinite(velocities), velocities, changes)
         return Recording(
@@ -129,7 +129,7 @@ class RecordingReader:
         return found[0] if found else None
 
     def _good(self, role: str, read: Callable[[RecordedMessage], Any]) -> list[Any]:
-        """Return what is read of each message that the nodes would not reject."""
+        """Return what is read from each message that the nodes would not reject."""
         result = []
         for recorded in self._messages[role]:
             try:
@@ -195,7 +195,7 @@ class RecordingReader:
         return sorted(result, key=lambda item: item[0])
 
     def _monitor_states(self) -> list[tuple[float, str]]:
-        """Return what the guard of this run did, from when on."""
+        """Return the states of the monitor of this run, and since when [s]."""
         said: dict[str, list[tuple[float, str]]] = {}
         for recorded in self._messages['diagnostics']:
             for status in recorded.msg.status:
@@ -232,7 +232,7 @@ def _read(path: Path) -> tuple[dict[str, list[RecordedMessage]], int, dict[str, 
                 try:
                     msg = decode(message.data)
                 except Exception as problem:
-                    # Whoever published it may have sent anything: those after it count.
+                    # A publisher may have sent anything: the next messages count.
                     rejected[channel.topic] = (
                         f'{len(message.data)} bytes ({problem or type(problem).__name__}), '
                         f'expected a {schema.name}'
@@ -242,10 +242,10 @@ def _read(path: Path) -> tuple[dict[str, list[RecordedMessage]], int, dict[str, 
     except OSError as problem:
         raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
     except (EndOfFile, struct.error):
-        # Cut short: what is there counts.
+        # The file is cut off: what is there counts.
         pass
     except Exception as problem:
-        # Whoever made the file may have written anything.
+        # The file may hold anything.
         raise RecordError(
             f'{path}: {problem or type(problem).__name__}, expected an MCAP file of ROS 2 messages'
         ) from problem

@@ -13,7 +13,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.fast_decoding import quick_decoder
+from rrth_planner.ros.messages.fast_decoding import fast_decoder
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
@@ -74,7 +74,7 @@ class SceneMonitor:
                 self._on_body,
                 on_late=self._on_body,
                 # The monitor waits for it.
-                decode=quick_decoder(MarkerArray),
+                decode=fast_decoder(MarkerArray),
             ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
             self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),

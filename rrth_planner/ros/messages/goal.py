@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Targets as messages, in whatever frame is known."""
+"""Targets from messages, in any known frame."""
 
 from geometry_msgs.msg import PointStamped
 import numpy as np

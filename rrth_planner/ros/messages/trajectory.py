@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories as messages: what controllers ask of them, in both directions."""
+"""Conversion between trajectories and messages, with the checks of controllers."""
 
 from array import array
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # joint_trajectory_controller rejects a last point that is faster (float epsilon) [rad/s].
 REST_VELOCITY = float(np.finfo(np.float32).eps)
-# More is rejected: looking through them holds up the node.
+# More are rejected: reading them would block the node.
 MOST_POINTS = 10_000
 UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
 
