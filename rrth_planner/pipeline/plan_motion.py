@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The straight line from a scene and a target to a certified trajectory."""
+"""From a scene and a target to a certified trajectory."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -39,7 +39,7 @@ from rrth_planner.planning.planner import PlanResult
 from rrth_planner.planning.pointing_goals import check_pointing_arm
 from rrth_planner.timing.lead_in import lead_in, LeadIn, stop_first
 
-# A wearer who holds still makes the same world from plan to plan.
+# A wearer at rest makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)
 
 
@@ -76,19 +76,19 @@ def plan_motion(
     margin : float
         Clearance kept from every box [m].
     ray_guard_length : float
-        How much of the pointing ray is kept clear in motion [m]; at the end, all of it.
+        Length of the pointing ray kept clear in motion [m]; at the end, up to the target.
     seed : int
         >= 0.
     should_stop : callable
         Polled while planning; True cancels.
     moving : StartState, optional
-        How the arm moves at q_start; without, it is at rest. The motion then begins with this
-        state: the arm goes on straight ahead, no further than it needs to stop, and turns off; or,
-        where there is no room for that, it stops along its present motion first.
+        State of a moving arm at q_start; without, it is at rest. The motion then begins with this
+        state: the arm continues straight ahead, no further than it needs to stop, and blends
+        into the path; or, where there is no room for that, it stops along its present motion.
     escape_depth : float
-        An arm at rest that is less deep in the boxes grown by the margin first leaves them by the
-        shortest way [m]; 0: it never does. The depth is by how much a box would have to be
-        smaller on every side.
+        An arm at rest with a smaller penetration depth in the boxes grown by the margin escapes
+        first [m]; 0: never. The depth is by how much a box would have to be smaller on every
+        side.
 
     """
     begin = time.perf_counter()
@@ -116,7 +116,7 @@ def plan_motion(
             )
             if isinstance(out, Escape):
                 rejection, escape = None, out
-                leads = (out.lead(limits),)
+                leads = (out.lead_in(limits),)
             else:
                 rejection = out
     if rejection is None:
@@ -189,9 +189,9 @@ def _leads(
     arm: ArmModel, world: World, moving: StartState, limits: MotionLimits
 ) -> Iterator[LeadIn | Rejection]:
     """
-    Yield what an arm in motion may do first: go straight on, or stop along its present motion.
+    Yield the lead-ins of an arm in motion: straight ahead, or a stop along its present motion.
 
-    The last of these is why it can do neither.
+    Where neither is possible, yield the rejection.
     """
     straight = lead_in(moving.state, limits)
     rejection = lead_rejection(arm, world, straight, limits)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Why a request cannot be planned: the part of the arm, the box, and by how much."""
+"""Reasons of rejected requests: the part of the arm, the box, and by how much."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ from rrth_planner.timing.lead_in import LeadIn
 
 # A joint this far beyond its limit is at it [rad, m].
 ROUNDING = 1e-6
-# A joint that moves faster than its limit by no more than this share is let pass.
+# A joint may move faster than its limit by this share.
 EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
     """
-    A request that ends without a motion.
+    The reason of a request without a motion.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
     ----------
     arm : ArmModel
     world : World
-        Its boxes grown by the margin and what must be left beyond it.
+        Its boxes grown by the margin and the least clearance beyond it.
     q_start : ndarray, shape (dof,)
         [rad].
 
@@ -78,7 +78,7 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
 
 def depth_sentence(world: World, depths: Array, margin: float) -> str:
     """
-    Say which part of the arm is deepest in which box, and how deep.
+    Return which part of the arm is deepest in which box, and how deep, as a sentence.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
 def lead_rejection(
     arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
 ) -> Rejection | None:
-    """Return why an arm that moves cannot go straight on until it could rest, or None."""
+    """Return why a moving arm cannot continue straight ahead until it stops, or None."""
     fastest = np.abs(lead.trajectory.velocities) / limits.velocity
     k = int(fastest.max(axis=0).argmax())
     if fastest[:, k].max() > 1.0 + EXCESS:
@@ -139,7 +139,7 @@ def lead_rejection(
 
 
 def target_rejection(scene: Scene, goal: PointingGoal, margin: float) -> Rejection | None:
-    """Return why a target cannot be pointed at from anywhere, or None."""
+    """Return why no configuration may point at a target, or None."""
     where = ', '.join(f'{value:.3f}' for value in goal.target)
     for box in scene.boxes:
         local = (goal.target - box.center) @ box.rotation
@@ -161,7 +161,7 @@ def target_rejection(scene: Scene, goal: PointingGoal, margin: float) -> Rejecti
 
 
 def goal_rejection(world: World, goals: GoalSet) -> Rejection:
-    """Return why no posture that aims at the target will do."""
+    """Return why no configuration that points at the target is valid."""
     if goals.n_aiming == 0:
         return Rejection(
             PlanStatus.GOAL_UNREACHABLE,
@@ -171,7 +171,7 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
     least: dict[tuple[str, str], float] = {}
     reaches = np.maximum(goals.blocked_reaches, world.ray_length)
     for depths in box_depths(world, goals.q_blocked, reaches):
-        # A link may be two bars: it counts once.
+        # A link of two bars counts once.
         found: dict[tuple[str, str], float] = {}
         for bar, box in np.argwhere(depths > 0.0):
             pair = (world.bar_names[bar], world.box_names[box])

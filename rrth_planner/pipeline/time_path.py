@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a path to a motion in time that both judges agree about."""
+"""From a path to a trajectory that both collision checkers find free."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -23,12 +23,12 @@ from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.lead_in import LeadIn, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
 
-# Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
-# has other intervals, does not fail for a hair [m].
+# Blends are proven with this beyond the margin, so that the timed curve, whose proof has other
+# intervals, does not fail by rounding [m].
 HAIR = 2e-6
-# A motion that begins in motion goes beyond what it may do by no more than this share.
+# A motion from a moving start may exceed its limits by this factor.
 EXCESS = 1.01
-# Sizes of the first blend of an arm that moves, as shares of what is free.
+# Sizes of the first blend of a moving arm, as shares of the free one.
 FIRST_SHARES = (0.5, 0.2, 0.0)
 
 
@@ -45,13 +45,13 @@ def time_path(
     should_stop: Callable[[], bool],
 ) -> Trajectory | Disagreement | Rejection:
     """
-    Return the timed path once both judges agree that it is free, with stops if need be.
+    Return the timed path that both checkers find free, with stops at corners if needed.
 
     Parameters
     ----------
     arm : ArmModel
     scene : Scene
-        The wearer in the base frame, as the second judge sees him.
+        The wearer in the base frame, for the second checker.
     goal : PointingGoal
     world : World
         The same, grown by the margin [m].
@@ -61,11 +61,11 @@ def time_path(
     margin : float
         [m].
     lead : LeadIn or None
-        What comes before the path.
+        Precedes the path.
     escape : Escape or None
-        The lead, where it leads out of boxes that the arm was in.
+        The lead-in, where it is an escape.
     should_stop : callable
-        Polled meanwhile; True cancels.
+        Polled; True cancels.
 
     """
     if lead is not None and lead.speed > 0.0:
@@ -77,7 +77,7 @@ def time_path(
         return CANCELLED
     choices = [rounded]
     if lead is not None and lead.speed > 0.0 and rounded:
-        # The arm must be slow enough where the first blend begins: a smaller one begins later.
+        # The arm must be slow enough at the first blend: a smaller one begins later.
         choices += [
             (replace(rounded[0], half_length=share * rounded[0].half_length), *rounded[1:])
             for share in FIRST_SHARES
@@ -120,7 +120,7 @@ def in_time(
     ----------
     path : Path
     choices : sequence of tuple of Blend
-        Ways to take the corners.
+        Blends of the corners.
     limits : MotionLimits
     lead : LeadIn or None
         What comes before the path, whose first edge is then followed from its speed on.
@@ -136,7 +136,7 @@ def in_time(
             whole = joined(lead.trajectory, parameterize(path, blends, within, lead.speed))
             if excess(whole, lead.allowed) <= EXCESS:
                 timed.append(whole)
-    # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
+    # Where blends must be slow, stopping at each corner can be faster.
     return sorted(timed, key=lambda trajectory: trajectory.duration)
 
 
@@ -146,7 +146,7 @@ def first_proven(
     """
     Return the first of some trajectories that is proven free, or None.
 
-    escape_time: until then they are proven to lead out of the world's boxes [s].
+    escape_time: until then they are proven to escape from the world's boxes [s].
     """
     for trajectory in timed:
         if certify(trajectory, world, escape_time).is_proven:
