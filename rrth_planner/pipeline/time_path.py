@@ -89,7 +89,7 @@ def time_path(
     if not timed:
         return Rejection(
             PlanStatus.START_MOVES,
-            'the arm moves, and no motion found from its state keeps the limits of its joints; '
+            'the arm moves, and no motion found from its state respects the limits of its joints; '
             'expected an arm at rest',
         )
     trajectory = first_proven(timed, world, escape_time)

@@ -124,12 +124,12 @@ def test_of_many_changes_few_are_looked_at():
 
 
 def test_a_section_keeps_its_times_and_what_led_to_it():
-    told = (CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4)),)
-    part = section(seen(told=told), 0.25, 0.75)
+    commanded = (CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4)),)
+    part = section(seen(commanded=commanded), 0.25, 0.75)
     assert part.times[0] >= 0.25
     assert part.times[-1] <= 0.75
     assert len(part.times) == len(part.positions) == len(part.velocities) == 24
-    assert part.commanded == told
+    assert part.commanded == commanded
     with pytest.raises(RecordError, match=r'from 3 to 4, expected times between 0\.00 and 1\.00'):
         section(seen(), 3.0, 4.0)
 

@@ -405,7 +405,7 @@ def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
     running = ExecutingMotion(
         trajectory=plan.trajectory,
         start_time=0.0,
-        reach=plan.target_distance,
+        target_distance=plan.target_distance,
         escape_time=plan.escape_time,
     )
     kept = {'margin': MARGIN, 'ray_guard_length': RAY}

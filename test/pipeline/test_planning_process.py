@@ -145,7 +145,7 @@ def test_one_that_dies_over_a_question_says_so_and_another_one_goes_on(process, 
         return False
 
     endless = RRTHOptions(max_samples=10**7, time_limit=3600.0)
-    expected = 'the planning process ended with code -9 while it worked; another one is started'
+    expected = 'the planning process ended with code -9 while working; another one is started'
     with pytest.raises(PlanningProcessError, match=expected):
         process.plan(question(scene=shut_in(), options=endless), kill)
     assert said[-1] == expected
@@ -158,7 +158,7 @@ def test_one_that_has_died_is_replaced_before_it_is_asked(process, said):
     os.kill(before, signal.SIGKILL)
     os.waitid(os.P_PID, before, os.WEXITED | os.WNOWAIT)
     assert process.plan(question()).status is PlanStatus.SOLVED
-    assert 'ended with code -9 while it had nothing to do' in said[-1]
+    assert 'ended with code -9 while idle' in said[-1]
     assert process.pid != before
 
 

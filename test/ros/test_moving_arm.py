@@ -24,7 +24,7 @@ from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.requests import handover as start  # noqa: E402
+from rrth_planner.ros.requests import handover  # noqa: E402
 from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402
 from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
@@ -77,7 +77,7 @@ def _ask(monkeypatch):
         if tick > 0.0:
             # No time but that of the clock, however busy the machine.
             still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
-            monkeypatch.setattr(start, 'time', still)
+            monkeypatch.setattr(handover, 'time', still)
 
         def publish(_, revalidation):
             clock.now += reading
@@ -182,7 +182,7 @@ def test_a_motion_whose_time_has_passed_is_planned_anew(ask):
     outcome, now = ask(_slow(), 3.0, reading=0.1)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
-    assert now <= outcome.handover.latest
+    assert now <= outcome.handover.deadline
     outcome, _ = ask(_slow(), 3.0, reading=0.5)
     assert outcome.code is ErrorCode.TIMED_OUT
     assert outcome.trajectory is None
@@ -191,7 +191,7 @@ def test_a_motion_whose_time_has_passed_is_planned_anew(ask):
 def test_an_arm_whose_motion_is_unknown_is_not_told_late(ask):
     outcome, _ = ask(_slow(), 3.0, is_known=False, reading=0.1)
     assert outcome.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
-    assert 'off its course' in outcome.sentence
+    assert 'deviates from its trajectory' in outcome.sentence
     assert outcome.trajectory is None
 
 
@@ -200,7 +200,7 @@ def test_a_motion_whose_time_has_passed_when_all_is_read_is_planned_anew(ask):
     outcome, now = ask(_slow(), 3.0, reading=0.03)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.handover.time > BEGIN + 3.0 + LEADS[1]
-    assert now <= outcome.handover.latest
+    assert now <= outcome.handover.deadline
 
 
 def test_a_wearer_who_never_stands_still_does_not_make_a_motion_late(ask):
@@ -208,7 +208,7 @@ def test_a_wearer_who_never_stands_still_does_not_make_a_motion_late(ask):
     outcome, now = ask(_slow(), 3.0, checking=0.02)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
     assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[0], abs=0.01)
-    assert now <= outcome.handover.latest
+    assert now <= outcome.handover.deadline
 
 
 def test_a_motion_that_nobody_knows_pauses_unseen(ask):

@@ -614,16 +614,16 @@ def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, publishers = inputs_of(planner), planner._queue._publishers
-    tell, known = publishers.tell, []
+    publish, known = publishers.publish, []
 
-    def tell_slowly(msg):
+    def publish_slowly(msg):
         body = inputs.body.value
         stranger.publishers['body_boxes'].publish(fenced())
         time.sleep(0.3)
         known.append(inputs.body.value is body)
-        tell(msg)
+        publish(msg)
 
-    monkeypatch.setattr(publishers, 'tell', tell_slowly)
+    monkeypatch.setattr(publishers, 'publish', publish_slowly)
     assert stranger.answer().success
     assert known[0]
     # Then it is, and the guard stops the arm.
@@ -805,7 +805,7 @@ def test_a_planning_process_that_dies_is_an_answer_and_no_end(start, monkeypatch
     say_all(planner, stranger)
 
     def die(*_):
-        raise PlanningProcessError('the planning process ended with code -9 while it worked')
+        raise PlanningProcessError('the planning process ended with code -9 while working')
 
     with monkeypatch.context() as patch:
         patch.setattr(planner._planner, 'plan', die)

@@ -26,7 +26,7 @@ TARGETS = ((2.0, 0.3, 0.4), (1.0, 1.5, 0.8), (1.5, -0.8, 1.2), (2.5, 0.8, 0.2), 
 ROUNDS = 2
 # At 500 Hz and half the pace a busy machine holds up the arm's own process: the planner sees that,
 # or the arm rejects what comes too late. Never is a motion from rest told to an arm that moves.
-MOST_HELD_UP, OFF_COURSE = 3, ('the arm is off its course by', 'the motion begins at ')
+MOST_HELD_UP, OFF_COURSE = 3, ('the arm deviates from its trajectory by', 'the motion begins at ')
 FROM_REST = 'begins at velocity 0,'
 
 

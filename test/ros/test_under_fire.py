@@ -159,7 +159,7 @@ class Wire:
         self.published, self.complaints = [], Complaints()
         planner.get_logger = lambda: self.complaints
         publishers = planner._queue._publishers
-        publishers.tell = self.published.append
+        publishers.publish = self.published.append
         publishers.publish_view = lambda *a: None
 
     def say(self, name, msg, is_reliable=False):

@@ -240,4 +240,4 @@ def test_a_motion_that_would_break_the_limits_is_none(monkeypatch):
     plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, StartState(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert plan.trajectory is None
-    assert 'holds the limits of its joints' in plan.sentence
+    assert 'respects the limits of its joints' in plan.sentence
