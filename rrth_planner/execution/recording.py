@@ -134,7 +134,7 @@ def at(changes: Sequence[tuple[float, Any]], time: float) -> Any:
     return changes[i - 1][1] if i else None
 
 
-def clearances_seen(recording: Recording, arm: ArmModel, ray_guard_length: float) -> Array:
+def measured_clearances(recording: Recording, arm: ArmModel, ray_guard_length: float) -> Array:
     """
     Return the clearance of the arm at each joint state, (n,) [m].
 

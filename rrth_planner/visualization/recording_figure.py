@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 import numpy as np
 from rrth_planner.execution.recording import (
     at,
-    clearances_seen,
     commanded_at,
     commanded_stops,
+    measured_clearances,
     Recording,
 )
 from rrth_planner.io.settings import PlanSettings
@@ -79,7 +79,7 @@ def recording_figure(
     others = [figure.add_subplot(curves[i], sharex=position) for i in (1, 2, 3)]
     velocity, distance, monitor = others
     _draw_joints(position, velocity, recording, arm, settings)
-    clearances = clearances_seen(recording, arm, settings.ray_guard_length)
+    clearances = measured_clearances(recording, arm, settings.ray_guard_length)
     _draw_distance(distance, recording, clearances, settings.margin)
     _draw_monitor(monitor, recording)
     begin, end = _span(recording)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where within its motion an arm is, by what it says."""
+"""Localization of an arm within its motion, by its readings."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_an_arm_that_is_elsewhere_is_nowhere_on_its_motion():
     running = ExecutingMotion(trajectory=_swing(), start_time=10.0)
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 10.5, 10.5) is None
     assert running.phase(np.full(4, np.nan), 10.5, 10.5) is None
-    # It may still be on its way there.
+    # It may still be moving there.
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 9.8, 9.9) == pytest.approx(-0.1)
 
 

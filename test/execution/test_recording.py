@@ -9,10 +9,10 @@ import pytest
 from rrth_planner.collision.reference_checker import least_clearance
 from rrth_planner.execution.recording import (
     at,
-    clearances_seen,
     commanded_at,
     commanded_stops,
     CommandedMotion,
+    measured_clearances,
     Recording,
     section,
 )
@@ -36,7 +36,7 @@ def motion(begin, end, duration=1.0, v_begin=0.0):
 
 
 def seen(n=50, **fields):
-    """Return a recording of an arm that was seen on a straight way for a second."""
+    """Return a recording of an arm on a straight path for a second."""
     times = np.linspace(0.0, 1.0, n)
     q = FOLDED + np.outer(times, [0.5, -0.5, 0.3, 0.2])
     return Recording(times=times, positions=q, velocities=np.zeros((n, 4)), **fields)
@@ -63,10 +63,10 @@ def test_the_motion_that_began_last_counts_and_its_end_is_held():
 
 
 def test_the_distance_is_the_one_to_the_wearer_of_that_time():
-    # Far enough that nothing touches: what is inside a box is signed otherwise.
+    # Far enough that nothing collides: what is inside a box is signed otherwise.
     bodies = (scene([0.4, 0.5, 0.3]), scene([-0.5, 0.7, 0.9], [1.5, 0.0, 0.1]))
     recording = seen(bodies=((0.2, bodies[0]), (0.6, bodies[1])))
-    found = clearances_seen(recording, ARM, 0.4)
+    found = measured_clearances(recording, ARM, 0.4)
     for time, q, clearance in zip(recording.times, recording.positions, found, strict=True):
         if time < 0.2:
             assert np.isnan(clearance)
@@ -78,10 +78,10 @@ def test_the_distance_is_the_one_to_the_wearer_of_that_time():
 
 
 def test_nobody_there_is_no_distance():
-    assert np.isnan(clearances_seen(seen(bodies=((0.0, Scene(())),)), ARM, 1.0)).all()
+    assert np.isnan(measured_clearances(seen(bodies=((0.0, Scene(())),)), ARM, 1.0)).all()
 
 
-def test_a_brake_begins_in_motion_while_the_guard_brakes():
+def test_a_stop_begins_in_motion_while_the_monitor_is_stopping():
     plain = CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4))
     turn = CommandedMotion(0.5, motion(FOLDED + 0.2, FOLDED, v_begin=0.3))
     stop = CommandedMotion(2.0, motion(FOLDED, FOLDED + 0.05, v_begin=0.3))
@@ -101,7 +101,7 @@ def test_what_was_the_case_is_what_came_last():
 
 
 class Counted(Sequence):
-    """A sequence that counts how often it is looked into."""
+    """A sequence that counts its accesses."""
 
     def __init__(self, items):
         """Begin at 0."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A running motion: what is left of it, held against a new body, and how it stops."""
+"""A running motion: checks of the remaining motion against a new body, and its stop."""
 
 import functools
 
@@ -85,7 +85,7 @@ def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
 
 @examples(60)
 @given(seed=SEEDS, n_more=st.sampled_from([0, 1, 3, 60]), reach=st.sampled_from([0.0, 2.0]))
-def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach):
+def test_the_remaining_motion_is_free_where_the_certificate_says_so(seed, n_more, reach):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -125,7 +125,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
         dense_touch(arm, scene, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
         for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
     )
-    # Free by a hair may be left unproven; what touches must never be called free.
+    # Free by a hair may be left unproven; a violation must never be called free.
     assert not (is_free and touches)
     if not touches and not is_free:
         larger = Scene((*wearer().boxes, Box('hand', where, hand.size + 2e-3, np.eye(3))))
@@ -170,8 +170,8 @@ def hand_beside(rng, q, gap):
     return None
 
 
-def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
-    rng, told = np.random.default_rng(5), {True: 0, False: 0}
+def test_a_motion_that_escapes_is_told_from_one_that_does_not():
+    rng, counts = np.random.default_rng(5), {True: 0, False: 0}
     arm = table_1_arm()
     for _ in range(60):
         motion = random_motion(rng)
@@ -190,7 +190,7 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         found = escapes_by_continuing(
             running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
         )
-        told[found] += 1
+        counts[found] += 1
         hand = Scene(scene.boxes[-1:])
         gaps = [reference_checker.least_clearance(arm, hand, row[None], RAY) for row in q]
         if found:
@@ -201,18 +201,18 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         assert not escapes_by_continuing(
             running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY
         )
-    assert min(told.values()) >= 5, told
+    assert min(counts.values()) >= 5, counts
 
 
 def test_a_place_is_free_by_the_boxes_of_a_moment_as_by_the_world():
-    rng, arm, told = np.random.default_rng(8), table_1_arm(), {True: 0, False: 0}
+    rng, arm, counts = np.random.default_rng(8), table_1_arm(), {True: 0, False: 0}
     low, high = arm.bounds
     for _ in range(300):
         q, ray = rng.uniform(low, high), rng.uniform(0.0, 1.0)
         found = is_place_free(q, arm, wearer(), MARGIN, ray)
         assert found == arm_world(arm, wearer(), MARGIN, ray).is_valid(q)
-        told[found] += 1
-    assert min(told.values()) >= 20, told
+        counts[found] += 1
+    assert min(counts.values()) >= 20, counts
 
 
 @functools.cache
@@ -225,7 +225,7 @@ def some_motions():
 @pytest.mark.parametrize(
     ('late', 'rate'), [(0.0, 1.0), (1e-5, 1.0), (-1e-5, 1.0), (0.003, 1.0), (0.0, 0.5), (0.0, 0.1)]
 )
-def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
+def test_a_handover_is_tracked_from_its_publication_on(late, rate):
     n_known = 0
     for motion in some_motions():
         before = ExecutingMotion(trajectory=motion, start_time=100.0)
@@ -238,7 +238,7 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
         after = ExecutingMotion(trajectory=later, start_time=150.0)
         now = 150.0 - begin_ahead
         whole = with_lead_in(before, begin - late, after, now)
-        # Where nothing moves no place tells the time.
+        # At rest the position does not determine the time.
         if np.abs(sample(motion, [at])[1]).max() < 0.05:
             continue
         n_known += 1
@@ -254,7 +254,7 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
     assert n_known >= 5
 
 
-def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
+def test_an_arm_off_its_motion_is_not_located_before_the_handover():
     motion = some_motions()[0]
     before = ExecutingMotion(trajectory=motion, start_time=100.0)
     half = 0.5 * motion.duration

@@ -67,7 +67,7 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
 
 
 def is_touched(arm, box, q, growth):
-    """Return at which of the instants q, (n, dof), the oracle sees the arm touch a grown box."""
+    """Return at which of the instants q, (n, dof), the oracle finds the arm in a grown box."""
     ends = oracle_bars(arm, q, RAY)
     radii = [arm.radii[row] for row, _ in bar_ends(arm)]
     hits = [
@@ -196,7 +196,7 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
         if not is_entered:
             assert not touched.any()
             continue
-        # In, then out for good; and from each look on no deeper than there.
+        # In, then out for good; and from each sample on no deeper than there.
         assert not (np.diff(touched.astype(int)) > 0).any()
         for time in looks:
             depth = max(0.0, oracle_depth(arm, box, positions_at(trajectory, [time])[0]))
@@ -211,7 +211,7 @@ def test_most_arms_come_out():
     assert len(n_solved) >= 45
 
 
-def test_an_arm_whose_shoulder_is_covered_has_no_way_out():
+def test_an_arm_whose_shoulder_is_covered_has_no_escape():
     arm = table_1_arm()
     shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
     center = shoulder - [0.0, 0.05, 0.0]
@@ -244,7 +244,7 @@ def test_deeper_is_rejected_with_part_box_and_depth(seed):
     for more, is_hit in ((1e-4, False), (-1e-4, True)):
         half = 0.5 * box.size + MARGIN - depths.max() - more + arm.radii[0]
         assert bar_box_touch(ends, box.center, box.rotation, half) == is_hit
-    # One that may be that deep gets out, or is told that there is no way.
+    # One that may be that deep escapes, or is rejected since there is no escape.
     plan = ask(arm, scene, q_start, escape_depth=0.1)
     assert 'escape_depth' not in plan.sentence
 
@@ -263,7 +263,7 @@ def pressed(depth=0.03):
 
 
 @pytest.mark.parametrize('seed', [None, 4, 7, 8])
-def test_no_way_out_that_is_shorter_is_found_by_trying_many(seed):
+def test_no_shorter_escape_is_found_by_trying_many(seed):
     if seed is None:
         (arm, scene), q_start = pressed(), FOLDED
     else:
@@ -329,14 +329,14 @@ def test_a_cancelled_request_leads_nowhere():
 
 
 @pytest.mark.parametrize('after', [5, 20])
-def test_a_search_for_a_way_out_is_cancelled_in_mid_look(after):
+def test_a_search_for_an_escape_is_cancelled(after):
     arm = table_1_arm()
     shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
     hand = Box('hand', shoulder - [0.0, 0.05, 0.0], [0.1, 0.08, 0.1], np.eye(3))
     polls = []
     plan = ask(arm, Scene((hand,)), FOLDED, should_stop=lambda: polls.append(None))
     assert plan.status is PlanStatus.START_IN_COLLISION
-    # In every one of the directions that it looks in.
+    # In all directions of the search.
     assert len(polls) > 100
     n_polls = itertools.count()
     plan = ask(arm, Scene((hand,)), FOLDED, should_stop=lambda: next(n_polls) >= after)
@@ -357,7 +357,7 @@ def second_opinion(arm, scene, world, trajectory):
     )
 
 
-def test_a_way_out_that_touches_for_the_second_judge_is_rejected(monkeypatch):
+def test_an_escape_that_violates_for_the_second_checker_is_rejected(monkeypatch):
     arm, scene = pressed()
     touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
     monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
@@ -386,7 +386,7 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     assert (touch.bar, touch.box) == ('pointing ray', 'hand')
     # Half way it is no deeper but not out.
     assert judged[0.5] == (False, None)
-    # A plate in the way, which the arm does not touch yet.
+    # A plate in the way, which the arm does not reach yet.
     middle = oracle_bars(arm, (FOLDED + 0.8 * way)[None], RAY)[0, -1]
     plate = Box('plate', middle[0] + 0.9 * (middle[1] - middle[0]), [1e-3] * 3, np.eye(3))
     blocked = Scene((*scene.boxes, plate))
@@ -399,7 +399,7 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
         assert touch.box == 'plate'
 
 
-def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
+def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED)
     running = ExecutingMotion(

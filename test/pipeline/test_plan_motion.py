@@ -104,7 +104,7 @@ def test_what_is_solved_never_touches_and_ends_on_target(answers):
 
 
 def aiming_postures(arm, scene, target, rng, n):
-    """Return random postures that aim, with their reach."""
+    """Return random configurations that point at the target, with its distance."""
     world = arm_world(arm, scene, MARGIN, RAY)
     local = target_in_mount(arm, PointingGoal(target))
     for q_near in rng.uniform(*arm.bounds, (n, arm.dof)):
@@ -156,7 +156,7 @@ def test_a_target_in_the_wearer_is_rejected_by_name():
     assert 'margin of 0.02 m: penetration depth 0.0100 m' in plan.sentence
 
 
-def test_a_share_of_postures_is_no_more_than_all_of_them():
+def test_a_share_of_configurations_is_at_most_all_of_them():
     # Bars of one link have one name: a box round all of the arm counts once for each.
     box = Box('everywhere', np.zeros(3), np.full(3, 5.0), np.eye(3))
     world = arm_world(table_1_arm(), Scene((box,)), MARGIN, RAY)
@@ -168,7 +168,7 @@ def test_a_share_of_postures_is_no_more_than_all_of_them():
     rejection = goal_rejection(world, goals)
     (share,) = re.findall(r'\((\d+) %\)', rejection.sentence)
     assert share == '100'
-    # What the proof says, not a distance that may be greater; of both bars the deeper.
+    # The bound of the proof, not a distance that may be greater; of both bars the deeper.
     depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
     (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', rejection.sentence)
     assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
@@ -233,7 +233,7 @@ def test_a_start_beyond_a_limit_is_rejected_with_joint_and_limits():
         assert ask(wearer(), q, [1.5, 0.0, 0.3]).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_an_arm_that_aims_already_holds_still():
+def test_an_arm_that_points_already_holds_still():
     rng = np.random.default_rng(94)
     arm, world = table_1_arm(), wearer_world()
     n = 0
@@ -303,7 +303,7 @@ def test_an_arm_that_moves_may_stop_past_a_limit_by_rounding(excess):
 
 
 @pytest.mark.parametrize('opinion', [None, Violation(0.1, 0.01, 'ray', 'torso')])
-def test_what_is_cancelled_while_the_second_judge_looks_ends_so(monkeypatch, opinion):
+def test_a_request_is_cancelled_during_the_second_check(monkeypatch, opinion):
     looked = []
 
     def look(*_, **__):
@@ -327,7 +327,7 @@ def test_a_start_a_hair_from_the_margin_is_not_blamed_on_the_goal():
     scene = Scene((Box('plate', center, (0.1, 0.2, 0.4), T[:3, :3]),))
     world = arm_world(arm, scene, MARGIN, RAY)
     assert world.is_valid(q)
-    # Plenty of postures aim at a target on the other side.
+    # Many configurations point at a target on the other side.
     target = T[:3, 3] - 1.5 * T[:3, 0] + 0.5 * T[:3, 2]
     plan = ask(scene, q, target)
     assert plan.status is not PlanStatus.GOAL_IN_COLLISION, plan.sentence

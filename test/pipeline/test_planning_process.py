@@ -62,7 +62,7 @@ def shut_in():
 
 @pytest.fixture(name='said', scope='module')
 def _said():
-    """Give what was said of deaths."""
+    """Give the sentences of deaths."""
     return []
 
 
@@ -105,7 +105,7 @@ def test_the_second_checker_sees_what_it_sees_here(process):
     assert found.box == 'hand'
 
 
-def test_what_nobody_wants_any_more_ends(process):
+def test_cancelled_requests_end(process):
     # Without a limit that it could reach soon.
     endless = RRTHOptions(max_samples=10**7, time_limit=3600.0)
     asked = [False]
@@ -178,7 +178,7 @@ def test_an_error_is_raised_here_with_where_it_was_raised_there(process):
     assert process.plan(question()).status is PlanStatus.SOLVED
 
 
-def test_an_error_that_cannot_be_sent_is_told_in_words():
+def test_an_error_that_cannot_be_sent_becomes_a_sentence():
     class LocalError(Exception):
         pass
 

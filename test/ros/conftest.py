@@ -12,7 +12,7 @@ import weakref
 import pytest
 
 LONGEST_WAIT = 30.0
-# Answers of a planner that has not heard everything yet, or whose machine is too busy to plan in
+# Answers of a planner that still lacks an input, or whose machine is too busy to plan in
 # time for an arm that moves.
 AGAIN = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'TIMED_OUT')
 
@@ -79,7 +79,7 @@ def _destroyed_nodes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """
     Destroy what nodes a test has made and left, whether it passed or not.
 
-    A node outlives its context. A publisher of one would go on giving its last body to each
+    A node outlives its context. Its publishers would give their last body to each
     planner of the tests after it, whose own body that may replace.
     """
     if 'rclpy.node' not in sys.modules:

@@ -40,14 +40,14 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
-        # How long a body waits until it is judged [s].
+        # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
             parameters=replace(parameters or declare_parameters(node), replan=False),
             monitor_state=('', ''),
             publish_soon=lambda: None,
             remaining_motion_checked=lambda took: self.said.append('free'),
-            stop_published=lambda took: self.said.append('braked') or self.took.append(took),
+            stop_published=lambda took: self.said.append('stopped') or self.took.append(took),
         )
         self.inputs = Inputs('body', 'target', 'joints')
         publishers = SimpleNamespace(
@@ -69,7 +69,7 @@ class Monitored:
         self.command(running)
 
     def command(self, running, publish=lambda: None):
-        """Tell the arm a motion."""
+        """Command a motion."""
         self.monitor.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
 
     def on_time(self, phase):
@@ -88,7 +88,7 @@ class Monitored:
         self.monitor.on_body(self.inputs.body.value, 0)
 
     def hand(self, ahead, away, motion=None):
-        """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
+        """Return a hand so far ahead along the path of the ray [s], and aside of that [m]."""
         at = PHASE + ahead if motion is None else ahead
         T = reference_checker.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
         tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]

@@ -32,7 +32,7 @@ MARGIN, RAY = 0.02, 1.0
 
 
 class Client(Node):
-    """Tells the planner where to point, and writes down how the arm moves."""
+    """Publishes inputs of the planner, and records the joint states."""
 
     def __init__(self):
         """Connect to both nodes."""

@@ -60,7 +60,7 @@ class Injector:
         self._kind, self._at, self._on_delay = kind, at, on_delay
 
     def __call__(self, frame, event, _):
-        """Look at one event of the interpreter."""
+        """Check one event of the interpreter."""
         wanted = 'return' if self._kind == 'return late' else 'call'
         if event.removeprefix('c_') != wanted:
             return
@@ -100,20 +100,20 @@ def supervised(arm, step):
 
 
 def follow(arm):
-    """Let the arm do what it was told last, with bodies and timers, for the time of a stop."""
+    """Let the arm execute its last motion, with bodies and timers, for the time of a stop."""
     begin, waits = arm.now, 0.0
     while arm.now - begin < LONGEST_STOP:
         arm.now += PERIOD
         waits = arm.now - (arm.alive[-1] if arm.alive else begin)
         if not arm.published and waits > LEASE:
-            # The playback, or who watches on a real arm, stops it.
+            # The playback, or the controller of a real arm, stops it.
             return 'its planner is lost'
         arm.read(*(arm.obeys() if arm.published else arm.on_time(arm.now - 100.0)))
         supervised(arm, lambda: arm.see(*arm.boxes))
-        # A body that came while the one before was still looked at has waited since then.
+        # A body that came while the one before was still checked has waited since then.
         arm.late = 0.0
         supervised(arm, arm.monitor._on_timer)
-    return 'stopped' if arm.published and not arm.obeys()[1].any() else 'goes on'
+    return 'stopped' if arm.published and not arm.obeys()[1].any() else 'continues'
 
 
 def check(arm, which, kind, at):
@@ -188,7 +188,7 @@ def test_what_fails_for_ever_stops_the_arm_or_loses_its_planner(
     if is_hand or n_calls:
         assert found in ('stopped', 'its planner is lost')
     else:
-        assert found == 'goes on'
+        assert found == 'continues'
 
 
 def test_a_message_that_cannot_be_published_is_published_again(monitored, monkeypatch):
@@ -205,11 +205,11 @@ def test_a_message_that_cannot_be_published_is_published_again(monitored, monkey
     arm.monitor._publishers.publish_motion = at_the_third_time
     assert follow(arm) == 'stopped'
     assert len(n_tries) == 3
-    # Nobody said meanwhile that the motion was monitored.
+    # Meanwhile liveliness was not asserted.
     assert not [time for time in arm.alive if n_tries[0] <= time < n_tries[-1]]
 
 
-def test_a_body_that_is_rejected_stops_the_arm_and_says_why(monitored):
+def test_a_rejected_body_stops_the_arm_with_the_reason(monitored):
     arm = monitored()
     arm.boxes = [FAR]
 
@@ -232,7 +232,7 @@ def test_joint_positions_that_are_rejected_stop_the_arm(monitored):
 
 
 @pytest.mark.parametrize(('late', 'n_stops'), [(0.049, 0), (0.051, 1)])
-def test_a_body_that_is_judged_late_stops_the_arm(monitored, late, n_stops):
+def test_a_body_that_is_checked_late_stops_the_arm(monitored, late, n_stops):
     arm = monitored()
     arm.late = late
     arm.see(FAR)

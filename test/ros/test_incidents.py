@@ -120,7 +120,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
+def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     start, monkeypatch, tmp_path
 ):
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
@@ -349,7 +349,7 @@ def test_what_is_in_the_way_is_named_with_the_part_of_the_arm(start):
     assert ' m inside box "back pack"' in message
 
 
-def test_postures_that_all_touch_are_told_with_part_and_box(start):
+def test_configurations_that_all_violate_are_reported_with_part_and_box(start):
     planner, stranger = start()
     body = samples.wearer()
     # A wall between the arm and the target, larger than the arm can point past.

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes promise of names, frames, clocks and lives, seen from outside."""
+"""Names, frames, clocks and liveliness of the nodes, from outside."""
 
 import time
 from types import SimpleNamespace
@@ -209,7 +209,7 @@ def seconds(node):
 
 
 def set_clock(clock, now, wait_until, *nodes):
-    """Tell a time until everybody has heard it; clocks are often said, not latched."""
+    """Publish a time until all nodes have it; clocks are published often, not latched."""
 
     def is_told():
         clock(now)
@@ -220,7 +220,7 @@ def set_clock(clock, now, wait_until, *nodes):
 
 def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until):
     planner, stranger = start(use_sim_time=True, body_timeout=1.0, joint_timeout=5.0)
-    # Before anybody has told the time it is 0, and plans are made all the same.
+    # Before the first clock message the time is 0, and plans are made all the same.
     say_all(planner, stranger)
     assert seconds(planner) == 0.0
     assert stranger.answer().success
@@ -234,7 +234,7 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
         set_clock(clock, now, wait_until, planner)
         message = stranger.answer().message
         assert message.startswith('SUCCESS' if is_fresh else 'SENSOR_INFO_STALE (-24)'), message
-    # What is heard after the clock was set back counts from then on.
+    # Messages after the clock was set back count from then on.
     say_inputs(stranger, inputs, wait_until, 20.0)
     assert stranger.answer().success
     for _ in range(3):
@@ -242,15 +242,13 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
 
 
 def say_inputs(stranger, inputs, wait_until, now):
-    """Say all inputs again and wait until they are heard at a time [s]."""
+    """Publish all inputs again and wait until they are received at a time [s]."""
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
     wait_until(lambda: all(abs(heard.received - now) < 1e-6 for heard in inputs.all.values()))
 
 
-def test_an_arm_in_motion_is_taken_over_while_simulated_time_stands_still(
-    start, clock, wait_until
-):
+def test_a_handover_works_while_simulated_time_stands_still(start, clock, wait_until):
     planner, stranger = start(use_sim_time=True)
     set_clock(clock, 7.0, wait_until, planner)
     say_all(planner, stranger, joint_states=joints(velocity=[0.1, 0.0, 0.0, 0.0]))
@@ -315,7 +313,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_is_set)
-    # The motion is watched by them too.
+    # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.endswith(f'seed {seed}')
         assert planner._monitor._parameters.margin == margin
@@ -323,7 +321,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
 
 
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE])
-def test_the_playback_hears_reliable_publishers(spinning, wait_until, profile):
+def test_the_playback_receives_from_reliable_publishers(spinning, wait_until, profile):
     node, planner = PlaybackNode(namespace='/quality'), Node('planner', namespace='/quality')
     motions = planner.create_publisher(JointTrajectory, 'joint_trajectory', profile)
     with spinning(node, planner):
@@ -355,7 +353,7 @@ def test_bytes_and_huge_messages_from_the_wire_end_no_node(start, spinning, wait
 
 
 class Watcher(Node):
-    """Tells a planner of its own namespace where to point, and writes down the states."""
+    """Publishes inputs of the planner of its namespace, and records the joint states."""
 
     def __init__(self):
         super().__init__('watcher', namespace='/killed')
@@ -369,7 +367,7 @@ class Watcher(Node):
         self.arm = self.create_publisher(JointTrajectory, 'joint_trajectory', 1)
 
     def tell_slowly(self, positions):
-        """Tell the arm a motion of 100 s."""
+        """Command a motion of 100 s."""
         msg = motion(positions, 100)
         msg.points[0].positions = list(self.states[-1].position)
         self.arm.publish(msg)
@@ -386,7 +384,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
     module = 'rrth_planner.ros.planner_node'
 
     def ask():
-        # A killed node stays in the lists of others for a while: some requests are for nobody.
+        # A killed node stays in the lists of others for a while: some requests reach no node.
         wait_until(watcher.plan.service_is_ready, 120.0)
         while True:
             future, end = watcher.plan.call_async(Trigger.Request()), time.monotonic() + 2.0
@@ -414,7 +412,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
         goal = watcher.motions[0].points[-1].positions
         assert np.abs(np.array(watcher.states[-1].position) - goal).max() > 0.1
         wait_until(lambda: any('planner liveliness lost' in line for line in said))
-        # Somebody whose liveliness nobody asks for moves the arm on.
+        # A publisher without supervised liveliness moves the arm on.
         watcher.tell_slowly(goal)
         wait_until(lambda: watcher.speed > 0.011)
         watcher.target.publish(target(1.2, 0.9, 0.6))
@@ -423,7 +421,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
             # All this time the playback went on.
             assert watcher.speed > 0.011
             playback.check()
-            # A motion that takes over from one that nobody knows may come too late for it.
+            # A handover from an unknown motion may come too late.
             while watcher.speed > 0.0:
                 n_said, answer, end = len(said), ask(), time.monotonic() + 10.0
                 assert answer.success, answer.message

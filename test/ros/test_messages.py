@@ -391,7 +391,7 @@ def test_each_status_has_a_code():
     assert answer(ErrorCode.TIMED_OUT, 'too late') == 'TIMED_OUT (-6): too late'
 
 
-def test_a_frame_at_fault_is_told_from_other_rejections():
+def test_a_bad_frame_has_a_code_of_its_own():
     for other in (ErrorCode.INVALID_GOAL_CONSTRAINTS, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA):
         assert code_of_rejection(MessageError('x'), other) is other
         assert code_of_rejection(FrameError('x'), other) is ErrorCode.FRAME_TRANSFORM_FAILURE

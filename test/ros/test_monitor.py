@@ -32,11 +32,11 @@ FAR, OTHER = (1.0, 1.5, 0.8), (2.0, 0.3, 0.4)
 
 
 class Client(Node):
-    """Tells the planner everything, and writes down what the nodes say."""
+    """Publishes all inputs, and records what the nodes publish."""
 
     def __init__(self):
         """Connect to both nodes."""
-        super().__init__('guarded')
+        super().__init__('monitored')
         self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self.target = self.create_publisher(PointStamped, 'target', LATCHED)
         self.states, self.motions, self.figures = [], [], {}
@@ -70,7 +70,7 @@ def body(*more):
 
 @pytest.fixture
 def scene_of_a_motion(wait_until, tell, spinning):
-    """Have an arm on its way to a target; give the client."""
+    """Have an arm in motion to a target; give the client."""
 
     def begin(*settings):
         client = Client()
@@ -100,7 +100,7 @@ def scene_of_a_motion(wait_until, tell, spinning):
 
 
 def in_the_way(client, ahead):
-    """Return a box that the arm would touch so much later [s]."""
+    """Return a box that the arm would collide with so much later [s]."""
     arm, motion = worlds.table_1_arm(), client.motion()
     gaps = np.linspace(0.0, motion.duration, 500)
     q, _, _ = sample(motion, gaps)
@@ -122,7 +122,7 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     brake = client.motion(1)
     assert brake.velocities[0].any()
     assert brake.duration < client.motion(0).duration
-    # It goes on by itself, or holds and says so.
+    # It replans, or holds and reports that.
     wait_until(lambda: len(client.motions) == 3 or 'holding' in client.figures.get('monitor', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
@@ -133,7 +133,7 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     wait_until(lambda: client.figures['fail-safe stops'].startswith('1,'))
 
 
-def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wait_until, tell):
+def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, tell):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
     msg, scene = body(box)
@@ -142,7 +142,7 @@ def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wai
     wait_until(lambda: len(client.motions) == 2)
     future = client.plan.call_async(Trigger.Request())
     wait_until(future.done)
-    # For the new target, be it that the arm was at rest before and on its way to the old one.
+    # For the new target, whether the arm was at rest or in motion to the old one.
     assert future.result().success, future.result().message
     last = client.motion().positions[-1]
     assert pointing_error(worlds.table_1_arm(), last, np.array(OTHER)) < 1e-6

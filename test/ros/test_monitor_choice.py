@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the guard does with arms that lag, lie or do not hear, and with stops that touch."""
+"""The monitor with arms that lag, misreport or ignore commands, and with stops in violation."""
 
 from dataclasses import replace
 import re
@@ -27,28 +27,28 @@ pytestmark = pytest.mark.usefixtures('ros_context')
 
 @pytest.fixture
 def monitored():
-    """Give a guard with its motion."""
+    """Give a monitor with its motion."""
     node = Node('choice')
     yield Monitored(node)
     node.destroy_node()
 
 
-def test_an_arm_that_has_its_way_goes_on(monitored):
+def test_a_free_motion_continues(monitored):
     monitored.see(FAR)
     assert monitored.published == []
     assert monitored.said == ['free']
 
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])
-def test_an_arm_brakes_whether_or_not_its_stop_is_free(monitored, ahead, capfd):
+def test_an_arm_stops_whether_or_not_its_stop_is_free(monitored, ahead, capfd):
     monitored.see(monitored.hand(ahead, 0.0))
     ((stop, _),) = monitored.published
-    assert monitored.said == ['braked']
+    assert monitored.said == ['stopped']
     assert not stop.velocities[-1].any()
     sentence = monitored.reporter.monitor_state[1]
     assert 'fail-safe stop' in sentence
     assert ('not proven free either' in sentence) == (ahead < 0.3)
-    # What is proven free, and only that, is for the second judge too.
+    # What is proven free, and only that, is checked by the second checker too.
     (kept,) = monitored.monitor.take_stops()
     assert kept.trajectory is stop
     assert (kept.scene is None) == (ahead < 0.3)
@@ -59,7 +59,7 @@ def test_an_arm_brakes_whether_or_not_its_stop_is_free(monitored, ahead, capfd):
     assert level in line
 
 
-def test_how_near_a_stop_comes_that_is_not_free_is_said(monitored):
+def test_the_clearance_of_a_stop_that_is_not_free_is_reported(monitored):
     # Beside the way of the ray, within the margin.
     hand, next_hand = monitored.hand(0.1, 0.0), monitored.hand(0.11, 0.0)
     ray = reference_checker.frames(ARM, monitored.on_time(PHASE + 0.1)[0][None])[0, -1, :3, 2]
@@ -78,7 +78,7 @@ def test_how_near_a_stop_comes_that_is_not_free_is_said(monitored):
     assert float(said.removesuffix(' m')) == pytest.approx(least, abs=2e-4)
 
 
-def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(monitored):
+def test_an_arm_that_violates_the_margin_continues_where_that_escapes(monitored):
     monitored.see(monitored.hand(0.0, 0.045))
     assert monitored.published == []
     state, sentence = monitored.reporter.monitor_state
@@ -89,7 +89,7 @@ def test_an_arm_that_is_too_near_goes_on_where_that_leads_away(monitored):
     assert len(monitored.published) == 1
 
 
-# What an arm may say of itself when it was told to be at q with the velocity v.
+# What a driver may report when q and the velocity v were commanded.
 ARMS = {
     'ideal': lambda q, v: (q, v),
     'beside its path': lambda q, v: (q + [0.0, 0.0025, 0.0, 0.0], v),
@@ -101,7 +101,7 @@ ARMS = {
 
 @pytest.mark.parametrize('late', [0.0, 0.06])
 @pytest.mark.parametrize('arm', ARMS)
-def test_every_arm_is_braked(monitored, arm, late):
+def test_every_arm_is_stopped(monitored, arm, late):
     monitored.read(*ARMS[arm](*monitored.on_time(PHASE - late)))
     monitored.see(monitored.hand(0.6, 0.0))
     ((stop, begin),) = monitored.published
@@ -111,7 +111,7 @@ def test_every_arm_is_braked(monitored, arm, late):
     assert np.abs(stop.positions[0] - q).max() < 5e-3
 
 
-def test_the_guard_looks_while_simulated_time_stands_still(spinning, wait_until, monkeypatch):
+def test_the_monitor_checks_while_simulated_time_stands_still(spinning, wait_until, monkeypatch):
     looks = []
     monkeypatch.setattr(ExecutionMonitor, '_on_timer', lambda _: looks.append(0))
     node = Node('paused', parameter_overrides=[Parameter('use_sim_time', value=True)])
@@ -129,9 +129,9 @@ def test_an_arm_that_has_not_begun_is_held(monitored):
     assert np.abs(stop.positions - monitored.motion.positions[0]).max() < 5e-3
 
 
-def test_a_motion_that_begins_is_held_against_the_body_of_then(monitored):
+def test_a_motion_that_begins_is_checked_against_the_body_of_then(monitored):
     hand = monitored.hand(0.6, 0.0)
-    # It came after the motion was looked at last, while none was monitored.
+    # It came after the last check of the motion, while none was monitored.
     for boxes, n_stops in (([FAR], 0), ([FAR, hand], 1)):
         parts = tuple(((box.name, 0), BodyPart((box,))) for box in boxes)
         monitored.inputs.body.value = WearerBody(parts)
@@ -139,7 +139,7 @@ def test_a_motion_that_begins_is_held_against_the_body_of_then(monitored):
         assert len(monitored.published) == n_stops
 
 
-def test_a_motion_that_takes_over_is_watched_before_it_begins(monitored):
+def test_a_motion_is_monitored_before_its_handover(monitored):
     monitored.now = 100.0 - 0.2
     monitored.read(monitored.motion.positions[0] + 0.5, np.full(4, 1.0))
     monitored.begin()
@@ -150,7 +150,7 @@ def test_a_motion_that_takes_over_is_watched_before_it_begins(monitored):
 
 
 def _turned(monitored, after):
-    """Return a motion that takes over so much after the phase [s], and leads elsewhere."""
+    """Return a motion with a handover so much after the phase [s], to another goal."""
     q, v, a = (row[0] for row in sample(monitored.motion, [PHASE + after]))
     return Trajectory(
         times=[0.0, 1.0],
@@ -164,7 +164,7 @@ def fail(*_):
     raise OSError('nothing works')
 
 
-def test_a_motion_that_could_not_be_told_is_not_watched(monitored):
+def test_a_motion_that_could_not_be_published_is_not_monitored(monitored):
     before = monitored.monitor.running
     running = ExecutingMotion(trajectory=_turned(monitored, 0.2), start_time=monitored.now + 0.2)
     with pytest.raises(OSError, match='nothing works'):
@@ -174,7 +174,7 @@ def test_a_motion_that_could_not_be_told_is_not_watched(monitored):
     assert len(monitored.published) == 1
 
 
-def test_the_way_to_a_motion_that_takes_over_is_watched_too(monitored):
+def test_the_motion_before_a_handover_is_monitored_too(monitored):
     running = ExecutingMotion(trajectory=_turned(monitored, 0.2), start_time=monitored.now + 0.2)
     monitored.command(running)
     monitored.now += 0.02
@@ -189,7 +189,7 @@ def test_the_way_to_a_motion_that_takes_over_is_watched_too(monitored):
 
 
 def _told(monitored, ahead):
-    """Tell a motion that takes over; return it, and arms by whether they take it."""
+    """Command a motion with a handover; return it, and arms by whether they accept it."""
     turned = _turned(monitored, ahead)
     running = ExecutingMotion(trajectory=turned, start_time=monitored.now + ahead)
     monitored.command(running)
@@ -204,7 +204,7 @@ def _told(monitored, ahead):
 
 @pytest.mark.parametrize('ahead', [0.0, 0.02])
 @pytest.mark.parametrize('is_taken', [True, False])
-def test_what_the_arm_follows_is_watched_even_where_it_was_told_otherwise(
+def test_the_executed_motion_is_monitored_even_where_another_was_commanded(
     monitored, ahead, is_taken
 ):
     _, arms = _told(monitored, ahead)
@@ -219,7 +219,7 @@ def test_what_the_arm_follows_is_watched_even_where_it_was_told_otherwise(
 
 
 @pytest.mark.parametrize('aside', [0.0, 0.002, 0.004, 0.015])
-def test_an_arm_beside_its_new_motion_is_watched_on_that(monitored, aside):
+def test_an_arm_beside_its_new_motion_is_monitored_on_that(monitored, aside):
     turned, arms = _told(monitored, 0.02)
 
     def arm(after):
@@ -233,7 +233,7 @@ def test_an_arm_beside_its_new_motion_is_watched_on_that(monitored, aside):
     assert np.abs(stop.positions[0] - arm(0.35)[0]).max() <= aside + 1e-3
 
 
-def test_an_arm_that_takes_its_motion_late_is_watched_on_that_again(monitored):
+def test_an_arm_that_begins_its_motion_late_is_monitored_on_that_again(monitored):
     turned, arms = _told(monitored, 0.0)
     monitored.run(0.3, arms[False])
     assert 'ignored the last commanded motion' in monitored.reporter.monitor_state[1]
@@ -279,7 +279,7 @@ def test_a_clock_that_is_set_back_does_not_move_the_stop(monitored, back):
     ],
 )
 @pytest.mark.parametrize('arm', ARMS)
-def test_what_is_not_seen_any_more_stops_the_arm(monitored, setting, why, arm):
+def test_a_stale_input_stops_the_arm(monitored, setting, why, arm):
     monitored.reporter.parameters = replace(monitored.reporter.parameters, **setting)
     monitored.see(FAR, expires=monitored.now + (0.1 if why == 'expired' else 10.0))
     monitored.read(*ARMS[arm](*monitored.on_time(PHASE)))
@@ -295,7 +295,7 @@ def test_what_is_not_seen_any_more_stops_the_arm(monitored, setting, why, arm):
 
 @pytest.mark.parametrize('late', [0.0, 0.004, 0.03, 0.09])
 @pytest.mark.parametrize('beside', [0.0, 0.005])
-def test_an_arm_that_obeys_is_told_once(monitored, late, beside):
+def test_a_stop_that_is_executed_is_published_once(monitored, late, beside):
     monitored.see(monitored.hand(0.6, 0.0))
     ((stop, _),) = monitored.published
 
@@ -311,7 +311,7 @@ def test_an_arm_that_obeys_is_told_once(monitored, late, beside):
     assert monitored.monitor._state is MonitorState.HOLDING
 
 
-def test_an_arm_that_goes_on_is_told_again(monitored):
+def test_a_missed_stop_is_published_again(monitored):
     monitored.see(monitored.hand(0.8, 0.0))
     monitored.run(0.6, lambda after: monitored.on_time(PHASE + after))
     assert 2 <= len(monitored.published) <= 4
@@ -320,7 +320,7 @@ def test_an_arm_that_goes_on_is_told_again(monitored):
         assert np.allclose(stop.positions[0], monitored.on_time(begin - 100.0)[0], atol=1e-4)
 
 
-def test_an_arm_that_is_elsewhere_is_said_aloud(monitored):
+def test_an_arm_off_its_trajectory_is_reported(monitored):
     monitored.run(0.8, lambda after: (monitored.motion.positions[0] + 0.5, np.full(4, 0.2)))
     assert monitored.published == []
     assert 'monitoring suspended' in monitored.reporter.monitor_state[1]
@@ -337,7 +337,7 @@ def test_it_plans_again_for_the_same_goal_only_where_it_may(monitored, replan):
     assert monitored.monitor.take_stops() == []
 
 
-def test_what_became_of_an_older_motion_does_not_unguard_a_newer_one(monitored, capfd):
+def test_the_outcome_of_an_older_motion_does_not_end_monitoring_of_a_newer_one(monitored, capfd):
     monitored.monitor.hold('no way to the goal before')
     assert monitored.monitor._state is MonitorState.MONITORING
     monitored.see(monitored.hand(0.6, 0.0))

@@ -59,7 +59,7 @@ NAN = float('nan')
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 VOLATILE = QoSProfile(depth=10)
 BEST_EFFORT = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
-# With these the search for a way out of the fence goes on and on.
+# With these the search for a path out of the fence does not end.
 ENDLESS = {'time_limit': 600.0, 'max_samples': 10**7}
 TOPICS = {
     'body_boxes': (MarkerArray, wearer),
@@ -235,7 +235,7 @@ def test_without_an_input_the_answer_names_its_topic(start, missing):
         ),
         ({'joint_states': joints([0.0, 1.0, 0.0, 0.0])}, 'START_STATE_INVALID (-26): joint_2'),
         ({'target': target(0.0, 0.0, 0.0)}, 'GOAL_IN_COLLISION (-12): the target'),
-        # Nearer to the axis of the upper arm, in all its postures, than the ray runs beside it.
+        # Nearer to the axis of the upper arm, in all configurations, than the ray runs beside it.
         ({'target': target(-0.24, -0.1, 0.5)}, 'NO_IK_SOLUTION (-31): no configuration'),
         (
             {'target': target(frame='camera')},
@@ -276,7 +276,7 @@ def leaned(deeper=0.0):
     return body
 
 
-def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(start):
+def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(start):
     planner, stranger = start(seed=3)
     say_all(planner, stranger, body_boxes=leaned())
     response = stranger.answer()
@@ -286,7 +286,7 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_the_answer_says_so(sta
         in response.message
     )
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
-    # The present body, said again, does not stop it.
+    # The present body, published again, does not stop it.
     stranger.publishers['body_boxes'].publish(leaned())
     stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
     (msg,) = stranger.received['joint_trajectory']
@@ -309,7 +309,7 @@ def test_deeper_than_escape_depth_is_rejected(start):
     assert stranger.answer().success
 
 
-def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wait_until):
+def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
     inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
@@ -330,7 +330,7 @@ def test_a_way_out_is_judged_again_when_the_wearer_moved(start, monkeypatch, wai
 
 
 @pytest.mark.parametrize(('depth', 'answer'), [(0.05, 'SUCCESS'), (0.028, 'MOTION_PLAN_INVAL')])
-def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
+def test_no_escape_is_published_once_the_arm_is_too_deep(
     start, monkeypatch, wait_until, depth, answer
 ):
     # It is 0.0275 m deep at first.
@@ -348,7 +348,7 @@ def test_a_way_out_is_not_told_once_the_arm_is_too_deep(
     assert stranger.answer().message.startswith(answer)
 
 
-def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
+def test_both_checkers_check_an_escape_when_the_wearer_moved(
     start, monkeypatch, wait_until, tmp_path
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
@@ -415,7 +415,7 @@ def test_a_plan_is_cancelled_with_those_that_wait(start, wait_until):
     assert stranger.answer().success
 
 
-def test_messages_are_heard_and_callers_wait_while_it_plans(start, wait_until):
+def test_messages_are_received_and_callers_wait_while_it_plans(start, wait_until):
     planner, stranger = start(**ENDLESS)
     say_all(planner, stranger, body_boxes=fenced())
     first = stranger.ask('plan')
@@ -483,7 +483,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
     assert not stranger.received['joint_trajectory']
 
 
-def test_an_arm_that_moves_is_taken_over_from_its_present_velocity(start):
+def test_a_handover_begins_at_the_present_velocity(start):
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.3, 0.0, 0.0, -0.2]))
     assert stranger.answer().success
@@ -491,7 +491,7 @@ def test_an_arm_that_moves_is_taken_over_from_its_present_velocity(start):
     msg = stranger.received['joint_trajectory'][-1]
     assert list(msg.points[0].velocities) == [0.3, 0.0, 0.0, -0.2]
     assert not any(msg.points[-1].velocities)
-    # It begins at a time that it names, so that what is late on its way does not jump.
+    # It begins at a time that it names, so that a late message causes no jump.
     assert msg.header.stamp.sec > 0
 
 
@@ -507,7 +507,7 @@ def test_velocities_that_are_no_numbers_are_rejected(start):
     assert stranger.answer().success
 
 
-def test_an_arm_that_moves_faster_than_it_may_is_not_taken_over(start):
+def test_there_is_no_handover_of_an_arm_above_its_limits(start):
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 1.7, 0.0, 0.0]))
     assert stranger.answer().message.startswith(
@@ -610,7 +610,7 @@ def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
     assert bool(stranger.received['joint_trajectory']) == (not is_in_the_way)
 
 
-def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
+def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, publishers = inputs_of(planner), planner._queue._publishers
@@ -626,11 +626,11 @@ def test_nothing_is_taken_while_a_motion_is_told(start, monkeypatch):
     monkeypatch.setattr(publishers, 'publish', publish_slowly)
     assert stranger.answer().success
     assert known[0]
-    # Then it is, and the guard stops the arm.
+    # Then it is, and the monitor stops the arm.
     stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
 
 
-def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
+def test_a_busy_node_publishes_no_motion(start, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 0.2)
     planner, stranger = start()
     say_all(planner, stranger)
@@ -652,7 +652,7 @@ def test_a_motion_is_not_told_by_a_node_that_does_not_read(start, monkeypatch):
 
 
 def stop_for(planner):
-    """Have a stop of the arm, which was on its way to the target, followed up; it is over."""
+    """Have a stop of the arm, which was moving to the target, replanned; it is over."""
     goal, parameters = inputs_of(planner).target.value, planner._reporter.parameters
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
@@ -713,7 +713,7 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
     monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 300.0)
     planner, stranger = start()
     say_all(planner, stranger)
-    # No joint position comes that would say that it rests.
+    # No joint state comes that would show it at rest.
     stop_for(planner)
     assert stranger.answer().success
     # It is reported once it has been answered, by another thread.
@@ -739,7 +739,7 @@ def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(star
     stranger.wait_until(lambda: not queue._open)
 
 
-def test_where_it_cannot_go_on_after_a_stop_it_holds_and_says_why(start):
+def test_where_it_cannot_replan_after_a_stop_it_holds_and_reports_why(start):
     planner, stranger = start(max_samples=100)
     say_all(planner, stranger, body_boxes=fenced())
     stop_for(planner)
@@ -768,7 +768,7 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
     assert stranger.answer().success
 
 
-def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
+def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
     inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
@@ -793,7 +793,7 @@ def test_both_judges_are_asked_when_the_wearer_moved(start, monkeypatch, wait_un
     assert not stranger.received['joint_trajectory']
     (file,) = tmp_path.iterdir()
     incident = read_incident(file)
-    # Planned for two boxes, judged for three.
+    # Planned for two boxes, checked for three.
     assert len(incident.question.scene.boxes) == 2
     assert [box.name for box in incident.present.boxes][-1] == 'far/0'
     assert stranger.answer().success
@@ -873,7 +873,7 @@ def test_a_request_is_answered_before_its_motion_is_shown(start, monkeypatch):
     stranger.wait_until(lambda: stranger.received['rrth_planner/markers'])
 
 
-def test_what_fails_to_be_shown_does_not_unsay_the_motion(start, monkeypatch):
+def test_an_error_in_showing_a_motion_does_not_revoke_it(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
 
@@ -976,7 +976,7 @@ def test_the_same_seed_gives_the_same_trajectory(start):
 
 
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE, BEST_EFFORT])
-def test_publishers_of_every_quality_are_heard_once(start, profile):
+def test_publishers_of_every_quality_are_received_once(start, profile):
     planner, stranger = start()
     for name, (_, make) in TOPICS.items():
         stranger.say(name, make(), profile)
@@ -993,7 +993,7 @@ def test_publishers_of_every_quality_are_heard_once(start, profile):
         stranger.wait_until(lambda: all(profile.durability in h._reliable for h in hearers))
 
 
-def test_what_was_latched_before_the_start_is_heard(start, spinning, wait_until):
+def test_what_was_latched_before_the_start_is_received(start, spinning, wait_until):
     early = Node('early', namespace='/latched')
     publishers = [
         (early.create_publisher(kind, name, LATCHED), make)
@@ -1131,7 +1131,7 @@ def test_a_signal_ends_the_process_even_while_it_plans(process, spinning, wait_u
             )
         )
         asked = stranger.ask('plan')
-        # The request is on its way before this answer, and requests are taken in turn.
+        # The request was sent before this answer, and requests are handled in turn.
         stranger.answer('get_plan', GetPlan.Request(start=_framed()))
         assert not asked.done()
         running.send_signal(number)

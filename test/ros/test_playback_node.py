@@ -43,7 +43,7 @@ MODULE = [sys.executable, '-m', 'rrth_planner.ros.playback_node']
 
 
 class Observer(Node):
-    """Sends trajectories as a planner does, and remembers what the playback says."""
+    """Sends trajectories as a planner does, and records what the playback publishes."""
 
     def __init__(self):
         super().__init__('observer')
@@ -218,7 +218,7 @@ BAD = {
 }
 
 
-def test_a_resting_arm_says_where_it_is(playback, observer):
+def test_an_arm_at_rest_publishes_its_state(playback, observer):
     playback(initial_positions=[0.1, -0.2, 0.3, 0.4], base_frame='chest')
     observer.wait_for_states(20)
     wait_until(lambda: observer.poses)
@@ -287,7 +287,7 @@ def test_a_motion_from_the_present_state_replaces_the_running_one(playback, obse
 
 
 @pytest.mark.parametrize('scale', [1.0, 0.5])
-def test_stop_brakes_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
+def test_a_stop_is_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
     playback(time_scale=scale)
     way = np.array([-1.0, -1.0, 0.5, 0.5])
     observer.motions.publish(motion(FOLDED, FOLDED + way, 3.0))

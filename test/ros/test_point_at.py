@@ -57,7 +57,7 @@ def run(*arguments):
 
 
 def report_of(*arguments):
-    """Return what the command says with --json; its exit code is in it."""
+    """Return the output of the command with --json, its exit code included."""
     ended = run(*arguments, '--json')
     (line,) = ended.stdout.splitlines()
     report = json.loads(line)
@@ -66,10 +66,10 @@ def report_of(*arguments):
 
 
 class Bystander(Node):
-    """Hears what the planner publishes and is told, and stands in for an arm."""
+    """Receives inputs and outputs of the planner, and stands in for an arm."""
 
     def __init__(self):
-        """Listen."""
+        """Subscribe."""
         super().__init__('bystander')
         self.motions, self.bodies = [], []
         # Not latched: what an earlier test has the planner publish is none of this one's.
@@ -93,7 +93,7 @@ def planner(ros_context):
 
 @pytest.fixture
 def bystander(ros_context, spinning):
-    """Give a node that listens."""
+    """Give a node that subscribes."""
     node = Bystander()
     with spinning(node):
         yield node
@@ -108,8 +108,8 @@ def arm(planner):
 
 
 @pytest.mark.slow
-def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
-    # Who listens live must be known to the planner before it publishes.
+def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
+    # Volatile subscribers must be known to the planner before it publishes.
     wait_until(lambda: bystander.count_publishers('joint_trajectory'), START)
     wait_until(lambda: bystander.count_subscribers('joint_trajectory') > 1, START)
     time.sleep(1.0)
@@ -127,7 +127,7 @@ def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
         pointing_error(load_arm(), np.array(motion.points[-1].positions), [1.5, 0.1, 0.3]) < 1e-6
     )
 
-    # The body stays; without --json the figures come as the planner says them.
+    # The body stays; without --json the figures are those of the answer.
     ended = run(0.3, 1.3, 0.2)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('SUCCESS (1): ')
@@ -162,7 +162,7 @@ def test_planning_without_moving_publishes_nothing(planner, bystander, body):
 
 
 @pytest.mark.slow
-def test_planning_without_moving_goes_round_the_body_that_is_heard(planner, bystander):
+def test_a_dry_run_plans_round_the_received_body(planner, bystander):
     bystander.stand()
     silent = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', '5')
     assert silent['exit_code'] == 3
@@ -268,7 +268,7 @@ def test_the_help_names_every_exit_code(monkeypatch, capsys):
 
 @pytest.fixture
 def client(ros_context):
-    """Give a client that nobody answers."""
+    """Give a client without a planner."""
     client = PlannerClient('point_at', 0.5)
     yield client
     client.destroy_node()
@@ -296,7 +296,7 @@ def turn(to, duration):
     return motion, joint_trajectory_to_msg(motion, load_arm().joint_names, '', 0.0)
 
 
-def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
+def test_a_motion_of_another_machine_is_ignored(client):
     arm = load_arm()
     first, message = turn(np.array(FOLDED) + 0.1, 0.1)
     second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
@@ -306,7 +306,7 @@ def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
         announced_motion(client, arm, 0.1)
     client.commanded = [other, message, other]
     assert announced_motion(client, arm, 0.1).positions.tolist() == first.positions.tolist()
-    # Afterwards the planner sends the arm elsewhere, and the other machine is told something.
+    # Afterwards the planner sends the arm elsewhere, and the other machine gets a motion.
     came = iter([[], [other], [newer, other]])
 
     def take_messages(_):

@@ -50,18 +50,18 @@ def _full_markers(draw):
 ARRAYS = st.builds(MarkerArray, markers=st.lists(_full_markers(), max_size=3))
 
 
-def told(value, like):
-    """Return what a message says in all fields of a message of ROS, in numbers and texts."""
+def values_of(value, like):
+    """Return the values of a message in all fields of a message of ROS, in numbers and texts."""
     if hasattr(like, 'get_fields_and_field_types'):
         names = like.get_fields_and_field_types()
-        return {name: told(getattr(value, name), getattr(like, name)) for name in names}
+        return {name: values_of(getattr(value, name), getattr(like, name)) for name in names}
     if isinstance(like, list):
         assert len(value) == len(like)
-        return [told(*pair) for pair in zip(value, like, strict=True)]
+        return [values_of(*pair) for pair in zip(value, like, strict=True)]
     if isinstance(like, str | bool):
         assert type(value) is type(like)
         return value
-    # Numbers, and arrays of them; NaN is told as well.
+    # Numbers, and arrays of them; NaN included.
     return repr([int(v) for v in value]) if hasattr(like, '__len__') else repr(value)
 
 
@@ -72,7 +72,7 @@ def test_every_field_comes_through(msg):
     expected = deserialize_message(data, MarkerArray)
     found = DECODE(data)
     assert not isinstance(found, MarkerArray)
-    assert told(found, expected) == told(expected, expected)
+    assert values_of(found, expected) == values_of(expected, expected)
 
 
 @worlds.examples(200)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is recorded of a run is what was said, read back by a library that shares nothing."""
+"""A recording holds the published messages, as an independent library reads them."""
 
 from contextlib import contextmanager
 from itertools import pairwise
@@ -70,7 +70,7 @@ def recording(*arguments):
 
 
 def hears(node, *topics):
-    """Return whether the recorder listens to some topics, besides its best-effort reader."""
+    """Return whether the recorder subscribes to some topics, besides its best-effort reader."""
     return all(
         'rrth_recorder' in {info.node_name for info in node.get_subscriptions_info_by_topic(topic)}
         for topic in topics
@@ -94,7 +94,7 @@ def nanoseconds(stamp):
 
 @pytest.fixture(scope='module', name='run')
 def _run(ros_context, tmp_path_factory):
-    """Record one motion of planner and playback; return the file and what a node heard."""
+    """Record one motion of planner and playback; return the file and what a node received."""
     path = tmp_path_factory.mktemp('run') / 'run.mcap'
     node, lines, motion, states = Node('test_client'), [], [], []
     node.create_subscription(JointTrajectory, 'joint_trajectory', motion.append, LATCHED)
@@ -111,7 +111,7 @@ def _run(ros_context, tmp_path_factory):
             assert time.monotonic() < end, 'the condition did not come true in time'
             executor.spin_once(timeout_sec=0.05)
 
-    # Before anybody listens.
+    # Before any subscription.
     bodies.publish(wearer())
     with (
         ChildProcess(
@@ -140,7 +140,7 @@ def _run(ros_context, tmp_path_factory):
                     wait_until(lambda: motion)
             q_end = np.array(motion[0].points[-1].positions)
             wait_until(lambda: np.abs(np.array(states[-1].position) - q_end).max() < 1e-6)
-            # The file has seen the arm at rest, and the planner's second of diagnostics.
+            # The file has the arm at rest, and a second of the planner's diagnostics.
             time.sleep(1.5)
         words = process.communicate()
     node.destroy_node()
@@ -164,7 +164,7 @@ def test_all_topics_of_a_run_are_there_with_their_types(run):
     assert types == {topic.lstrip('/'): type_name(kind) for topic, kind in expected}
 
 
-def test_the_recorded_trajectory_is_the_one_that_was_heard(run):
+def test_the_recorded_trajectory_is_the_received_one(run):
     ((_, found),) = messages_of(run[0])['/joint_trajectory']
     heard = run[1]
     assert list(found.joint_names) == list(heard.joint_names)
@@ -226,7 +226,7 @@ def test_a_recording_reads_back_as_a_run(run):
             getattr(motion.trajectory, name), getattr(expected, name), name
         )
     np.testing.assert_allclose(found.positions[-1], expected.positions[-1], atol=1e-6)
-    # The playback follows to the bit, from when it heard of the motion, which is a little later.
+    # The playback executes it to the bit, from its reception on, which is a little later.
     late = found.times[np.flatnonzero(found.velocities.any(axis=1))[0]] - motion.begin
     assert late > 0.0
     (since, scene), (_, aim) = found.bodies[-1], found.targets[-1]
@@ -290,7 +290,7 @@ def rejection(*arguments, **options):
     return ended.stderr
 
 
-def test_a_recorder_that_hears_nothing_says_so_and_leaves_no_file(tmp_path):
+def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path):
     path = tmp_path / 'run.mcap'
     said = rejection('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
     assert 'nothing was heard' in said

@@ -409,7 +409,7 @@ def test_moments_of_several_processors_are_united():
     assert '0 times' in nothing.sentence()
 
 
-def test_a_brake_is_read_from_the_log():
+def test_a_stop_is_read_from_the_log():
     line = 'WARN: the remaining motion is not proven free of the wearer: '
     told = 'fail-safe stop, at rest in 0.12 s; published after 20.50 ms'
     before = time.time_ns()

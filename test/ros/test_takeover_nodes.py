@@ -24,18 +24,18 @@ pytestmark = pytest.mark.usefixtures('ros_context')
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 TARGETS = ((2.0, 0.3, 0.4), (1.0, 1.5, 0.8), (1.5, -0.8, 1.2), (2.5, 0.8, 0.2), (0.8, 0.4, 2.0))
 ROUNDS = 2
-# At 500 Hz and half the pace a busy machine holds up the arm's own process: the planner sees that,
-# or the arm rejects what comes too late. Never is a motion from rest told to an arm that moves.
+# At 500 Hz and half the rate a busy machine delays the arm's process: the planner finds that, or
+# the arm rejects a late motion. A motion from rest is never published for a moving arm.
 MOST_HELD_UP, OFF_COURSE = 3, ('the arm deviates from its trajectory by', 'the motion begins at ')
 FROM_REST = 'begins at velocity 0,'
 
 
 class Client(Node):
-    """Tells the planner where to point, and writes down how the arm moves."""
+    """Publishes inputs of the planner, and records the joint states."""
 
     def __init__(self):
         """Connect to both nodes."""
-        super().__init__('takeover')
+        super().__init__('handover')
         self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self.target = self.create_publisher(PointStamped, 'target', LATCHED)
         self.states = []
@@ -58,9 +58,7 @@ def _body():
 
 
 @pytest.mark.parametrize('settings', [{}, {'rate': 500.0, 'time_scale': 0.5}], ids=str)
-def test_new_targets_in_mid_motion_are_taken_over_without_a_jump(
-    wait_until, tell, ask, spinning, settings
-):
+def test_handovers_to_new_targets_are_without_a_jump(wait_until, tell, ask, spinning, settings):
     client, said, answers = Client(), [], []
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', 'seed:=7']

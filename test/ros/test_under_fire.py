@@ -183,7 +183,7 @@ class Wire:
         return True
 
     def plan(self):
-        """Return the answer to a request, after looking at what was published."""
+        """Return the answer to a request, after checking what was published."""
         before = len(self.published)
         answer = finish(
             self.planner._on_plan(Trigger.Request(), Trigger.Response()), self.planner._queue
@@ -278,7 +278,7 @@ def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, ai
     q=st.lists(st.one_of(st.floats(-0.3, 0.3), NUMBERS), min_size=4, max_size=4),
     v=st.lists(st.one_of(st.floats(-1.6, 1.6), NUMBERS), min_size=4, max_size=4),
 )
-def test_any_moving_arm_is_taken_over_or_rejected(wire, q, v):
+def test_any_moving_arm_gets_a_handover_or_a_rejection(wire, q, v):
     assert wire.is_well()
     wire.say('joints', joints(np.add(FOLDED, q).tolist(), velocity=v))
     wire.say('body', wearer())
@@ -361,7 +361,7 @@ def spoiled(spoils):
 
 @MANY
 @given(spoils=SPOILS, should_stop=st.booleans())
-def test_any_trajectory_is_followed_or_rejected(playback, spoils, should_stop):
+def test_any_trajectory_is_executed_or_rejected(playback, spoils, should_stop):
     before = playback._playback
     playback._on_raw_trajectory(serialize_message(spoiled(spoils)))
     if should_stop:

@@ -25,7 +25,7 @@ def plan_without_moving(
     body: MarkerArray | None,
 ) -> tuple[Answer, float | None]:
     """
-    Return what the planner would answer, and by how much the motion would aim past the target [m].
+    Return what the planner would answer, and by how much the motion would miss the target [m].
 
     Parameters
     ----------

@@ -151,9 +151,9 @@ def _why(
         )
     gaps = np.abs(client.positions(arm.joint_names) - motion.positions[-1])
     k = int(np.argmax(gaps))
-    listener = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
+    hint = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
     return (
         f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
         f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
-        f'{client.timeout:g} s more{listener}'
+        f'{client.timeout:g} s more{hint}'
     )

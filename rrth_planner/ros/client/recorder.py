@@ -18,7 +18,7 @@ from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscript
 
 # Size of the chunks written; a recorder that is killed loses no more [bytes].
 CHUNK = 128 * 1024
-# How often topics of unknown type are looked for [s].
+# How often topics of unknown type are searched for [s].
 PERIOD = 0.2
 
 
@@ -144,7 +144,7 @@ class Recorder(Node):
         """Subscribe."""
         super().__init__('rrth_recorder')
         self._file = file
-        # Why the recording cannot go on; raised by `check`, outside of callbacks.
+        # Why the recording must end; raised by `check`, outside of callbacks.
         self._problem: RrthError | None = None
         self._topics: list[OpenSubscription] = []
         self._missing: list[str] = []

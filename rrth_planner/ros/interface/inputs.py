@@ -163,7 +163,7 @@ class InputSnapshot:
         if not np.isfinite(found.state.positions).all():
             raise RequestError(
                 ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a speed at which it is somewhere '
+                f'{self._fastest(arm)}, expected a finite position '
                 f'{time - joints.taken:.3f} s later',
             )
         return found

@@ -46,7 +46,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
             0.0,
             1.0,
             'm',
-            'an arm at rest, less deep in boxes grown by the margin, escapes; 0: never',
+            'greatest penetration depth, margin included, to escape from; 0: none',
         ),
         Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
         Setting(
@@ -60,7 +60,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
             None,
             None,
             'path',
-            'of incident files, to be replayed; empty: rrth_planner/ of the ROS logs',
+            'folder of incident files; empty: rrth_planner/ of the ROS logs',
         ),
         Setting('replan', True, None, None, '-', 'plan again after a fail-safe stop'),
         Setting('joint_timeout', 0.0, *timeout, 'older joint positions are rejected; 0: never'),

@@ -53,7 +53,7 @@ class Frames:
     """The frames of TF, relative to the base frame."""
 
     def __init__(self, node: Node, base_frame: str) -> None:
-        """Listen to TF where tf2_ros is installed."""
+        """Subscribe to TF where tf2_ros is installed."""
         self._base_frame = base_frame
         self._buffer = None
         if tf2_ros is not None:

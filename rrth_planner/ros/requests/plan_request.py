@@ -98,7 +98,7 @@ def plan_request(
     try:
         for lead in LEADS:
             question = plan = None
-            require_wanted(should_stop, 'the request was cancelled before its turn')
+            require_not_cancelled(should_stop, 'the request was cancelled before its turn')
             now = clock()
             snapshot = inputs.at(now, parameters, goal)
             handover = None
@@ -122,7 +122,7 @@ def plan_request(
                 inputs, clock, parameters, snapshot, plan, handover, running
             )
             try:
-                require_wanted(should_stop)
+                require_not_cancelled(should_stop)
                 found = revalidation.disagreement(planner)
                 if found is not None:
                     incident = disagreement_incident(question, *found)
@@ -147,7 +147,7 @@ def plan_request(
         raise PlanError(question, None if plan is None else plan.trajectory) from problem
 
 
-def require_wanted(
+def require_not_cancelled(
     should_stop: Callable[[], bool], sentence: str = 'the request was cancelled'
 ) -> None:
     """Raise RequestError where a request was cancelled."""

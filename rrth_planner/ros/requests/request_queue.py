@@ -25,7 +25,7 @@ from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
 from rrth_planner.ros.requests.incidents import incident_of, keep, sentence_of
-from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_wanted
+from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
 from rrth_planner.ros.requests.stop_validation import incident_of_stop
 from rrth_planner.ros.requests.wait_for_rest import Rest
@@ -189,7 +189,7 @@ class PlanQueue:
                     lambda: self._publish(ticket, outcome, revalidation, n_stops, msg)
                 )
             except NodeIsBusyError:
-                require_wanted(lambda: ticket.is_cancelled)
+                require_not_cancelled(lambda: ticket.is_cancelled)
                 raise RequestError(
                     ErrorCode.SENSOR_INFO_STALE,
                     'the node is busy: bodies received while the motion was planned are not '
@@ -257,7 +257,7 @@ class PlanQueue:
         Return False where it is too late; raise RequestError where it is no longer valid.
         """
         monitor, parameters = self._monitor, revalidation.parameters
-        require_wanted(lambda: ticket.is_cancelled)
+        require_not_cancelled(lambda: ticket.is_cancelled)
         if n_stops != monitor.n_stops:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
