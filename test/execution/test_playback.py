@@ -338,9 +338,9 @@ def test_a_stop_is_taken_at_the_pace_of_the_motion_whatever_the_time_scale_is_by
     move = motion(FOLDED, FOLDED - 0.8, duration=2.0)
     running = taken(standing(FOLDED), move, time_scale=before)
     phase = 0.9
-    braking = fast_stop(move, phase, LIMITS)
+    stopping = fast_stop(move, phase, LIMITS)
     now = phase / before
-    stopped = taken(running, braking, now, time_scale=after)
+    stopped = taken(running, stopping, now, time_scale=after)
     assert stopped.time_scale == before
     for one, other in zip(stopped.state_at(now), running.state_at(now), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)

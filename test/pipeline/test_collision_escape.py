@@ -66,7 +66,7 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
     )
 
 
-def is_touched(arm, box, q, growth):
+def collides(arm, box, q, growth):
     """Return at which of the instants q, (n, dof), the oracle finds the arm in a grown box."""
     ends = oracle_bars(arm, q, RAY)
     radii = [arm.radii[row] for row, _ in bar_ends(arm)]
@@ -80,11 +80,11 @@ def is_touched(arm, box, q, growth):
 def oracle_depth(arm, box, q):
     """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
     low, high = -0.5 * box.size.min(), FREE
-    if not is_touched(arm, box, q[None], high)[0]:
+    if not collides(arm, box, q[None], high)[0]:
         return MARGIN - FREE
     for _ in range(48):
         middle = 0.5 * (low + high)
-        if is_touched(arm, box, q[None], middle)[0]:
+        if collides(arm, box, q[None], middle)[0]:
             high = middle
         else:
             low = middle
@@ -101,7 +101,7 @@ def leaned(arm, scene, q, rng, depth):
 
     def is_deeper(share):
         pushed = replace(box, center=box.center + share * towards)
-        return is_touched(arm, pushed, q[None], MARGIN - depth)[0]
+        return collides(arm, pushed, q[None], MARGIN - depth)[0]
 
     if is_deeper(low) or not is_deeper(high):
         return None
@@ -191,17 +191,17 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     assert (np.abs(v) <= limits().velocity * 1.001).all()
     looks = np.linspace(0.0, out, 9)
     for box, is_entered in zip(scene.boxes, is_in, strict=True):
-        touched = is_touched(arm, box, q, MARGIN)
-        assert not touched[times >= out].any()
+        is_hit = collides(arm, box, q, MARGIN)
+        assert not is_hit[times >= out].any()
         if not is_entered:
-            assert not touched.any()
+            assert not is_hit.any()
             continue
         # In, then out for good; and from each sample on no deeper than there.
-        assert not (np.diff(touched.astype(int)) > 0).any()
+        assert not (np.diff(is_hit.astype(int)) > 0).any()
         for time in looks:
             depth = max(0.0, oracle_depth(arm, box, positions_at(trajectory, [time])[0]))
             later = q[times >= time]
-            assert not is_touched(arm, box, later, MARGIN - depth - 2e-6).any()
+            assert not collides(arm, box, later, MARGIN - depth - 2e-6).any()
 
 
 n_solved: list[int] = []
@@ -373,19 +373,19 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     world = arm_world(arm, scene, MARGIN, RAY)
     plan = ask(arm, scene, FOLDED)
     way = plan.path.waypoints[1] - FOLDED
-    judged = {}
+    verdicts = {}
     for share in (1.0, -0.2, 0.5):
         q = FOLDED + share * way
         trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
         end = trajectory.duration
         touch = second_opinion(arm, scene, world, trajectory)
-        judged[share] = leads_out(trajectory, world, end), touch
-    assert judged[1.0] == (True, None)
-    is_out, touch = judged[-0.2]
+        verdicts[share] = leads_out(trajectory, world, end), touch
+    assert verdicts[1.0] == (True, None)
+    is_out, touch = verdicts[-0.2]
     assert not is_out
     assert (touch.bar, touch.box) == ('pointing ray', 'hand')
     # Half way it is no deeper but not out.
-    assert judged[0.5] == (False, None)
+    assert verdicts[0.5] == (False, None)
     # A plate in the way, which the arm does not reach yet.
     middle = oracle_bars(arm, (FOLDED + 0.8 * way)[None], RAY)[0, -1]
     plate = Box('plate', middle[0] + 0.9 * (middle[1] - middle[0]), [1e-3] * 3, np.eye(3))

@@ -25,12 +25,12 @@ def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -
         time.sleep(0.005)
 
 
-def tell(node, publisher, message) -> None:
+def send(node, publisher, message) -> None:
     """Publish a message, by a latched publisher; return once all have it who are reliable."""
     from rclpy.duration import Duration
-    from rrth_planner.ros.client.planner_client import is_heard
+    from rrth_planner.ros.client.planner_client import is_matched
 
-    wait_until(lambda: is_heard(node, publisher))
+    wait_until(lambda: is_matched(node, publisher))
     publisher.publish(message)
     assert publisher.wait_for_all_acked(Duration(seconds=LONGEST_WAIT))
 
@@ -108,10 +108,10 @@ def _wait_until() -> Callable[..., None]:
     return wait_until
 
 
-@pytest.fixture(name='tell')
+@pytest.fixture(name='send')
 def _tell() -> Callable[..., None]:
-    """Give `tell` to tests."""
-    return tell
+    """Give `send` to tests."""
+    return send
 
 
 @pytest.fixture(name='ask')

@@ -103,7 +103,7 @@ class Monitored:
             if k % 2 == 0:
                 self.monitor._on_timer()
 
-    def obeys(self):
+    def executes(self):
         """Return where an arm is, and how fast, that follows the last stop that was published."""
         stop, begin = self.published[-1]
         return tuple(row[0] for row in sample(stop, [self.now - begin])[:2])

@@ -55,7 +55,7 @@ def _body(scene):
     return samples.array(*boxes)
 
 
-def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
+def test_both_nodes_work_with_another_arm(wait_until, send, ask, spinning):
     file = resource_path(ARM)
     arm, scene = load_arm(file), load_body(resource_path(BODY))
     client, said = Client(), []
@@ -69,9 +69,9 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
         wait_until(client.plan.service_is_ready, 240.0)
         wait_until(lambda: client.states)
         assert client.states[0].name == list(arm.joint_names)
-        tell(client, client.body, _body(scene))
+        send(client, client.body, _body(scene))
         for target in TARGETS:
-            tell(client, client.target, samples.target(*target))
+            send(client, client.target, samples.target(*target))
             n_states, n_motions = len(client.states), len(client.motions)
             answer = ask(client.plan)
             assert answer.success, (target, answer.message)

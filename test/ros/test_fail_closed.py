@@ -108,12 +108,12 @@ def follow(arm):
         if not arm.published and waits > LEASE:
             # The playback, or the controller of a real arm, stops it.
             return 'its planner is lost'
-        arm.read(*(arm.obeys() if arm.published else arm.on_time(arm.now - 100.0)))
+        arm.read(*(arm.executes() if arm.published else arm.on_time(arm.now - 100.0)))
         supervised(arm, lambda: arm.see(*arm.boxes))
         # A body that came while the one before was still checked has waited since then.
         arm.late = 0.0
         supervised(arm, arm.monitor._on_timer)
-    return 'stopped' if arm.published and not arm.obeys()[1].any() else 'continues'
+    return 'stopped' if arm.published and not arm.executes()[1].any() else 'continues'
 
 
 def check(arm, which, kind, at):

@@ -239,7 +239,7 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
 
 def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkeypatch, tmp_path):
     planner, stranger = start(seed=3, incident_folder=str(tmp_path))
-    stranger.hear('/rosout', Log, 100)
+    stranger.subscribe('/rosout', Log, 100)
     name = planner.get_logger().name
     say_all(planner, stranger)
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
@@ -288,25 +288,25 @@ def test_diagnostics_say_everything(start):
 
 def test_the_summary_of_diagnostics_is_what_is_worst(start):
     planner, _ = start(body_timeout=1.0)
-    heard = Inputs('body', 'target', 'joints')
+    inputs = Inputs('body', 'target', 'joints')
 
     def summary(now=10.0, code=None, sentence=''):
         report = PlanReport(code=code, sentence=sentence)
         parameters = planner._reporter.parameters
-        (status,) = diagnostics_msg('', Time(), now, heard, parameters, report).status
+        (status,) = diagnostics_msg('', Time(), now, inputs, parameters, report).status
         return status.level, status.message
 
     def reject():
         raise MessageError('no point')
 
     assert summary() == (DiagnosticStatus.WARN, 'waiting for body, target, joints')
-    for topic in heard.all.values():
+    for topic in inputs.all.values():
         topic.accept(lambda topic=topic: topic.value, 10.0)
     assert summary() == (DiagnosticStatus.OK, 'ready')
     assert summary(code=ErrorCode.SUCCESS, sentence='so') == (DiagnosticStatus.OK, 'so')
     late = {'code': ErrorCode.TIMED_OUT, 'sentence': 'no path'}
     assert summary(**late) == (DiagnosticStatus.WARN, 'TIMED_OUT (-6): no path')
-    heard.target.accept(reject, 10.0)
+    inputs.target.accept(reject, 10.0)
     assert summary(**late) == (DiagnosticStatus.WARN, 'target rejected: no point')
     assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
     broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
@@ -316,11 +316,11 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
 def test_only_so_many_expired_boxes_are_remembered_as_named(start, monkeypatch):
     monkeypatch.setattr(reporter, 'MOST_NAMED', 3)
     planner, _ = start()
-    heard = inputs_of(planner).body
+    source = inputs_of(planner).body
     for k in range(20):
         hat = samples.box('hat', k)
         hat.lifetime.nanosec = 1
-        heard.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
+        source.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
         planner._reporter._warn_of_expired(1.0)
         named = planner._reporter._named
         assert ('hat', k) in named

@@ -102,16 +102,16 @@ def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_
         strangers[0].say('/wearer', wearer())
         strangers[0].say('joint_states', joints())
         strangers[0].say('target', target(*points[0]))
-        heard = [inputs_of(p) for p in planners]
-        wait_until(lambda: heard[0].target.received is not None)
-        wait_until(lambda: heard[0].joints.received is not None)
-        wait_until(lambda: all(inputs.body.received is not None for inputs in heard))
+        all_inputs = [inputs_of(p) for p in planners]
+        wait_until(lambda: all_inputs[0].target.received is not None)
+        wait_until(lambda: all_inputs[0].joints.received is not None)
+        wait_until(lambda: all(inputs.body.received is not None for inputs in all_inputs))
         assert strangers[0].answer().success
         assert 'no target yet on /b/target' in strangers[1].answer().message
         strangers[1].say('joint_states', joints())
         strangers[1].say('target', target(*points[1]))
-        wait_until(lambda: heard[1].joints.received is not None)
-        wait_until(lambda: heard[1].target.received is not None)
+        wait_until(lambda: all_inputs[1].joints.received is not None)
+        wait_until(lambda: all_inputs[1].target.received is not None)
         assert strangers[1].answer().success
         wait_until(lambda: all(s.received['joint_trajectory'] for s in strangers))
     for stranger, point in zip(strangers, points, strict=True):
@@ -193,12 +193,12 @@ def _clock(spinning):
     node = Node('clock')
     publisher = node.create_publisher(Clock, '/clock', 10)
 
-    def tell(seconds):
+    def send(seconds):
         sec, nanosec = divmod(round(seconds * 10**9), 10**9)
         msg = Clock(clock=Time(sec=sec, nanosec=nanosec))
         publisher.publish(msg)
 
-    yield tell
+    yield send
     node.destroy_node()
 
 
@@ -245,7 +245,7 @@ def say_inputs(stranger, inputs, wait_until, now):
     """Publish all inputs again and wait until they are received at a time [s]."""
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: all(abs(heard.received - now) < 1e-6 for heard in inputs.all.values()))
+    wait_until(lambda: all(abs(source.received - now) < 1e-6 for source in inputs.all.values()))
 
 
 def test_a_handover_works_while_simulated_time_stands_still(start, clock, wait_until):
@@ -337,18 +337,18 @@ def test_bytes_and_huge_messages_from_the_wire_end_no_node(start, spinning, wait
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, topics = inputs_of(planner), ('body_boxes', 'target', 'joint_states')
-    for k, (topic, heard) in enumerate(zip(topics, inputs.all.values(), strict=True)):
-        before = heard.value
+    for k, (topic, source) in enumerate(zip(topics, inputs.all.values(), strict=True)):
+        before = source.value
         stranger.publishers[topic].publish(b'\0\1\0\0' + b'\xff' * 40)
-        wait_until(lambda h=heard: h.n_rejected == 1)
-        assert 'bytes that are no ' in str(heard.rejection)
-        assert heard.value is before, k
+        wait_until(lambda h=source: h.n_rejected == 1)
+        assert 'bytes that are no ' in str(source.rejection)
+        assert source.value is before, k
     stranger.publishers['body_boxes'].publish(array(*(box(index=k) for k in range(3000))))
     wait_until(lambda: inputs.body.n_rejected == 2)
     assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.rejection)
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: not any(heard.is_last_rejected for heard in inputs.all.values()))
+    wait_until(lambda: not any(source.is_last_rejected for source in inputs.all.values()))
     assert stranger.answer().success
 
 
@@ -366,7 +366,7 @@ class Watcher(Node):
         self.plan = self.create_client(Trigger, 'rrth_planner/plan')
         self.arm = self.create_publisher(JointTrajectory, 'joint_trajectory', 1)
 
-    def tell_slowly(self, positions):
+    def publish_slowly(self, positions):
         """Command a motion of 100 s."""
         msg = motion(positions, 100)
         msg.points[0].positions = list(self.states[-1].position)
@@ -413,7 +413,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
         assert np.abs(np.array(watcher.states[-1].position) - goal).max() > 0.1
         wait_until(lambda: any('planner liveliness lost' in line for line in said))
         # A publisher without supervised liveliness moves the arm on.
-        watcher.tell_slowly(goal)
+        watcher.publish_slowly(goal)
         wait_until(lambda: watcher.speed > 0.011)
         watcher.target.publish(target(1.2, 0.9, 0.6))
         with ChildProcess(module, ros, lines.append) as second:

@@ -238,14 +238,14 @@ def test_answers_are_one_line_whatever_they_quote():
 
 
 def test_an_age_is_unknown_once_the_clock_was_set_back():
-    heard = Input('target', None)
-    assert heard.age(5.0) == float('inf')
-    heard.accept(lambda: None, 100.0)
-    assert heard.age(100.5) == 0.5
-    assert heard.age(99.99) == 0.0
-    assert heard.age(50.0) == float('inf')
-    heard.accept(lambda: None, 50.0)
-    assert heard.age(50.25) == 0.25
+    source = Input('target', None)
+    assert source.age(5.0) == float('inf')
+    source.accept(lambda: None, 100.0)
+    assert source.age(100.5) == 0.5
+    assert source.age(99.99) == 0.0
+    assert source.age(50.0) == float('inf')
+    source.accept(lambda: None, 50.0)
+    assert source.age(50.25) == 0.25
 
 
 def test_a_clock_that_was_set_back_makes_no_speed():

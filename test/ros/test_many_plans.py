@@ -104,7 +104,7 @@ def _is_blocked_by_oracle(rng, arm, scene, target):
     return bool(is_touching.all())
 
 
-def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, tell, spinning):
+def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, send, spinning):
     rng = np.random.default_rng(2024)
     arm, limits = worlds.table_1_arm(), worlds.limits()
     client = Client()
@@ -118,15 +118,15 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, tel
             q = _free_start(rng, arm, scene)
             # The last motion is found not to be executed: another body does not stop it.
             time.sleep(0.4)
-            tell(client, client.joints, samples.joints(q.tolist()))
+            send(client, client.joints, samples.joints(q.tolist()))
             time.sleep(0.05)
-            tell(client, client.body, _body_message(scene))
+            send(client, client.body, _body_message(scene))
             for k in range(N_TARGETS + N_NEAR):
                 direction = rng.standard_normal(3)
                 length = rng.uniform(0.7, 4.0) if k < N_TARGETS else rng.uniform(0.1, 0.5)
                 target = length * direction / np.linalg.norm(direction)
-                tell(client, client.joints, samples.joints(q.tolist()))
-                tell(client, client.target, samples.target(*target))
+                send(client, client.joints, samples.joints(q.tolist()))
+                send(client, client.target, samples.target(*target))
                 n_before, n_asked = len(client.motions), sum(codes.values())
                 future = client.plan.call_async(Trigger.Request())
                 wait_until(future.done)

@@ -69,7 +69,7 @@ def body(*more):
 
 
 @pytest.fixture
-def scene_of_a_motion(wait_until, tell, spinning):
+def scene_of_a_motion(wait_until, send, spinning):
     """Have an arm in motion to a target; give the client."""
 
     def begin(*settings):
@@ -84,8 +84,8 @@ def scene_of_a_motion(wait_until, tell, spinning):
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')
-        tell(client, client.body, body()[0])
-        tell(client, client.target, samples.target(*FAR))
+        send(client, client.body, body()[0])
+        send(client, client.target, samples.target(*FAR))
         future = client.plan.call_async(Trigger.Request())
         wait_until(future.done)
         assert future.result().success
@@ -119,25 +119,25 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     msg, scene = body(box)
     client.body.publish(msg)
     wait_until(lambda: len(client.motions) == 2)
-    brake = client.motion(1)
-    assert brake.velocities[0].any()
-    assert brake.duration < client.motion(0).duration
+    stop = client.motion(1)
+    assert stop.velocities[0].any()
+    assert stop.duration < client.motion(0).duration
     # It replans, or holds and reports that.
     wait_until(lambda: len(client.motions) == 3 or 'holding' in client.figures.get('monitor', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
-    touch = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
-    assert touch is None
+    contact = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
+    assert contact is None
     assert any('not proven free of the wearer' in line for line in said)
     assert not [line for line in said if 'rejected' in line]
     wait_until(lambda: client.figures['fail-safe stops'].startswith('1,'))
 
 
-def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, tell):
+def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
     msg, scene = body(box)
-    tell(client, client.target, samples.target(*OTHER))
+    send(client, client.target, samples.target(*OTHER))
     client.body.publish(msg)
     wait_until(lambda: len(client.motions) == 2)
     future = client.plan.call_async(Trigger.Request())

@@ -188,7 +188,7 @@ def test_the_motion_before_a_handover_is_monitored_too(monitored):
     assert np.allclose(stop.positions[0], monitored.on_time(PHASE + 0.02)[0], atol=1e-3)
 
 
-def _told(monitored, ahead):
+def _commanded(monitored, ahead):
     """Command a motion with a handover; return it, and arms by whether they accept it."""
     turned = _turned(monitored, ahead)
     running = ExecutingMotion(trajectory=turned, start_time=monitored.now + ahead)
@@ -207,7 +207,7 @@ def _told(monitored, ahead):
 def test_the_executed_motion_is_monitored_even_where_another_was_commanded(
     monitored, ahead, is_taken
 ):
-    _, arms = _told(monitored, ahead)
+    _, arms = _commanded(monitored, ahead)
     monitored.run(0.35, arms[is_taken])
     assert monitored.published == []
     assert ('ignored the last commanded motion' in monitored.reporter.monitor_state[1]) != is_taken
@@ -220,7 +220,7 @@ def test_the_executed_motion_is_monitored_even_where_another_was_commanded(
 
 @pytest.mark.parametrize('aside', [0.0, 0.002, 0.004, 0.015])
 def test_an_arm_beside_its_new_motion_is_monitored_on_that(monitored, aside):
-    turned, arms = _told(monitored, 0.02)
+    turned, arms = _commanded(monitored, 0.02)
 
     def arm(after):
         (q, v), (old, _) = arms[True](after), arms[False](after)
@@ -234,7 +234,7 @@ def test_an_arm_beside_its_new_motion_is_monitored_on_that(monitored, aside):
 
 
 def test_an_arm_that_begins_its_motion_late_is_monitored_on_that_again(monitored):
-    turned, arms = _told(monitored, 0.0)
+    turned, arms = _commanded(monitored, 0.0)
     monitored.run(0.3, arms[False])
     assert 'ignored the last commanded motion' in monitored.reporter.monitor_state[1]
     monitored.now += 0.02
@@ -246,7 +246,7 @@ def test_an_arm_that_begins_its_motion_late_is_monitored_on_that_again(monitored
 
 
 def test_an_arm_that_took_neither_its_motion_nor_the_stop_of_it_is_stopped_on_its_way(monitored):
-    turned, arms = _told(monitored, 0.02)
+    turned, arms = _commanded(monitored, 0.02)
     monitored.run(0.04, arms[False])
     monitored.see(monitored.hand(0.5, 0.0, turned), monitored.hand(0.8, 0.0))
     assert len(monitored.published) == 1
@@ -299,14 +299,14 @@ def test_a_stop_that_is_executed_is_published_once(monitored, late, beside):
     monitored.see(monitored.hand(0.6, 0.0))
     ((stop, _),) = monitored.published
 
-    def obeys(after):
+    def executes(after):
         if after < late:
             q, v = monitored.on_time(PHASE + after - late)
         else:
             q, v, _ = (row[0] for row in sample(stop, [after - late]))
         return q + beside, v
 
-    monitored.run(1.5, obeys)
+    monitored.run(1.5, executes)
     assert len(monitored.published) == 1
     assert monitored.monitor._state is MonitorState.HOLDING
 

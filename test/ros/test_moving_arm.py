@@ -82,7 +82,7 @@ def _ask(monkeypatch):
         def publish(_, revalidation):
             clock.now += reading
             if checking is not None:
-                hear(0.01 * next(n_heard))
+                publish_body(0.01 * next(n_bodies))
             revalidation.require_fit()
             return not revalidation.is_late()
 
@@ -90,21 +90,21 @@ def _ask(monkeypatch):
             clock.now += checking
             return disagreement(*args)
 
-        def hear(shift):
+        def publish_body(shift):
             """Let a body come whose parts are so much further back [m]."""
             boxes = [replace(b, center=b.center - [shift, 0, 0]) for b in worlds.wearer().boxes]
             parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in boxes)
-            heard.body.accept(lambda: WearerBody(parts), clock())
+            inputs.body.accept(lambda: WearerBody(parts), clock())
 
         if checking is not None:
             monkeypatch.setattr(Revalidation, 'disagreement', check_slowly)
-        n_heard = count()
-        heard = Inputs('body', 'target', 'joints')
-        hear(0.01 * next(n_heard))
-        heard.joints = Following(motion, clock, pace)
+        n_bodies = count()
+        inputs = Inputs('body', 'target', 'joints')
+        publish_body(0.01 * next(n_bodies))
+        inputs.joints = Following(motion, clock, pace)
         running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
         outcome = plan_request(
-            heard, parameters, clock, planner, lambda: False, publish, TARGET, running
+            inputs, parameters, clock, planner, lambda: False, publish, TARGET, running
         )
         return outcome, clock.now
 

@@ -81,14 +81,14 @@ class Stranger:
             ('rrth_planner/tool_path', Path),
             ('rrth_planner/markers', MarkerArray),
         ):
-            self.hear(name, msg_type, LATCHED)
-        self.hear('/diagnostics', DiagnosticArray, 10)
+            self.subscribe(name, msg_type, LATCHED)
+        self.subscribe('/diagnostics', DiagnosticArray, 10)
         self.services = {
             name: self.node.create_client(kind, f'rrth_planner/{name}')
             for name, kind in (('plan', Trigger), ('get_plan', GetPlan), ('cancel', Trigger))
         }
 
-    def hear(self, name, msg_type, profile):
+    def subscribe(self, name, msg_type, profile):
         self.received[name] = []
         self.node.create_subscription(msg_type, name, self.received[name].append, profile)
 
@@ -518,12 +518,12 @@ def test_there_is_no_handover_of_an_arm_above_its_limits(start):
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    heard, plan_motion = inputs_of(planner).joints, in_process_planner.plan_motion
+    source, plan_motion = inputs_of(planner).joints, in_process_planner.plan_motion
 
     def plan_while_it_starts(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
         stranger.publishers['joint_states'].publish(joints(velocity=[0.0, 0.3, 0.0, 0.0]))
-        wait_until(lambda: heard.value.velocities[1] == 0.3)
+        wait_until(lambda: source.value.velocities[1] == 0.3)
         return plan
 
     monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_starts)
@@ -952,15 +952,15 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
     planner, stranger = start()
-    heard = stranger.received['/diagnostics']
-    stranger.wait_until(lambda: heard)
+    arrays = stranger.received['/diagnostics']
+    stranger.wait_until(lambda: arrays)
     name = planner.get_fully_qualified_name()[1:]
-    assert heard[-1].status[0].name == f'{name}: planning'
-    begin, n_before = time.monotonic(), len(heard)
+    assert arrays[-1].status[0].name == f'{name}: planning'
+    begin, n_before = time.monotonic(), len(arrays)
     while time.monotonic() < begin + 1.0:
         planner._reporter.publish()
         time.sleep(0.005)
-    assert 5 <= len(heard) - n_before <= 13
+    assert 5 <= len(arrays) - n_before <= 13
     planner._reporter.conclude(ErrorCode.FAILURE, 'the last', PlanReport())
     stranger.wait_until(lambda: stranger.value('last sentence') == 'the last', 0.9)
 
@@ -989,8 +989,8 @@ def test_publishers_of_every_quality_are_received_once(start, profile):
     stranger.wait_until(lambda: all(i.received is not None for i in inputs.all.values()))
     if profile is not BEST_EFFORT:
         # What the best-effort reader misses comes by another one.
-        hearers = planner._scene_monitor._subscriptions
-        stranger.wait_until(lambda: all(profile.durability in h._reliable for h in hearers))
+        subscriptions = planner._scene_monitor._subscriptions
+        stranger.wait_until(lambda: all(profile.durability in h._reliable for h in subscriptions))
 
 
 def test_what_was_latched_before_the_start_is_received(start, spinning, wait_until):
@@ -1087,9 +1087,9 @@ def test_joint_states_of_other_machines_are_ignored(start):
     say_all(planner, stranger)
     stranger.publishers['joint_states'].publish(joints([NAN], ['wheel']))
     stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
-    heard = inputs_of(planner).joints
-    stranger.wait_until(lambda: heard.value.positions[0] == 0.1)
-    assert heard.n_rejected == 0
+    source = inputs_of(planner).joints
+    stranger.wait_until(lambda: source.value.positions[0] == 0.1)
+    assert source.n_rejected == 0
 
 
 @pytest.fixture(name='process')

@@ -169,8 +169,8 @@ def test_a_dry_run_plans_round_the_received_body(planner, bystander):
     assert '/body_boxes' in silent['sentence']
     latched = bystander.create_publisher(MarkerArray, 'body_boxes', LATCHED)
     latched.publish(body_to_msg(load_body(), 'torso'))
-    heard = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
-    assert heard['exit_code'] == 0, heard
+    received = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
+    assert received['exit_code'] == 0, received
     assert not bystander.motions
 
 

@@ -69,7 +69,7 @@ def recording(*arguments):
         process.wait()
 
 
-def hears(node, *topics):
+def subscribes(node, *topics):
     """Return whether the recorder subscribes to some topics, besides its best-effort reader."""
     return all(
         'rrth_recorder' in {info.node_name for info in node.get_subscriptions_info_by_topic(topic)}
@@ -123,10 +123,10 @@ def _run(ros_context, tmp_path_factory):
         wait_until(lambda: states)
         with recording('-o', path) as process:
             topics = [topic if topic[0] == '/' else f'/{topic}' for topic in TOPICS]
-            wait_until(lambda: hears(node, *topics))
+            wait_until(lambda: subscribes(node, *topics))
             wait_until(lambda: node.count_subscribers('target') > 1)
             # The planner and the arm know of the recorder.
-            missing = {'hears /diagnostics', 'hears /joint_states'}
+            missing = {'subscribes /diagnostics', 'subscribes /joint_states'}
             while missing:
                 line = process.stdout.readline()
                 assert line, process.stderr.read()
@@ -166,12 +166,12 @@ def test_all_topics_of_a_run_are_there_with_their_types(run):
 
 def test_the_recorded_trajectory_is_the_received_one(run):
     ((_, found),) = messages_of(run[0])['/joint_trajectory']
-    heard = run[1]
-    assert list(found.joint_names) == list(heard.joint_names)
-    assert nanoseconds(found.header.stamp) == nanoseconds(heard.header.stamp)
-    assert found.header.frame_id == heard.header.frame_id
-    assert len(found.points) == len(heard.points)
-    for one, other in zip(found.points, heard.points, strict=True):
+    received = run[1]
+    assert list(found.joint_names) == list(received.joint_names)
+    assert nanoseconds(found.header.stamp) == nanoseconds(received.header.stamp)
+    assert found.header.frame_id == received.header.frame_id
+    assert len(found.points) == len(received.points)
+    for one, other in zip(found.points, received.points, strict=True):
         assert nanoseconds(one.time_from_start) == nanoseconds(other.time_from_start)
         for field in ('positions', 'velocities', 'accelerations', 'effort'):
             np.testing.assert_array_equal(getattr(one, field), getattr(other, field))
@@ -214,12 +214,12 @@ def test_every_message_has_its_times_and_none_comes_twice(run):
 
 
 def test_a_recording_reads_back_as_a_run(run):
-    path, heard, *_ = run
+    path, received, *_ = run
     arm = load_arm()
     reader = RecordingReader(path, arm, 'torso')
     found = reader.recording()
     assert not reader.rejected
-    expected = joint_trajectory_from_msg(heard, arm.joint_names)
+    expected = joint_trajectory_from_msg(received, arm.joint_names)
     (motion,) = found.commanded
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         np.testing.assert_array_equal(
@@ -259,7 +259,7 @@ def test_names_follow_namespace_and_remaps_and_types_are_looked_up(tmp_path, spi
     options = ['--topics', 'target', 'words', 'words', '--duration', LONGEST_WAIT]
     remaps = ['--ros-args', '-r', '__ns:=/left', '-r', 'target:=/aim']
     with spinning(node), recording('-o', path, *options, *remaps) as process:
-        wait_until(lambda: hears(node, '/aim', '/left/words'), LONGEST_WAIT)
+        wait_until(lambda: subscribes(node, '/aim', '/left/words'), LONGEST_WAIT)
         wait_until(lambda: aims.get_subscription_count() > 0, LONGEST_WAIT)
         for k in range(5):
             aims.publish(target(x=float(k)))

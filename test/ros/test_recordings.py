@@ -60,7 +60,7 @@ def state(time, position=FOLDED, **fields):
     return 'joint_states', time, msg
 
 
-def told(time, speed=0.0, stamp=0.0):
+def commanded(time, speed=0.0, stamp=0.0):
     """Return a motion."""
     trajectory = Trajectory(
         times=[0.0, 1.0],
@@ -100,8 +100,8 @@ def test_a_run_is_read_on_one_clock(tmp_path):
         ('body_boxes', 0.1, wearer()),
         ('body_boxes', 0.3, array(hat)),
         ('target', 0.15, target()),
-        told(0.2),
-        told(0.5, speed=0.3, stamp=0.45),
+        commanded(0.2),
+        commanded(0.5, speed=0.3, stamp=0.45),
         said(0.2, 'monitoring'),
         said(0.5, 'stopping'),
         said(0.4, 'no motion', name='elsewhere/rrth_planner'),

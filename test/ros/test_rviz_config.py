@@ -75,15 +75,15 @@ def by_topic(entries, key='Topic'):
 
 
 def test_every_topic_is_one_of_the_planner_and_of_its_type(manager, topics):
-    said, heard = topics
+    published, subscribed = topics
     shown = by_topic(manager['Displays'])
     clicked = by_topic(manager['Tools'])
     assert shown
     for kind, topic, _ in shown:
-        assert {**said, **heard}.get(topic) == TYPES[kind], topic
+        assert {**published, **subscribed}.get(topic) == TYPES[kind], topic
     ((kind, topic, _),) = clicked
     assert kind == 'PublishPoint'
-    assert heard.get(topic) == TYPES[kind]
+    assert subscribed.get(topic) == TYPES[kind]
 
 
 def test_all_that_can_be_shown_is_shown(manager, topics):

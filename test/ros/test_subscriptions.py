@@ -139,28 +139,28 @@ def test_the_last_message_is_the_last_that_counts_and_none_is_missed(case):
     # Live copies, some lost, and all reliable ones, each stream in its order, mixed at random.
     live = [(10 * k, k) for k in range(1, n + 1) if k not in lost]
     reliable = [(10 * k, k) for k in range(1, n + 1)]
-    copies, heard = Copies(takes_late=True), {'news': [], 'late': []}
+    copies, received = Copies(takes_late=True), {'news': [], 'late': []}
     while live or reliable:
         is_live = live and (not reliable or random.random() < 0.5)
         sent = (live if is_live else reliable).pop(0)
         found = take(copies, *sent, LIVE if is_live else RELIABLE)
         if found:
-            heard[found].append(sent[1])
-    assert heard['news'] == sorted(set(heard['news']))
-    assert heard['news'][-1] == n
-    assert sorted(heard['news'] + heard['late']) == list(range(1, n + 1))
+            received[found].append(sent[1])
+    assert received['news'] == sorted(set(received['news']))
+    assert received['news'][-1] == n
+    assert sorted(received['news'] + received['late']) == list(range(1, n + 1))
 
 
 @pytest.mark.usefixtures('ros_context')
 def test_a_late_latched_target_does_not_override_a_newer_one():
-    node, heard, late = Node('hearer'), [], []
+    node, received, late = Node('subscriber'), [], []
     subscriptions = [
-        OpenSubscription(node, PointStamped, 'target', lambda msg, _: heard.append(msg)),
+        OpenSubscription(node, PointStamped, 'target', lambda msg, _: received.append(msg)),
         OpenSubscription(
             node,
             PointStamped,
             'target',
-            lambda msg, _: heard.append(msg),
+            lambda msg, _: received.append(msg),
             lambda msg, arrival: late.append((msg.point.x, arrival.sent[0])),
         ),
     ]
@@ -172,30 +172,30 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
             subscription._on_copy(
                 old, {'source_timestamp': 100, 'publication_sequence_number': 1}, RELIABLE
             )
-    assert [msg.point.x for msg in heard] == [2.0, 2.0]
+    assert [msg.point.x for msg in received] == [2.0, 2.0]
     assert late == [(1.0, 100)]
     node.destroy_node()
 
 
 @pytest.mark.usefixtures('ros_context')
 def test_a_late_body_changes_neither_age_nor_rejection():
-    heard = Input('body', WearerBody())
+    source = Input('body', WearerBody())
 
     def reject():
         raise MessageError('no box')
 
-    assert heard.accept(WearerBody, 1.0)
-    assert not heard.accept(reject, 2.0)
-    assert not heard.accept(WearerBody, 3.0, is_news=False)
-    assert heard.is_last_rejected
-    assert heard.age(4.0) == 3.0
-    assert heard.accept(WearerBody, 4.0)
-    assert not heard.is_last_rejected
+    assert source.accept(WearerBody, 1.0)
+    assert not source.accept(reject, 2.0)
+    assert not source.accept(WearerBody, 3.0, is_news=False)
+    assert source.is_last_rejected
+    assert source.age(4.0) == 3.0
+    assert source.accept(WearerBody, 4.0)
+    assert not source.is_last_rejected
 
 
 @pytest.mark.usefixtures('ros_context')
 def test_progress_is_that_of_the_reader_that_matches_all_publishers():
-    node = Node('hearer')
+    node = Node('subscriber')
     subscription = OpenSubscription(node, PointStamped, 'target', lambda *_: None)
     data = serialize_message(target())
     assert subscription.progress() == (0, 0)

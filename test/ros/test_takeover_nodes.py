@@ -58,7 +58,7 @@ def _body():
 
 
 @pytest.mark.parametrize('settings', [{}, {'rate': 500.0, 'time_scale': 0.5}], ids=str)
-def test_handovers_to_new_targets_are_without_a_jump(wait_until, tell, ask, spinning, settings):
+def test_handovers_to_new_targets_are_without_a_jump(wait_until, send, ask, spinning, settings):
     client, said, answers = Client(), [], []
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', 'seed:=7']
@@ -70,9 +70,9 @@ def test_handovers_to_new_targets_are_without_a_jump(wait_until, tell, ask, spin
     ):
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.states)
-        tell(client, client.body, _body())
+        send(client, client.body, _body())
         for target in TARGETS * ROUNDS:
-            tell(client, client.target, samples.target(*target))
+            send(client, client.target, samples.target(*target))
             speeds = []
             answer = ask(client.plan, lambda speeds=speeds: speeds.append(client.speed()))
             answers.append((speeds[-1] > 0.05, answer))

@@ -164,8 +164,8 @@ class Wire:
 
     def say(self, name, msg, is_reliable=False):
         """Return whether a message was taken."""
-        heard = self.inputs.all[name]
-        before = (heard.n_rejected, heard.value, heard.received)
+        source = self.inputs.all[name]
+        before = (source.n_rejected, source.value, source.received)
         data = msg if isinstance(msg, bytes) else serialize_message(msg)
         n = next(self.sent)
         subscription = self.subscriptions[name]
@@ -175,10 +175,10 @@ class Wire:
         else:
             subscription._on_live(data, info)
         assert not self.complaints.errors
-        if heard.n_rejected > before[0]:
-            assert heard.n_rejected == before[0] + 1
-            assert (heard.value, heard.received) == before[1:]
-            assert is_a_sentence(str(heard.rejection))
+        if source.n_rejected > before[0]:
+            assert source.n_rejected == before[0] + 1
+            assert (source.value, source.received) == before[1:]
+            assert is_a_sentence(str(source.rejection))
             return False
         return True
 
@@ -397,7 +397,7 @@ def test_after_all_of_this_a_good_motion_is_followed(playback):
     assert playback._playback is not before
 
 
-def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_until):
+def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_until):
     planner = PlannerNode(InProcessPlanner(), namespace='/wire')
     playback = PlaybackNode(namespace='/wire')
     stranger, motions = Node('stranger', namespace='/wire'), []
@@ -437,9 +437,9 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_unt
         fire()
         for publisher, _, good in publishers.values():
             if good is not None:
-                tell(stranger, publisher, good)
+                send(stranger, publisher, good)
         n, inputs = len(motions), planner._scene_monitor._inputs
-        wait_until(lambda: not any(heard.is_last_rejected for heard in inputs.all.values()))
+        wait_until(lambda: not any(source.is_last_rejected for source in inputs.all.values()))
         wait_until(lambda: ask().success)
         wait_until(lambda: len(motions) > n)
     planner.close()

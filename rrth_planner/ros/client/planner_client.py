@@ -147,7 +147,7 @@ class PlannerClient(Node):
 
     def _publish(self, publisher: Any, message: Any) -> None:
         self.wait_for(
-            lambda: is_heard(self, publisher), f'a reliable subscription of {publisher.topic}'
+            lambda: is_matched(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
         publisher.publish(message)
         # The request that follows must not overtake the message.
@@ -178,7 +178,7 @@ class PlannerClient(Node):
         self.commanded.append(msg)
 
 
-def is_heard(node: Node, publisher: Publisher) -> bool:
+def is_matched(node: Node, publisher: Publisher) -> bool:
     """
     Return whether all subscribers are connected, a reliable one among them.
 
