@@ -61,7 +61,7 @@ class Figures:
     def __init__(self) -> None:
         """Begin with nothing done."""
         self.n, self.last, self.most = 0, 0.0, 0.0
-        # As many numbers after a year as after a minute.
+        # Of constant size, however long the node runs.
         self._counts = [0] * (BINS * DECADES)
 
     def add(self, elapsed: float) -> None:

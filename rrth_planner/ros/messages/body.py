@@ -47,7 +47,7 @@ class WearerBody:
         """Return the body at a time [s]: parts whose lifetime has passed are expired."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        # Their first box is enough to name them.
+        # Their first box suffices for the name.
         gone = dict(self.expired) | {
             k: BodyPart(part.boxes[:1], part.expires)
             for k, part in self.parts

@@ -11,15 +11,15 @@ from rrth_planner.model.trajectory import REST_SPEED, sample
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
 
-# An arm that stands still that long after the end of its motion is taken to have arrived; where it
-# is nowhere on it for as long, it does something else [s].
+# An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
+# long is lost [s].
 GRACE = 0.5
-# An arm stands still where it does not go further than at `REST_SPEED` for this time [s].
+# An arm is at rest where it moves no further than at `REST_SPEED` for this time [s].
 STILL = 0.1
-# An arm that is further from its motion than this [rad], and nearer to another one by so great a
-# share, follows that.
+# An arm that is further from its motion than this [rad] executes another one whose distance is less
+# than this share of that.
 ASIDE, NEARER = 0.02, 0.25
-# An arm may be so late [s].
+# Greatest lag of an arm [s].
 LATE = 0.1
 # Spacing of the samples of a stop [s].
 SPACING = 2e-3
