@@ -16,8 +16,8 @@ from rrth_planner.ros.messages.joint_state import JointReading
 GRACE = 0.5
 # An arm is at rest where it moves no further than at `REST_SPEED` for this time [s].
 STILL = 0.1
-# An arm that is further from its motion than this [rad] executes another one whose distance is less
-# than this share of that.
+# An arm that is further from its motion than this [rad] executes another one where the distance to
+# that is less than this share.
 ASIDE, NEARER = 0.02, 0.25
 # Greatest lag of an arm [s].
 LATE = 0.1
