@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest escape of an arm that the wearer leaned into."""
+"""The shortest escape of an arm that is in a box of the wearer."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -56,7 +56,7 @@ def off_the_path(trajectory, q):
 
 @examples(25)
 @given(seed=SEEDS)
-def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
+def test_a_fast_stop_begins_as_the_motion_and_rests_on_its_path(seed):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -121,13 +121,13 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
         ray_guard_length=RAY,
     )
     rest = part_of(motion, phase, motion.duration)
-    touches = any(
+    is_violated = any(
         dense_touch(arm, scene, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
         for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
     )
     # Free by a hair may be left unproven; a violation must never be called free.
-    assert not (is_free and touches)
-    if not touches and not is_free:
+    assert not (is_free and is_violated)
+    if not is_violated and not is_free:
         larger = Scene((*wearer().boxes, Box('hand', where, hand.size + 2e-3, np.eye(3))))
         assert any(
             dense_touch(arm, larger, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
@@ -137,7 +137,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
 
 @examples(25)
 @given(seed=SEEDS)
-def test_a_reading_tells_how_far_the_motion_is(seed):
+def test_a_reading_locates_the_arm_on_its_motion(seed):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -170,7 +170,7 @@ def hand_beside(rng, q, gap):
     return None
 
 
-def test_a_motion_that_escapes_is_told_from_one_that_does_not():
+def test_a_motion_that_escapes_is_distinguished_from_one_that_does_not():
     rng, counts = np.random.default_rng(5), {True: 0, False: 0}
     arm = table_1_arm()
     for _ in range(60):
@@ -196,7 +196,7 @@ def test_a_motion_that_escapes_is_told_from_one_that_does_not():
         if found:
             assert min(gaps) > gaps[0] - 1e-4
             assert gaps[-1] >= MARGIN - 1e-6
-        # Nearer for a while: going on is no way out.
+        # Nearer for a while: continuing is no escape.
         assert not (found and min(gaps) < gaps[0] - 1e-3)
         assert not escapes_by_continuing(
             running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY

@@ -51,7 +51,7 @@ def test_it_is_of_the_size_that_it_should_be():
     assert 0.4 < reach < 0.5
 
 
-def test_it_plans_round_the_seated_wearer_without_a_touch():
+def test_it_plans_round_the_seated_wearer_without_contact():
     pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
     arm, scene = load_arm(resource_path(ARM)), load_body(resource_path(BODY))
     settings = load_settings(arm.dof, improve_time=1000.0, time_limit=1000.0)

@@ -67,7 +67,7 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
 
 
 def collides(arm, box, q, growth):
-    """Return at which of the instants q, (n, dof), the oracle finds the arm in a grown box."""
+    """Return at which of the instants q, (n, dof), the reference finds the arm in a grown box."""
     ends = oracle_bars(arm, q, RAY)
     radii = [arm.radii[row] for row, _ in bar_ends(arm)]
     hits = [
@@ -77,7 +77,7 @@ def collides(arm, box, q, growth):
     return np.any(hits, axis=0)
 
 
-def oracle_depth(arm, box, q):
+def reference_depth(arm, box, q):
     """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
     low, high = -0.5 * box.size.min(), FREE
     if not collides(arm, box, q[None], high)[0]:
@@ -128,7 +128,7 @@ def is_shoulder_covered(arm, scene):
 
 
 def leaned_case(seed, low, high):
-    """Return arm, wearer, start and oracle depths of the boxes, the deepest from low to high."""
+    """Return arm, wearer, start and reference depths of the boxes, the deepest within bounds."""
     rng = np.random.default_rng(seed)
     while True:
         arm = table_1_arm(rng.choice([0.0, 0.02]))
@@ -138,14 +138,14 @@ def leaned_case(seed, low, high):
         found = leaned(arm, scene, q, rng, rng.uniform(low, high))
         if found is None or is_shoulder_covered(arm, found):
             continue
-        depths = np.array([oracle_depth(arm, box, q) for box in found.boxes])
+        depths = np.array([reference_depth(arm, box, q) for box in found.boxes])
         if depths.max() < high:
             return arm, found, q, depths
 
 
 @examples(40)
 @given(SEEDS)
-def test_depths_are_those_of_the_oracle(seed):
+def test_depths_are_those_of_the_reference(seed):
     rng = np.random.default_rng(seed)
     arm = table_1_arm(rng.choice([0.0, 0.02]))
     scene = BODIES[int(rng.integers(len(BODIES)))]
@@ -153,7 +153,7 @@ def test_depths_are_those_of_the_oracle(seed):
     q = rng.uniform(*world.bounds)
     depths = box_depths(world, q).max(axis=0)
     for box, depth in zip(scene.boxes, depths, strict=True):
-        expected = oracle_depth(arm, box, q)
+        expected = reference_depth(arm, box, q)
         if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
             assert depth == pytest.approx(expected, abs=1e-7)
     assert world.is_valid(q) == (depths.max() < 0.0)
@@ -199,7 +199,7 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
         # In, then out for good; and from each sample on no deeper than there.
         assert not (np.diff(is_hit.astype(int)) > 0).any()
         for time in looks:
-            depth = max(0.0, oracle_depth(arm, box, positions_at(trajectory, [time])[0]))
+            depth = max(0.0, reference_depth(arm, box, positions_at(trajectory, [time])[0]))
             later = q[times >= time]
             assert not collides(arm, box, later, MARGIN - depth - 2e-6).any()
 
@@ -359,12 +359,12 @@ def second_opinion(arm, scene, world, trajectory):
 
 def test_an_escape_that_violates_for_the_second_checker_is_rejected(monkeypatch):
     arm, scene = pressed()
-    touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
-    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
+    violation = Violation(0.001, 0.005, 'pointing ray', 'hand')
+    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: violation)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None
-    assert plan.disagreement.touch == touch
+    assert plan.disagreement.touch == violation
     assert 'at 0.001 s, on the way out of the wearer; expected no part deeper' in plan.sentence
 
 
@@ -378,12 +378,12 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
         q = FOLDED + share * way
         trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
         end = trajectory.duration
-        touch = second_opinion(arm, scene, world, trajectory)
-        verdicts[share] = leads_out(trajectory, world, end), touch
+        violation = second_opinion(arm, scene, world, trajectory)
+        verdicts[share] = leads_out(trajectory, world, end), violation
     assert verdicts[1.0] == (True, None)
-    is_out, touch = verdicts[-0.2]
+    is_out, violation = verdicts[-0.2]
     assert not is_out
-    assert (touch.bar, touch.box) == ('pointing ray', 'hand')
+    assert (violation.bar, violation.box) == ('pointing ray', 'hand')
     # Half way it is no deeper but not out.
     assert verdicts[0.5] == (False, None)
     # A plate in the way, which the arm does not reach yet.
@@ -395,8 +395,8 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     if first_contact(arm, Scene((plate,)), FOLDED[None], RAY, MARGIN) is None:
         world = arm_world(arm, blocked, MARGIN, RAY)
         assert not leads_out(trajectory, world, trajectory.duration)
-        touch = second_opinion(arm, blocked, world, trajectory)
-        assert touch.box == 'plate'
+        violation = second_opinion(arm, blocked, world, trajectory)
+        assert violation.box == 'plate'
 
 
 def test_a_running_escape_is_free_until_the_wearer_comes_nearer():

@@ -77,7 +77,7 @@ def test_most_requests_are_solved(answers):
     assert np.mean(solved) > 0.6
 
 
-def test_what_is_solved_never_touches_and_ends_on_target(answers):
+def test_what_is_solved_is_never_in_collision_and_ends_on_target(answers):
     arm, bounds = table_1_arm(), limits()
     for scene, q_start, target, plan in answers:
         if plan.status is not PlanStatus.SOLVED:
@@ -97,7 +97,7 @@ def test_what_is_solved_never_touches_and_ends_on_target(answers):
         assert (q <= arm.bounds[1] + 1e-9).all()
         assert (np.abs(v) <= bounds.velocity * 1.001).all()
         assert (np.abs(a) <= bounds.acceleration * 1.001).all()
-        # Grown by the margin the oracle saw no contact, so the figure cannot be less.
+        # Grown by the margin the reference checker found no contact, so the figure cannot be less.
         assert plan.clearance >= MARGIN - 1e-6
         assert 'clearance' in plan.sentence
         assert f'seed {plan.seed}' in plan.sentence

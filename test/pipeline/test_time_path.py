@@ -26,7 +26,7 @@ WORLD = arm_world(ARM, WEARER, MARGIN, RAY)
 
 @functools.cache
 def paths_without_room(n):
-    """Return n paths round the body, pulled taut in the very world in which they are timed."""
+    """Return n paths round the body, shortcut in the very world in which they are timed."""
     rng, found = np.random.default_rng(8), []
     options = RRTHOptions(time_limit=60.0, improve_time=60.0, club_attempts=0)
     while len(found) < n:

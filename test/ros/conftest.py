@@ -109,7 +109,7 @@ def _wait_until() -> Callable[..., None]:
 
 
 @pytest.fixture(name='send')
-def _tell() -> Callable[..., None]:
+def _send() -> Callable[..., None]:
     """Give `send` to tests."""
     return send
 

@@ -123,7 +123,7 @@ def test_cancelled_work_does_not_run(node, spinning, monkeypatch):
     assert done == ['second']
 
 
-def test_a_round_that_was_asked_for_before_tells_nothing(node, spinning, wait_until, monkeypatch):
+def test_a_round_that_was_asked_for_before_does_not_count(node, spinning, wait_until, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     barrier = ExecutorBarrier(node, lambda: (len(node.numbers), 0))
     with spinning(node) as executor:

@@ -37,7 +37,7 @@ from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent
-TOUCH = Violation(0.25, 0.0123, 'pointing ray', 'head')
+VIOLATION = Violation(0.25, 0.0123, 'pointing ray', 'head')
 SENTENCE = (
     'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
     'at 0.250 s, expected at least 0.02 m'
@@ -80,7 +80,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     )
     say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
@@ -93,7 +93,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     incident = read_incident(file)
     question = incident.question
     assert incident.kind is IncidentKind.DISAGREEMENT
-    assert incident.touch == TOUCH
+    assert incident.touch == VIOLATION
     assert incident.present is None
     assert (question.seed, question.margin, question.ray_guard_length) == (5, 0.02, 1.0)
     assert question.options == RRTStarOptions(max_samples=500)
@@ -141,13 +141,13 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     with monkeypatch.context() as patch:
         # What agrees leaves nothing behind.
         assert not list(tmp_path.iterdir())
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         follow_up()
     (file,) = tmp_path.iterdir()
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
     incident = read_incident(file)
-    assert incident.touch == TOUCH
+    assert incident.touch == VIOLATION
     np.testing.assert_array_equal(incident.trajectory.positions, stop.positions)
     assert replayed(file)[0] == 1
 
@@ -158,7 +158,7 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
@@ -174,7 +174,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
@@ -245,7 +245,7 @@ def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkey
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
     answers = [stranger.answer() for _ in range(2)]
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())

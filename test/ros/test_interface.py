@@ -211,11 +211,11 @@ def seconds(node):
 def set_clock(clock, now, wait_until, *nodes):
     """Publish a time until all nodes have it; clocks are published often, not latched."""
 
-    def is_told():
+    def is_received():
         clock(now)
         return all(abs(seconds(node) - now) < 1e-6 for node in nodes)
 
-    wait_until(is_told)
+    wait_until(is_received)
 
 
 def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two hundred requests to a node of its own, each answer checked by the oracle."""
+"""Two hundred requests to a node of its own, each answer checked by the reference checker."""
 
 import re
 import time
@@ -76,7 +76,7 @@ def _free_start(rng, arm, scene):
     return q
 
 
-def _is_blocked_by_oracle(rng, arm, scene, target):
+def _is_blocked_by_reference(rng, arm, scene, target):
     """Return whether the target is too near a box, or random goal configurations all violate."""
     for box in scene.boxes:
         local = box.rotation.T @ (target - box.center)
@@ -94,14 +94,14 @@ def _is_blocked_by_oracle(rng, arm, scene, target):
             configurations.append(q)
             rays.append([max(RAY, reach)])
     ends = reference_checker.bars(arm, np.array(configurations), np.array(rays))
-    is_touching = np.zeros(len(ends), dtype=bool)
+    collides = np.zeros(len(ends), dtype=bool)
     for box in scene.boxes:
         # Half a centimetre of room: what is only just free may be missed by a finite search.
         half = 0.5 * box.size + MARGIN + 0.005
-        is_touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+        collides |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
             axis=1
         )
-    return bool(is_touching.all())
+    return bool(collides.all())
 
 
 def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, send, spinning):
@@ -138,7 +138,7 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
                     assert code == 'GOAL_IN_COLLISION', answer.message
                     name = re.search(r'box "([^"]+)"', answer.message).group(1)
                     assert name in {box.name for box in scene.boxes}
-                    assert _is_blocked_by_oracle(rng, arm, scene, target), answer.message
+                    assert _is_blocked_by_reference(rng, arm, scene, target), answer.message
                     assert len(client.motions) == n_before
                     continue
                 wait_until(lambda n=n_before: len(client.motions) == n + 1)

@@ -353,7 +353,7 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion, touches = inputs_of(planner), in_process_planner.plan_motion, []
+    inputs, plan_motion, violations = inputs_of(planner), in_process_planner.plan_motion, []
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -361,9 +361,9 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
         far = box('far', body.n_boxes, center=(0.0, 0.0, -5.0), size=(0.1, 0.1, 0.1))
         stranger.publishers['body_boxes'].publish(array(far))
         wait_until(lambda: inputs.body.value is not body)
-        for touch in touches:
+        for violation in violations:
             monkeypatch.setattr(
-                trajectory_validation, 'touch_on_way_out', lambda *_, touch=touch: touch
+                trajectory_validation, 'touch_on_way_out', lambda *_, found=violation: found
             )
         return plan
 
@@ -372,7 +372,7 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
-    touches.append(Violation(0.001, 0.01, 'pointing ray', 'hand/0'))
+    violations.append(Violation(0.001, 0.01, 'pointing ray', 'hand/0'))
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: pointing ray')
     assert not stranger.received['joint_trajectory']
@@ -824,13 +824,13 @@ def test_what_was_cancelled_is_never_published(start, monkeypatch):
     queue, disagreement = planner._queue, Revalidation.disagreement
     ended = []
 
-    def cancel_after_the_last_look(*args):
+    def cancel_after_the_revalidation(*args):
         found = disagreement(*args)
         ended.append(queue.cancel())
         return found
 
     with monkeypatch.context() as patch:
-        patch.setattr(Revalidation, 'disagreement', cancel_after_the_last_look)
+        patch.setattr(Revalidation, 'disagreement', cancel_after_the_revalidation)
         message = stranger.answer().message
     assert ended == [1]
     assert message == 'PREEMPTED (-7): the request was cancelled'
@@ -891,14 +891,14 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
     queue, disagreement = planner._queue, Revalidation.disagreement
     closers = []
 
-    def close_after_the_last_look(*args):
+    def close_after_the_revalidation(*args):
         found = disagreement(*args)
         closers.append(Thread(target=queue.close))
         closers[0].start()
         stranger.wait_until(lambda: queue._is_closed)
         return found
 
-    monkeypatch.setattr(Revalidation, 'disagreement', close_after_the_last_look)
+    monkeypatch.setattr(Revalidation, 'disagreement', close_after_the_revalidation)
     assert stranger.answer().message.startswith('PREEMPTED (-7): ')
     closers[0].join(30.0)
     assert not stranger.received['joint_trajectory']

@@ -234,7 +234,7 @@ def test_a_recording_reads_back_as_a_run(run):
     assert since < motion.begin
     point = target().point
     np.testing.assert_array_equal(aim, [point.x, point.y, point.z])
-    states = {state for _, state in found.guard}
+    states = {state for _, state in found.monitor_states}
     assert states
     assert states <= {'no motion', 'monitoring'}
 

@@ -76,10 +76,10 @@ def commanded(time, speed=0.0, stamp=0.0):
     )
 
 
-def said(time, guard, name='rrth_planner'):
+def said(time, state, name='rrth_planner'):
     """Return diagnostics."""
     status = DiagnosticStatus(name=f'{name}: planning', hardware_id='rrth_planner')
-    status.values = [KeyValue(key='monitor', value=guard)]
+    status.values = [KeyValue(key='monitor', value=state)]
     return 'diagnostics', time, DiagnosticArray(status=[status])
 
 
