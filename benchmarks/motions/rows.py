@@ -80,7 +80,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
         *(arm, case.scene, trajectory, limits),
         margin=MARGIN,
         ray_length=RAY,
-        reach=plan.reach,
+        reach=plan.target_distance,
     )
     if not told.is_increasing:
         return told.columns()
@@ -114,7 +114,9 @@ def _fcl_distance(motion: Motion, curve: Curve) -> float:
     arm, scene = table_1_arm(), motion.case.scene
     q = derivative(curve, instants(curve, PERIOD), 0)
     along = least_distance(arm, scene, q, RAY, MARGIN)
-    return min(along, least_distance(arm, scene, q[-1:], max(RAY, motion.plan.reach), MARGIN))
+    return min(
+        along, least_distance(arm, scene, q[-1:], max(RAY, motion.plan.target_distance), MARGIN)
+    )
 
 
 def read_motions(path: Path) -> list[Row]:

@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace) -> None:
         client = DemoClient(load_arm(settings.get('arm')), options.timeout, check)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
-        client.tell_body(body)
+        client.publish_body(body)
         lines, figure = _visit(client, settings, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
         went_round = _raise_arm(client, settings)
@@ -123,7 +123,7 @@ def _visit(
     motions, lines = [], []
     for name, message in targets.items():
         target = goal_from_msg(message, frame).target
-        client.tell_target(message)
+        client.publish_target(message)
         q_present = client.present()
         trajectory, planning_time = client.ask_for_motion()
         found = inspect_motion(
@@ -163,7 +163,7 @@ def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
     scene = scene_of(WearerBody().apply(raised, 0.0, frame))
     for name in RAISED_ON_THE_WAY:
         message = _example(f'target_{name}', PointStamped)
-        client.tell_target(message)
+        client.publish_target(message)
         trajectory, _ = client.ask_for_motion()
         if name != RAISED_ON_THE_WAY[-1]:
             client.wait_for_arrival(trajectory)

@@ -153,7 +153,7 @@ def _figures(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any
             'duration_s': plan.trajectory.duration,
             'length_rad': plan.path.length,
             'clearance_m': plan.clearance,
-            'reach_m': plan.reach,
+            'reach_m': plan.target_distance,
             'escape_time_s': plan.escape_time,
             'end': _ray(arm, plan.trajectory.positions[-1]),
         }

@@ -112,7 +112,7 @@ def _draw_recording(options: argparse.Namespace) -> 'Figure':
     arm, settings = _arm_and_settings(options)
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
-    for topic, sentence in reader.refused.items():
+    for topic, sentence in reader.rejected.items():
         tell('plot', one_line(f'{topic}: bad messages are left out: {sentence}'))
     if options.begin is not None or options.end is not None:
         last = float(recording.times[-1])

@@ -138,8 +138,8 @@ def _move(
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
-        client.tell_body(body)
-    client.tell_target(target)
+        client.publish_body(body)
+    client.publish_target(target)
     report.take(answer_from_text(client.ask(PATIENCE).message))
     if report.exit_code != DONE:
         return

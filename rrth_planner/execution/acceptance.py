@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which motions the kinematic arm takes: those at its present state, and within limits."""
+"""Which motions the kinematic arm accepts: those from its present state, and within limits."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,10 @@ from rrth_planner.model.bernstein import first_outside, to_bernstein
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
-# Planned limits may be touched; a motion is refused when it goes further than this beyond them.
+# A motion is rejected where it exceeds a limit by more than this share.
 EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
-# A motion that ends later than this is refused [s].
+# A motion that ends later than this is rejected [s].
 LONGEST_WAIT = 3600.0
 # By number of coefficients; and what differentiation multiplies them with.
 _TO_BERNSTEIN = {size: to_bernstein(size - 1) for size in (4, 5, 6)}
@@ -25,7 +25,7 @@ _POWERS = np.arange(1.0, 6.0)[:, None]
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlaybackRules:
     """
-    Which motions the arm takes, and how it moves.
+    Which motions the arm accepts, and how it moves.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PlaybackRules:
     time_scale : float
         Seconds of a motion that begins at rest per second of the clock, above 0 and up to 1 [-].
     limits : MotionLimits
-        What each joint may do; braking keeps to the jerk, a motion may have any.
+        Of each joint; a stop keeps the jerk limit, a motion may have any jerk.
 
     Raises
     ------
@@ -67,14 +67,14 @@ def accept(
     """
     Return what the arm does when a new motion replaces the present one.
 
-    Until a motion begins that begins later, the arm goes on with what it does now; one that has
-    not begun when another comes never does. What begins while a motion is under way, a takeover
-    or a stop, goes on at that motion's pace: a new `time_scale` counts from the next rest on.
+    Until the new motion begins the arm continues the present one; a motion that has not begun when
+    another one comes is dropped. A handover or a stop within a motion keeps the time scale of that
+    motion: a new `time_scale` counts from the next rest on.
 
     Parameters
     ----------
     playback : Playback
-        What it does now.
+        The present one.
     trajectory : Trajectory
         The new motion.
     arm : ArmModel
@@ -86,9 +86,9 @@ def accept(
     Raises
     ------
     MessageError
-        The new motion is not where the arm is when it begins, or now if that is over, leaves
-        limits somewhere, or ends more than an hour ahead. Within `start_tolerance` the arm steps
-        onto it.
+        The new motion does not start at the state of the arm when it begins (now, if it has
+        begun), exceeds a limit, or ends more than an hour ahead. Within `start_tolerance` the arm
+        steps onto it.
 
     """
     before = at_present(playback, time)
@@ -99,7 +99,7 @@ def accept(
         time_scale=before.time_scale if is_under_way else rules.time_scale,
         before=before if start_time > time else None,
     )
-    # Numbers that overflow become infinite or NaN, which every comparison below refuses.
+    # Numbers that overflow become infinite or NaN, which every comparison below rejects.
     with np.errstate(all='ignore'):
         _check_start(before, new, arm, rules, max(time, start_time))
         _check_limits(new, arm, rules)
@@ -114,7 +114,7 @@ def accept(
 def _check_start(
     playback: Playback, new: Playback, arm: ArmModel, rules: PlaybackRules, time: float
 ) -> None:
-    """Raise MessageError where a motion is not where the arm is when it is taken over [s]."""
+    """Raise MessageError where a motion does not start at the state of the arm at a time [s]."""
     q, v, _ = playback.state_at(time)
     q_new, v_new, _ = new.state_at(time)
     for what, unit, wanted, present in (
@@ -131,7 +131,7 @@ def _check_start(
 
 
 def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> None:
-    """Raise MessageError where the curve of a motion leaves the bounds or limits."""
+    """Raise MessageError where a motion exceeds bounds or limits anywhere."""
     trajectory, scale, top = playback.trajectory, playback.time_scale, 1.0 + EXCESS
     c, durations = _pieces(trajectory)
     rates = scale / durations[:, None, None]
@@ -159,7 +159,7 @@ def _pieces(trajectory: Trajectory) -> tuple[Array, Array]:
     """Return the polynomials of all pieces, (n, 6, dof), and their durations, (n,) [s]."""
     if len(trajectory.times) > 1:
         return piece_coefficients(trajectory), np.diff(trajectory.times)
-    # A single point is held.
+    # A single point: the arm stands still.
     held = np.zeros((1, 6, trajectory.positions.shape[1]))
     held[0, 0] = trajectory.positions[0]
     return held, np.ones(1)

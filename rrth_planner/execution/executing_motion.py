@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that an arm was told to follow, and how far the arm has come."""
+"""A commanded motion, and the time within it that the arm has come to."""
 
 from dataclasses import dataclass
 import math
@@ -17,19 +17,19 @@ from rrth_planner.model.trajectory import (
     Trajectory,
 )
 
-# How late an arm is cannot be told where it hardly moves [rad/s]; most that counts [s].
+# Below this speed the lag of an arm is not measurable [rad/s]; the greatest lag that counts [s].
 SLOW, LATEST = 0.05, 0.05
-# An arm that is further from all of its motion, in one joint, does something else [rad].
-ELSEWHERE = 0.1
-# A motion is told no earlier before it begins; a clock that was set back may say otherwise [s].
+# An arm that is further from its whole motion, in one joint, does not execute it [rad].
+MAX_DEVIATION = 0.1
+# A motion is published no earlier before it begins; more means a clock that was set back [s].
 LONGEST_LEAD = 0.25
-# Places of a motion at which an arm is looked for [s].
+# Spacing of the samples of a motion that an arm is located by [s].
 SPACING = 5e-3
-# An arm that is so near to where its motion is now is on time [rad].
+# Greatest deviation of an arm that is on time [rad].
 ON_TIME = 5e-4
-# For so long after its begin a motion has hardly left the place where it begins [s].
+# For so long a motion has hardly left its start [s].
 BEGINNING = 0.05
-# Instants that are looked at to tell whether it moves soon.
+# Number of samples to decide whether it moves soon.
 N_SOON = 9
 
 
@@ -43,25 +43,24 @@ class ExecutingMotion:
     trajectory : Trajectory
     start_time : float
         [s].
-    reach : float
-        How much of the pointing ray must be clear at the end [m].
+    target_distance : float
+        From the tool to the target at the end: so much of the pointing ray must be clear [m].
     escape_time : float
-        Until then the motion may lead out of the wearer [s].
+        Until then the motion may escape from boxes [s].
 
     """
 
     trajectory: Trajectory
     start_time: float
-    reach: float = 0.0
+    target_distance: float = 0.0
     escape_time: float = 0.0
 
     def phase(self, q: Array, taken: float, now: float) -> float | None:
         """
-        Return the time within the motion that the arm is at now [s]; None where it is elsewhere.
+        Return the time within the motion that the arm is at now [s]; None where it is off it.
 
-        An arm may be late, slow, or a little beside its motion: it counts as where it is nearest
-        to. Before its motion begins the time is negative. Velocities are not asked for: not every
-        driver has any.
+        An arm may be late, slow, or a little off its motion: the nearest point counts. Before the
+        motion begins the time is negative. Velocities are not needed: not every driver has them.
 
         Parameters
         ----------
@@ -73,38 +72,38 @@ class ExecutingMotion:
         """
         motion, guess = self.trajectory, taken - self.start_time
         if now < self.start_time <= now + LONGEST_LEAD and not self._has_begun(q, guess):
-            # It takes over from another one, where the arm is still.
+            # Before the handover: the arm is still on the previous motion.
             return now - self.start_time
         if len(motion.times) == 1:
-            is_there = np.abs(motion.positions[0] - q).max() <= ELSEWHERE
+            is_there = np.abs(motion.positions[0] - q).max() <= MAX_DEVIATION
             return max(0.0, now - self.start_time) if is_there else None
-        # Mostly the arm is where it was told to be, a little late: it began when it heard of it.
+        # Mostly the arm is at the commanded state, a little late.
         at = self.near(guess, q, SAME_POSITION)
         if not math.isfinite(at):
             at = self._place(q, guess)
         return at + now - taken if math.isfinite(at) else None
 
     def _place(self, q: Array, guess: float) -> float:
-        """Return the time of the nearest place, of several that near a guess; NaN: none [s]."""
+        """Return the time of the nearest point, of several the one near a guess; NaN: none [s]."""
         motion = self.trajectory
         times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
         gaps = positions_at(motion, times) - q
-        if not np.abs(gaps).max(axis=1).min() <= ELSEWHERE:
+        if not np.abs(gaps).max(axis=1).min() <= MAX_DEVIATION:
             return math.nan
         squares = (gaps * gaps).sum(axis=1)
-        # A motion may pass a place twice.
+        # A motion may pass a point twice.
         near = times[squares <= squares.min() + SAME_POSITION**2]
         return self.near(float(near[np.abs(near - guess).argmin()]), q)
 
     def _has_begun(self, q: Array, guess: float) -> bool:
-        """Return whether an arm is on the motion, past its beginning, whatever the clock says."""
+        """Return whether an arm is on the motion, past its beginning, by its positions alone."""
         at = math.nan if len(self.trajectory.times) == 1 else self._place(q, guess)
         if not at > BEGINNING:
             return False
         return bool(np.abs(positions_at(self.trajectory, [at])[0] - q).max() <= SAME_POSITION)
 
     def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
-        """Return whether an arm was where the motion is at that time, and as fast [rad, s]."""
+        """Return whether an arm had positions and velocities of the motion at a time [s]."""
         since = taken - self.start_time
         if not BEGINNING <= since <= self.trajectory.duration:
             return False
@@ -122,7 +121,7 @@ class ExecutingMotion:
         return float(time_on(curves, self.trajectory.times, guess, q, same, SLOW, LATEST))
 
     def gap(self, q: Array, taken: float) -> float:
-        """Return how far a reading, taken at a time [s], is beside the motion [rad]."""
+        """Return how far a reading, taken at a time [s], is off the motion [rad]."""
         at = self.phase(q, taken, taken)
         if at is None:
             return math.inf

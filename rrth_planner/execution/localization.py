@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where in a motion an arm is, by a reading of it."""
+"""Localization of an arm on a motion, by a reading of it."""
 
 import numpy as np
 from rrth_planner.model.arrays import Array
@@ -10,14 +10,14 @@ from rrth_planner.model.trajectory import near_point, sample, Trajectory
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
 SEARCH_SPACING = 1e-3
-# Where it hardly moves, so close [rad], and by so small a share of its own speed; slower, it has
-# no direction [rad/s].
+# Tolerances where it hardly moves: [rad], and a share of its speed; slower, it has no direction
+# [rad/s].
 SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
-# No arm goes much faster than it was told.
+# No arm executes a motion much faster than commanded.
 FASTEST_RATE = 1.05
 
 
-def takeover(
+def predict_start_state(
     positions: Array,
     velocities: Array,
     running: Trajectory | None,
@@ -25,23 +25,22 @@ def takeover(
     known: tuple[float, float] | None = None,
 ) -> StartState:
     """
-    Return what an arm will do, from a reading of it.
+    Return the predicted state of an arm, from a reading of it.
 
-    An arm that is seen to follow a known motion, at whatever rate, goes on to follow it, and what
-    it is told next it follows at the same rate: the state is that of the motion. Any other goes on
-    at the velocity it has; of its acceleration nothing is known.
+    An arm that is found to execute a known motion, at any rate, is predicted to continue it, and
+    to execute the next motion at the same rate: the state is that of the motion. Any other arm is
+    predicted to keep its velocity; its acceleration is unknown.
 
     Parameters
     ----------
     positions, velocities : ndarray, shape (dof,)
         Of the reading [rad, rad/s].
     running : Trajectory or None
-        The motion that the arm was last told to follow.
+        The last commanded motion.
     ahead : float
         From the reading on, >= 0 [s].
     known : tuple of float, optional
-        Where in that motion the arm is known to be [s], and at which rate it follows it; without,
-        that is looked for.
+        The time within that motion [s], and the rate at which the arm executes it, if known.
 
     """
     found = known
@@ -56,7 +55,7 @@ def takeover(
             )
         )
     phase, rate = found
-    # At a point of the motion where there is one: no piece of what follows is too short.
+    # At a point of the motion where there is one: no piece of the next motion is too short.
     time = near_point(running, min(phase + rate * ahead, running.duration))
     q, v, a = (values[0] for values in sample(running, [time]))
     return StartState(
@@ -65,7 +64,7 @@ def takeover(
 
 
 def sharp_phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
-    """Return the same as `phase_of` of an arm that hardly moves, where its reading is so exact."""
+    """Return `phase_of` of an arm that hardly moves, with tolerances that are tight enough."""
     speed = float(np.linalg.norm(v))
     if speed < STILL:
         return None
@@ -80,14 +79,14 @@ def phase_of(
     same: tuple[float, float] = (SAME_POSITION, SAME_VELOCITY),
 ) -> tuple[float, float] | None:
     """
-    Return the time within a motion at which the arm is [s], and at which rate it follows it.
+    Return the time within a motion that the arm is at [s], and the rate of its execution.
 
-    None where the motion does not pass so close to the reading, `same` [rad, rad/s].
+    None where the motion does not pass the reading within `same` [rad, rad/s].
     """
     n = max(2, int(running.duration / SEARCH_SPACING))
     times = np.linspace(0.0, running.duration, n)
     path, along, _ = sample(running, times)
-    # A motion that passes a place twice does so in another direction.
+    # A motion that passes a point twice does so in different directions.
     speed, pace = float(np.linalg.norm(v)), np.linalg.norm(along, axis=1)
     heading = along @ v / (pace * speed + 1e-300)
     gaps = np.linalg.norm(path - q, axis=1) + np.where(heading > 0.9, 0.0, np.inf)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic arm: it follows one motion exactly, brakes along its path, or stands still."""
+"""The kinematic arm: it executes a motion exactly, stops along its path, or stands still."""
 
 from dataclasses import dataclass, replace
 
@@ -13,9 +13,7 @@ from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Playback:
     """
-    What the arm does from some time on.
-
-    The motion is passed through at the rate `time_scale`.
+    The motion of the arm from some time on, executed at the rate `time_scale`.
 
     Parameters
     ----------
@@ -24,10 +22,10 @@ class Playback:
     start_time : float
         When the motion begins [s].
     before : Playback or None
-        What the arm does until then; None: it stands at the first point.
+        The motion until then; None: it stands at the first point.
     time_scale : float
         Seconds of the motion per second of the clock [-].
-    is_braking : bool
+    is_stopping : bool
         Whether the motion is a stop.
 
     """
@@ -36,11 +34,11 @@ class Playback:
     start_time: float
     time_scale: float
     before: 'Playback | None' = None
-    is_braking: bool = False
+    is_stopping: bool = False
 
     @property
     def end_time(self) -> float:
-        """When the arm stands still for good, at the latest [s]."""
+        """When the motion has ended [s]."""
         return self.start_time + self.trajectory.duration / self.time_scale
 
     def states_at(self, times: ArrayLike) -> tuple[Array, Array, Array]:
@@ -80,7 +78,7 @@ def standing(q: ArrayLike) -> Playback:
 
 
 def at_present(playback: Playback, time: float) -> Playback:
-    """Return what an arm does now, without a motion that only begins after a time [s]."""
+    """Return the present motion of an arm, without one that begins after a time [s]."""
     if playback.before is None:
         return playback
     return playback.before if time < playback.start_time else replace(playback, before=None)
@@ -88,10 +86,10 @@ def at_present(playback: Playback, time: float) -> Playback:
 
 def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     """
-    Return what the arm does when it brakes along its path from now on.
+    Return the motion of an arm that stops along its path from now on.
 
-    The stop is `fast_stop.fast_stop`, and holds what that holds. An arm that comes to rest by
-    itself as soon does that; one that brakes already goes on.
+    The stop is `fast_stop.fast_stop`, with the same limits. An arm that comes to rest by itself as
+    soon does that; one that is stopping already continues.
 
     Parameters
     ----------
@@ -103,11 +101,11 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
 
     """
     playback = at_present(playback, time)
-    if playback.is_braking or time >= playback.end_time:
+    if playback.is_stopping or time >= playback.end_time:
         return playback
     if time <= playback.start_time:
         return standing(playback.trajectory.positions[0])
-    # Kernels take a while to load, and an arm that only follows motions needs none.
+    # Kernels take a while to load, and only a stop needs them.
     from rrth_planner.timing.fast_stop import fast_stop
 
     scale = playback.time_scale
@@ -117,7 +115,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
         jerk=limits.jerk / scale**3,
     )
     phase = scale * (time - playback.start_time)
-    # Without the compiler numpy would warn of what a kernel takes for granted.
+    # Without the compiler numpy would warn in kernels.
     with np.errstate(all='ignore'):
-        braking = fast_stop(playback.trajectory, phase, in_motion, lead=0.0)
-    return replace(playback, trajectory=braking, start_time=time, is_braking=True)
+        stopping = fast_stop(playback.trajectory, phase, in_motion, lead=0.0)
+    return replace(playback, trajectory=stopping, start_time=time, is_stopping=True)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A run that is over: what the arm was told, where it was seen, and the wearer beside it."""
+"""A recorded run: the commanded motions, the measured joint states, and the wearer."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -15,21 +15,21 @@ from rrth_planner.model.errors import RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 
-# What the guard says while it brakes.
-BRAKING = 'brakes'
-# Diagnostics come a tenth of a second after what they tell of, and a little later still [s].
-TOLD_LATE = 0.3
+# The state of the monitor during a fail-safe stop.
+STOPPING = 'stopping'
+# Diagnostics lag the state that they report by a tenth of a second and more [s].
+DIAGNOSTICS_DELAY = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Told:
+class CommandedMotion:
     """
-    A motion that the arm was told.
+    A commanded motion.
 
     Parameters
     ----------
     begin : float
-        When it is to begin [s].
+        When it begins [s].
     trajectory : Trajectory
 
     """
@@ -46,17 +46,17 @@ class Recording:
     Parameters
     ----------
     times : array_like, shape (n,)
-        When the arm was seen, strictly increasing [s].
+        Of the joint states, strictly increasing [s].
     positions, velocities : array_like, shape (n, dof)
-        Where it was seen, and how it moved [rad, rad/s].
-    told : sequence of Told
+        Measured [rad, rad/s].
+    commanded : sequence of CommandedMotion
         By their begin.
     bodies : sequence of (float, Scene)
         From when [s] the wearer was like that, in the base frame.
     targets : sequence of (float, ndarray)
         From when [s] the target was where, (3,) in the base frame [m].
-    guard : sequence of (float, str)
-        From when [s] the guard of the motion did what.
+    monitor_states : sequence of (float, str)
+        From when [s] the monitor was in which state.
 
     Raises
     ------
@@ -68,10 +68,10 @@ class Recording:
     times: Array
     positions: Array
     velocities: Array
-    told: tuple[Told, ...] = ()
+    commanded: tuple[CommandedMotion, ...] = ()
     bodies: tuple[tuple[float, Scene], ...] = ()
     targets: tuple[tuple[float, Array], ...] = ()
-    guard: tuple[tuple[float, str], ...] = ()
+    monitor_states: tuple[tuple[float, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -88,12 +88,12 @@ class Recording:
 
 def section(recording: Recording, begin: float, end: float) -> Recording:
     """
-    Return what was seen from one time to another [s]; the zero of the clock stays.
+    Return the run from one time to another [s]; the zero of the clock stays.
 
     Raises
     ------
     RecordError
-        The arm was not seen then.
+        There are no joint states then.
 
     """
     chosen = (recording.times >= begin) & (recording.times <= end)
@@ -102,7 +102,7 @@ def section(recording: Recording, begin: float, end: float) -> Recording:
         first, last = recording.times[[0, -1]].round(2) + 0.0
         raise RecordError(
             f'from {begin:g} to {end:g}, expected times between {first:.2f} and {last:.2f}, when '
-            'the arm was seen [s]'
+            'joint states were recorded [s]'
         )
     return replace(
         recording,
@@ -112,18 +112,18 @@ def section(recording: Recording, begin: float, end: float) -> Recording:
     )
 
 
-def told_at(recording: Recording, times: Array) -> tuple[Array, Array]:
+def commanded_at(recording: Recording, times: Array) -> tuple[Array, Array]:
     """
-    Return where the arm was to be at some times, and how fast, (m,) [s] -> (m, dof) twice.
+    Return the commanded positions and velocities at some times, (m,) [s] -> (m, dof) twice.
 
-    NaN before it was told anything; at rest after the end of what it was told last.
+    NaN before the first commanded motion; at rest after the end of the last one.
     """
     q = np.full((len(times), recording.positions.shape[1]), np.nan)
     v = q.copy()
-    for i, told in enumerate(recording.told):
-        later = recording.told[i + 1].begin if i + 1 < len(recording.told) else np.inf
-        within = (times >= told.begin) & (times < later)
-        q[within], v[within], _ = sample(told.trajectory, times[within] - told.begin)
+    for i, motion in enumerate(recording.commanded):
+        later = recording.commanded[i + 1].begin if i + 1 < len(recording.commanded) else np.inf
+        within = (times >= motion.begin) & (times < later)
+        q[within], v[within], _ = sample(motion.trajectory, times[within] - motion.begin)
     return q, v
 
 
@@ -134,11 +134,11 @@ def at(changes: Sequence[tuple[float, Any]], time: float) -> Any:
     return changes[i - 1][1] if i else None
 
 
-def clearances_seen(recording: Recording, arm: ArmModel, ray_guard_length: float) -> Array:
+def measured_clearances(recording: Recording, arm: ArmModel, ray_guard_length: float) -> Array:
     """
-    Return how far the arm was from the wearer whenever it was seen, (n,) [m].
+    Return the clearance of the arm at each joint state, (n,) [m].
 
-    Signed: < 0 is inside a box. The guarded part of the pointing ray counts as arm. NaN where
+    Signed: < 0 is inside a box. The pointing ray up to `ray_guard_length` counts as arm. NaN where
     there was no wearer yet.
     """
     result = np.full(len(recording.times), np.nan)
@@ -152,12 +152,12 @@ def clearances_seen(recording: Recording, arm: ArmModel, ray_guard_length: float
     return result
 
 
-def brakes(recording: Recording) -> tuple[Told, ...]:
-    """Return the motions that were told to stop the arm: in motion, while the guard braked."""
-    since = [time for time, state in recording.guard if state == BRAKING]
+def commanded_stops(recording: Recording) -> tuple[CommandedMotion, ...]:
+    """Return the commanded stops: they begin in motion, while the monitor is stopping the arm."""
+    since = [time for time, state in recording.monitor_states if state == STOPPING]
     return tuple(
-        told
-        for told in recording.told
-        if np.abs(told.trajectory.velocities[0]).max() > REST_SPEED
-        and any(-TOLD_LATE <= time - told.begin <= TOLD_LATE for time in since)
+        motion
+        for motion in recording.commanded
+        if np.abs(motion.trajectory.velocities[0]).max() > REST_SPEED
+        and any(-DIAGNOSTICS_DELAY <= time - motion.begin <= DIAGNOSTICS_DELAY for time in since)
     )

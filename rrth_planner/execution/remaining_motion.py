@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is left of a motion that runs, held against the wearer as he is seen now."""
+"""Checks of the remaining motion against the present wearer."""
 
 from dataclasses import replace
 
@@ -23,33 +23,33 @@ from rrth_planner.model.trajectory import (
     Trajectory,
 )
 
-# Where one motion takes over from another their states are the same: positions, velocities and
-# accelerations to rounding [rad, rad/s, rad/s^2].
+# At a handover the states of both motions agree to rounding: positions, velocities and
+# accelerations [rad, rad/s, rad/s^2].
 SAME_STATE = 1e-11, 1e-9, 1e-6
 # Newton's steps to the time of that state; a square of a speed that counts as none [rad^2/s^2].
 REFINEMENTS, TINY = 3, 1e-12
 
 
-def taken_over(
+def with_lead_in(
     before: ExecutingMotion, phase: float, after: ExecutingMotion, now: float
 ) -> ExecutingMotion:
     """
-    Return a motion that begins a little later, with what the arm does until then before it.
+    Return a motion that begins a little later, preceded by the present motion until then.
 
     Parameters
     ----------
     before : ExecutingMotion
-        That the arm follows until then.
+        The motion until then.
     phase, now : float
-        The time within it that the arm has come to, and the time by which that is so [s].
+        The time within it that the arm is at now, and now [s].
     after : ExecutingMotion
-        That takes over; returned as it is where nothing is known of the way to it.
+        The next one; returned as it is where it does not continue `before`.
 
     """
     duration = before.trajectory.duration
     if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:
         return after
-    # By place, not by time: clocks differ by microseconds, and an arm may be slower than its
+    # By position, not by time: clocks differ by microseconds, and an arm may be slower than its
     # motion.
     first = after.trajectory.positions[0]
     end = before.near(min(phase + after.start_time - now, duration), first)
@@ -59,8 +59,8 @@ def taken_over(
     end = near_point(before.trajectory, end)
     if not phase < end <= duration or not _is_same_state(before.trajectory, end, after.trajectory):
         return after
-    way = part_of(before.trajectory, phase, end)
-    return replace(after, trajectory=joined(way, after.trajectory), start_time=now)
+    lead_in = part_of(before.trajectory, phase, end)
+    return replace(after, trajectory=joined(lead_in, after.trajectory), start_time=now)
 
 
 def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
@@ -72,7 +72,7 @@ def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
     )
 
 
-def is_still_free(
+def is_remaining_free(
     running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
@@ -82,13 +82,13 @@ def is_still_free(
     ray_guard_length: float,
 ) -> bool:
     """
-    Return whether what is left of a motion is proven free of the wearer as seen now.
+    Return whether the remaining motion is proven free of the present wearer.
 
     Parameters
     ----------
     running : ExecutingMotion
     phase : float
-        Time within the motion that it has come to [s].
+        Time within the motion that the arm is at [s].
     arm : ArmModel
     scene : Scene
         The wearer in the base frame.
@@ -103,10 +103,10 @@ def is_still_free(
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
         checked = running.escape_time
-    return _is_rest_free(running, checked, arm, scene, margin, ray_guard_length)
+    return _is_certified(running, checked, arm, scene, margin, ray_guard_length)
 
 
-def leads_away(
+def escapes_by_continuing(
     running: ExecutingMotion,
     phase: float,
     arm: ArmModel,
@@ -116,26 +116,26 @@ def leads_away(
     ray_guard_length: float,
 ) -> bool:
     """
-    Return whether the arm is too near to the wearer now, and proven to get away by going on.
+    Return whether the arm violates the margin now, and is proven to escape by continuing.
 
-    Then it gets no nearer to any box than it is, comes near no other, and ends clear of all of
-    them (`penetration.leads_out`), while an arm that brakes stays. Of a motion whose trouble lies
-    ahead this is False: a stop follows its path, and is never nearer than going on.
+    Then no clearance decreases below its present value or below the margin, and the motion ends
+    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
+    violation lies ahead this is False: a stop, along the same path, is never nearer to it.
 
     Parameters
     ----------
     running, phase, arm, scene, margin, ray_guard_length
-        As for `is_still_free`.
+        As for `is_remaining_free`.
 
     """
     trajectory = running.trajectory
     here = positions_at(trajectory, [phase])[0]
-    # Most often it is; an arm that is to be stopped waits for the answer.
+    # Most often it is, and a stop waits for the answer.
     if is_place_free(here, arm, scene, margin, ray_guard_length):
         return False
     world = arm_world(arm, scene, margin, ray_guard_length)
     return world.is_valid(
-        trajectory.positions[-1], max(ray_guard_length, running.reach)
+        trajectory.positions[-1], max(ray_guard_length, running.target_distance)
     ) and leads_out(trajectory, world, trajectory.duration, phase)
 
 
@@ -143,9 +143,9 @@ def is_place_free(
     q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
 ) -> bool:
     """
-    Return whether the arm is free at q, shape (dof,) [rad], whatever its joints' limits.
+    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
 
-    With the margin and with as much of the pointing ray as is to be clear of the wearer [m].
+    With the margin, and with the pointing ray up to `ray_guard_length` [m].
     """
     _, chain = arm_rows(arm, ray_guard_length)
     boxes, T_arm_base = scene.numbers, mount_inverse(arm)
@@ -157,7 +157,7 @@ def is_place_free(
     )
 
 
-def _is_rest_free(
+def _is_certified(
     running: ExecutingMotion,
     begin: float,
     arm: ArmModel,
@@ -165,11 +165,13 @@ def _is_rest_free(
     margin: float,
     ray_guard_length: float,
 ) -> bool:
-    """Return what `certify` says of the rest, and of the end with the ray it needs, in one go."""
+    """Return `certify` of the remaining motion, and of its end with the ray to the target."""
     trajectory = running.trajectory
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
+        return world.is_valid(
+            trajectory.positions[0], max(ray_guard_length, running.target_distance)
+        )
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_rest_free(
@@ -178,7 +180,7 @@ def _is_rest_free(
             trajectory.velocities,
             trajectory.accelerations,
             begin,
-            running.reach,
+            running.target_distance,
             FINENESS * RESOLUTION,
             chain,
             robot,

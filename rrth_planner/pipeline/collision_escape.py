@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The shortest way out for an arm that the wearer leaned into."""
+"""The shortest escape of an arm that is in a box of the wearer."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Rejection
 from rrth_planner.timing.lead_in import LeadIn
 from rrth_planner.timing.parameterization import parameterize
 
-# A way out is no longer than this [rad or m], and is looked for in so many random directions.
+# The longest escape [rad or m], and the number of random directions tried.
 LONGEST, N_DIRECTIONS = 1.5, 48
-# Spacing of the looks for the end of a way, and how often it is then halved [rad].
-LOOK, HALVINGS = 0.03, 6
-# Rounds of pushing the arm out, and of the solution of each of them.
+# Spacing of the search for the end of an escape [rad], and how often it is then halved.
+SPACING, HALVINGS = 0.03, 6
+# Rounds of the sequential program, and sweeps of each solution.
 N_ROUNDS, N_SWEEPS = 12, 200
 # Pairs of a bar and a box that are further apart do not push [m].
 NEAR = 0.05
@@ -30,14 +30,14 @@ STEP = 1e-6
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Escape:
     """
-    A straight motion out of the boxes.
+    A straight motion out of boxes grown by the margin.
 
     Parameters
     ----------
     trajectory : Trajectory
-        From rest at the start to rest where the arm is out.
+        From rest at the start to rest clear of the boxes.
     sentence : str
-        Which boxes it leaves, and how deep the arm was in them.
+        The boxes, and the penetration depths at the start.
 
     """
 
@@ -46,16 +46,16 @@ class Escape:
 
     @property
     def q_end(self) -> Array:
-        """Where the arm is out, shape (dof,) [rad]."""
+        """The clear end, shape (dof,) [rad]."""
         q: Array = self.trajectory.positions[-1]
         return q
 
-    def lead(self, limits: MotionLimits) -> LeadIn:
-        """Return it as what comes before the path."""
+    def lead_in(self, limits: MotionLimits) -> LeadIn:
+        """Return it as the lead-in of a path."""
         return LeadIn(trajectory=self.trajectory, speed=0.0, q_stop=self.q_end, allowed=limits)
 
 
-def way_out(
+def plan_escape(
     world: World,
     q_start: Array,
     limits: MotionLimits,
@@ -65,9 +65,9 @@ def way_out(
     escape_depth: float,
     seed: int,
     should_stop: Callable[[], bool],
-) -> Escape | Refusal:
+) -> Escape | Rejection:
     """
-    Return the shortest straight motion found that is proven to lead out, or why there is none.
+    Return the shortest straight escape found that is proven, or why there is none.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def way_out(
     spares : tuple of float
         Clearance beyond the margin to end with; the next where there is no room for one [m].
     escape_depth : float
-        Deeper in a box there is no way out [m].
+        From this penetration depth on there is no escape [m].
     seed : int
         Of the random directions.
     should_stop : callable
@@ -91,16 +91,16 @@ def way_out(
     depths = box_depths(world, q_start)
     sentence = depth_sentence(world, depths, margin)
     if not max(0.0, float(depths.max())) < escape_depth:
-        return Refusal(
+        return Rejection(
             PlanStatus.START_IN_COLLISION,
             f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
         )
     for spare in spares:
         roomy, rng = grown(world, spare), np.random.default_rng(seed)
         best, longest = None, LONGEST
-        # What pushes the arm out directly is mostly the shortest way.
-        for look in (_pushed, _scattered):
-            tries = list(look(roomy, q_start, spare, longest, rng, should_stop))
+        # The direct solution is mostly the shortest escape.
+        for search in (_pushed, _scattered):
+            tries = list(search(roomy, q_start, spare, longest, rng, should_stop))
             if should_stop():
                 return CANCELLED
             for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
@@ -111,25 +111,25 @@ def way_out(
                     best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
                     break
         if best is not None:
-            return Escape(trajectory=best, sentence=_said(world, depths, spares[-1]))
-    return Refusal(
+            return Escape(trajectory=best, sentence=_escape_sentence(world, depths, spares[-1]))
+    return Rejection(
         PlanStatus.START_IN_COLLISION,
-        f'{sentence}, and no straight way out of it is proven free; expected a start clear of '
-        'the wearer',
+        f'{sentence}, and no straight escape is proven free; expected a start clear of the wearer',
     )
 
 
-def _said(world: World, depths: Array, hair: float) -> str:
-    """Say which boxes the arm leaves, the one it is deepest in first."""
+def _escape_sentence(world: World, depths: Array, hair: float) -> str:
+    """Return the boxes with their penetration depths as a sentence, the deepest first."""
     parts = []
     for box in np.argsort(-depths.max(axis=0)).tolist():
         bar = int(np.argmax(depths[:, box]))
         if depths[bar, box] > -hair:
             depth = max(0.0, float(depths[bar, box]))
             parts.append(
-                f'box "{world.box_names[box]}", {depth:.4f} m deep at {world.bar_names[bar]}'
+                f'box "{world.box_names[box]}", penetration depth {depth:.4f} m at '
+                f'{world.bar_names[bar]}'
             )
-    return f'first leaves {" and ".join(parts)}'
+    return f'escape from {" and ".join(parts)}'
 
 
 def _pushed(
@@ -141,7 +141,7 @@ def _pushed(
     should_stop: Callable[[], bool],
 ) -> Iterator[Array]:
     """
-    Yield where the boxes push the arm: to the nearest configuration that is free of all of them.
+    Yield the nearest configurations that are free of all boxes.
 
     Sequential quadratic programming: the depths are taken as linear where the arm has come to, and
     of the configurations that are then free the one nearest to the start is next.
@@ -150,10 +150,10 @@ def _pushed(
     for _ in range(N_ROUNDS):
         if should_stop():
             break
-        depths, slopes = _slopes(roomy, q)
+        depths, gradients = _gradients(roomy, q)
         is_near = depths > -NEAR
-        G, s = slopes[is_near], depths[is_near] + 1e-6 + 0.01 * spare
-        # Rows g x <= b for the way x from the start: the depths, and the limits of the joints.
+        G, s = gradients[is_near], depths[is_near] + 1e-6 + 0.01 * spare
+        # Rows g x <= b of the displacement x from the start: the depths, and the joint limits.
         rows = np.concatenate([G, np.eye(len(q)), -np.eye(len(q))])
         bounds = np.concatenate(
             [G @ (q - q_start) - s, roomy.bounds[1] - q_start, q_start - roomy.bounds[0]]
@@ -166,8 +166,8 @@ def _pushed(
             yield q
 
 
-def _slopes(world: World, q: Array) -> tuple[Array, Array]:
-    """Return the depths of all pairs, (n,) [m], and by each joint their slopes, (n, dof)."""
+def _gradients(world: World, q: Array) -> tuple[Array, Array]:
+    """Return the depths of all pairs, (n,) [m], and their gradients, (n, dof)."""
     steps = STEP * np.eye(len(q))
     depths = box_depths(world, np.concatenate([q[None], q + steps, q - steps]))
     flat = depths.reshape(len(depths), -1)
@@ -206,11 +206,11 @@ def _scattered(
         if should_stop():
             break
         u = direction / np.linalg.norm(direction)
-        for far in np.arange(LOOK, longest, LOOK).tolist():
+        for far in np.arange(SPACING, longest, SPACING).tolist():
             if not roomy.is_in_bounds(q_start + far * u):
                 break
             if roomy.is_valid(q_start + far * u):
-                near = far - LOOK
+                near = far - SPACING
                 for _ in range(HALVINGS):
                     middle = 0.5 * (near + far)
                     if roomy.is_valid(q_start + middle * u):

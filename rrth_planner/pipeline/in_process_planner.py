@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What `PlanningProcess` does, done by whoever asks for it."""
+"""`PlanningProcess` without a process: the caller plans."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,9 +20,9 @@ class InProcessPlanner:
     violation_seen = staticmethod(violation_seen)
 
     def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
-        """Have everything compiled and loaded for an arm and options."""
+        """Compile and load everything for an arm and options."""
         warm_up(arm, options)
-        # What was loaded lives as long as the process: the collector need not look at it again.
+        # Loaded objects live as long as the process: the collector skips them.
         gc.collect()
         gc.freeze()
 

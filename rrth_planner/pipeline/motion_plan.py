@@ -20,7 +20,7 @@ class MotionPlan:
     ----------
     status : PlanStatus
     sentence : str
-        What happened, with figures and units, for the caller.
+        The result, with figures and units, for the caller.
     seed : int
         Seed that was used; the same seed and inputs give the same trajectory to the bit.
     planning_time : float
@@ -30,14 +30,14 @@ class MotionPlan:
     trajectory : Trajectory or None
         From rest to rest, certified; None unless solved.
     clearance : float
-        Least distance of the arm and of the guarded ray from the wearer [m], once out of the
-        boxes that it was in; NaN unless solved.
-    reach : float
+        Least one of the arm and of the ray up to `ray_guard_length` [m], after an escape; NaN
+        unless solved.
+    target_distance : float
         Distance from the tool to the target at the end [m]; NaN unless solved.
     disagreement : Disagreement or None
-        The motion that the two judges disagree about, where that is why there is none.
+        The motion that the two checkers disagree about, where that is the reason.
     escape_time : float
-        Until then the trajectory leads out of boxes that the arm was in [s]; 0: it was in none.
+        Until then the trajectory escapes from boxes [s]; 0: it starts in none.
     search : PlanResult or None
         How the path was found: the first path, the trees; None unless solved.
 
@@ -50,7 +50,7 @@ class MotionPlan:
     path: Path | None = None
     trajectory: Trajectory | None = None
     clearance: float = float('nan')
-    reach: float = float('nan')
+    target_distance: float = float('nan')
     disagreement: Disagreement | None = None
     escape_time: float = 0.0
     search: PlanResult | None = None

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The straight line from a scene and a target to a certified trajectory."""
+"""From a scene and a target to a certified trajectory."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -21,16 +21,16 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.pipeline.collision_escape import Escape, way_out
+from rrth_planner.pipeline.collision_escape import Escape, plan_escape
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_path import find_path, SPARES
 from rrth_planner.pipeline.rejection import (
     CANCELLED,
     depth_sentence,
-    lead_refusal,
-    Refusal,
-    start_refusal,
-    target_refusal,
+    lead_rejection,
+    Rejection,
+    start_rejection,
+    target_rejection,
     within_limits,
 )
 from rrth_planner.pipeline.time_path import time_path
@@ -39,7 +39,7 @@ from rrth_planner.planning.planner import PlanResult
 from rrth_planner.planning.pointing_goals import check_pointing_arm
 from rrth_planner.timing.lead_in import lead_in, LeadIn, stop_first
 
-# A wearer who holds still makes the same world from plan to plan.
+# A wearer at rest makes the same world from plan to plan.
 _world_of = functools.lru_cache(maxsize=8)(arm_world)
 
 
@@ -76,35 +76,35 @@ def plan_motion(
     margin : float
         Clearance kept from every box [m].
     ray_guard_length : float
-        How much of the pointing ray is kept clear in motion [m]; at the end, all of it.
+        Length of the pointing ray kept clear in motion [m]; at the end, up to the target.
     seed : int
         >= 0.
     should_stop : callable
         Polled while planning; True cancels.
     moving : StartState, optional
-        How the arm moves at q_start; without, it is at rest. The motion then begins with this
-        state: the arm goes on straight ahead, no further than it needs to stop, and turns off; or,
-        where there is no room for that, it stops along its present motion first.
+        State of a moving arm at q_start; without, it is at rest. The motion then begins with this
+        state: the arm continues straight ahead, no further than it needs to stop, and blends
+        into the path; or, where there is no room for that, it stops along its present motion.
     escape_depth : float
-        An arm at rest that is less deep in the boxes grown by the margin first leaves them by the
-        shortest way [m]; 0: it never does. The depth is by how much a box would have to be
-        smaller on every side.
+        An arm at rest with a smaller penetration depth in the boxes grown by the margin escapes
+        first [m]; 0: never. The depth is by how much a box would have to be smaller on every
+        side.
 
     """
     begin = time.perf_counter()
     q_start = within_limits(arm, q_start)
     world = _world_of(arm, scene, margin, ray_guard_length)
     escape, disagreement = None, None
-    leads: Iterable[LeadIn | None | Refusal] = (None,)
-    refusal = start_refusal(arm, grown(world, SPARES[-1]), q_start)
-    if refusal is not None and refusal.status is PlanStatus.START_IN_COLLISION:
+    leads: Iterable[LeadIn | None | Rejection] = (None,)
+    rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
+    if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION:
         if moving is not None:
-            said = depth_sentence(world, box_depths(world, q_start), margin)
-            refusal = replace(
-                refusal, sentence=f'{said}, expected an arm that is at rest or clear'
+            sentence = depth_sentence(world, box_depths(world, q_start), margin)
+            rejection = replace(
+                rejection, sentence=f'{sentence}, expected an arm at rest or clear of it'
             )
         else:
-            out = way_out(
+            out = plan_escape(
                 world,
                 q_start,
                 limits,
@@ -115,22 +115,22 @@ def plan_motion(
                 should_stop=should_stop,
             )
             if isinstance(out, Escape):
-                refusal, escape = None, out
-                leads = (out.lead(limits),)
+                rejection, escape = None, out
+                leads = (out.lead_in(limits),)
             else:
-                refusal = out
-    if refusal is None:
-        refusal = CANCELLED if should_stop() else target_refusal(scene, goal, margin)
+                rejection = out
+    if rejection is None:
+        rejection = CANCELLED if should_stop() else target_rejection(scene, goal, margin)
     if moving is not None:
         leads = _leads(arm, world, moving, limits)
-    for lead in leads if refusal is None else ():
-        if isinstance(lead, Refusal):
-            refusal = lead
+    for lead in leads if rejection is None else ():
+        if isinstance(lead, Rejection):
+            rejection = lead
             break
         q_from = q_start if lead is None else lead.q_stop
         found = find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
-        if isinstance(found, Refusal):
-            refusal = found
+        if isinstance(found, Rejection):
+            rejection = found
             break
         assert found.path is not None
         timed = time_path(
@@ -140,15 +140,15 @@ def plan_motion(
             return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
         if isinstance(timed, Disagreement):
             disagreement = timed
-            refusal = Refusal(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
+            rejection = Rejection(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
             break
-        refusal = timed
-        if refusal.status is not PlanStatus.START_MOVES:
+        rejection = timed
+        if rejection.status is not PlanStatus.START_MOVES:
             break
-    assert refusal is not None
+    assert rejection is not None
     return MotionPlan(
-        status=refusal.status,
-        sentence=f'{refusal.sentence}, seed {seed}',
+        status=rejection.status,
+        sentence=f'{rejection.sentence}, seed {seed}',
         seed=seed,
         planning_time=time.perf_counter() - begin,
         disagreement=disagreement,
@@ -187,22 +187,22 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
 
 def _leads(
     arm: ArmModel, world: World, moving: StartState, limits: MotionLimits
-) -> Iterator[LeadIn | Refusal]:
+) -> Iterator[LeadIn | Rejection]:
     """
-    Yield what an arm in motion may do first: go straight on, or stop along its present motion.
+    Yield the lead-ins of an arm in motion: straight ahead, or a stop along its present motion.
 
-    The last of these is why it can do neither.
+    Where neither is possible, yield the rejection.
     """
     straight = lead_in(moving.state, limits)
-    refusal = lead_refusal(arm, world, straight, limits)
-    if refusal is None:
+    rejection = lead_rejection(arm, world, straight, limits)
+    if rejection is None:
         # Rounding may have put a joint past its limit.
         yield replace(straight, q_stop=np.clip(straight.q_stop, *arm.bounds))
     stop = stop_first(moving, limits)
     if stop is not None and certify(stop.trajectory, world).is_proven:
         yield replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
-    elif refusal is not None:
-        yield refusal
+    elif rejection is not None:
+        yield rejection
 
 
 def _solved(
@@ -222,7 +222,7 @@ def _solved(
     escape_time = 0.0 if escape is None else escape.trajectory.duration
     clearance = least_clearance(trajectory, grown(world, -margin), escape_time)
     planning_time = time.perf_counter() - begin
-    note = '' if result.is_reproducible else '; the clock ended the improvement'
+    note = '' if result.is_reproducible else '; improvement ended by the time limit'
     if escape is not None:
         q_start = trajectory.positions[:1]
         path = Path(np.concatenate([q_start, path.waypoints]))
@@ -239,7 +239,7 @@ def _solved(
         path=path,
         trajectory=trajectory,
         clearance=clearance,
-        reach=reach_to(arm, goal.target, path.waypoints[-1]),
+        target_distance=reach_to(arm, goal.target, path.waypoints[-1]),
         escape_time=escape_time,
         search=result,
     )

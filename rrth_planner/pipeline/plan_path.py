@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a wearer and a target to a path: with as much clearance to spare as there is room for."""
+"""From a wearer and a target to a path, with spare clearance where there is room."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +12,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.pipeline.rejection import CANCELLED, goal_refusal, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, goal_rejection, Rejection
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan, PlanResult
 from rrth_planner.planning.pointing_goals import (
@@ -23,8 +23,8 @@ from rrth_planner.planning.pointing_goals import (
     pointing_problem,
 )
 
-# Clearance that the path is planned with on top of the margin, for its rounded corners to spend;
-# in a tight place, next to none [m].
+# Clearance beyond the margin that the path is planned with, for its blends; in a narrow passage,
+# next to none [m].
 SPARES = (5e-3, 1e-5)
 
 
@@ -37,7 +37,7 @@ def find_path(
     seed: int,
     should_stop: Callable[[], bool],
     begin: float,
-) -> PlanResult | Refusal:
+) -> PlanResult | Rejection:
     """
     Return the shortest path found, or why there is none.
 
@@ -62,7 +62,7 @@ def find_path(
     n_samples, is_clocked = 0, False
     for spare in (*SPARES, 0.0):
         roomy = grown(world, spare)
-        # Without any to spare only where the start has none: an arm that was in motion.
+        # Without spare clearance only where the start has none: an arm that was in motion.
         if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
             continue
         goals = goal_configurations(arm, goal, roomy, q_start, FEW)
@@ -70,7 +70,7 @@ def find_path(
             goals = goal_configurations(arm, goal, roomy, q_start, MANY)
         if len(goals.q_goals) == 0:
             continue
-        # Half of the time for the roomy way, so that the tight one has its chance.
+        # Half of the time for the wide search, the rest for the narrow one.
         share = 0.5 if spare == SPARES[0] else 1.0
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
         problem = pointing_problem(arm, goal, roomy, q_start, goals)
@@ -81,15 +81,15 @@ def find_path(
         if result.status in (PlanStatus.SOLVED, PlanStatus.CANCELLED):
             break
     if result is None:
-        # The start keeps the smallest spare, so the goals were asked for.
+        # The start has the smallest spare clearance, so the goals were computed.
         assert goals is not None
-        return goal_refusal(world, goals)
+        return goal_rejection(world, goals)
     if result.status is PlanStatus.SOLVED:
         return replace(result, is_reproducible=result.is_reproducible and not is_clocked)
     elapsed = time.perf_counter() - begin
     sentence = {
         PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',
         PlanStatus.CANCELLED: CANCELLED.sentence,
-        PlanStatus.SAMPLE_LIMIT: 'the free postures that aim at the target were not reached',
+        PlanStatus.SAMPLE_LIMIT: 'no free goal configuration was reached',
     }[result.status]
-    return Refusal(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')
+    return Rejection(result.status, f'{sentence} ({n_samples} samples, {elapsed * 1e3:.0f} ms)')

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Planning in a process of its own, whose interpreter nobody else has to wait for."""
+"""Planning in a process of its own, with an interpreter of its own."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -23,14 +23,14 @@ from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import TreeOptions
 
-# How often a caller is asked whether its plan is still wanted [s].
+# Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
 # Of the arrays in a message [bytes].
 ALIGNMENT = 16
 # A process that has not ended by itself after this time is killed [s].
 LONGEST_END = 5.0
 WORKER = 'rrth_planner.pipeline.planning_worker'
-# Sent while the process works: what it works at is not wanted any more.
+# Sent while the process works, to cancel that.
 STOP = None
 
 
@@ -39,19 +39,19 @@ class PlanningProcessError(RrthError):
 
 
 class PlanningTraceback(Exception):
-    """Where in the planning process an error was raised: the cause of the same error here."""
+    """The traceback in the planning process, as the cause of the same error here."""
 
 
 @dataclass(frozen=True, slots=True)
 class Raised:
-    """An error instead of an answer, and where it was raised."""
+    """An error instead of an answer, with its traceback."""
 
     problem: Exception
     where: str
 
 
 class Planner(Protocol):
-    """Who plans and asks the second collision checker, in this process or in another one."""
+    """Plans, and runs the second collision checker, in this process or in another one."""
 
     def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
         """Return once plans with an arm and options need no time to load."""
@@ -68,29 +68,29 @@ class Planner(Protocol):
         trajectory: Trajectory,
         margin: float,
         ray_guard_length: float,
-        reach: float,
+        target_distance: float,
         escape_time: float = 0.0,
     ) -> Violation | None:
         """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
 
     def close(self) -> None:
-        """End what it has begun."""
+        """Release its resources."""
 
 
 class PlanningProcess:
     """
-    Plans, and asks the second collision checker, in a process of its own.
+    Plans, and runs the second collision checker, in a process of its own.
 
-    It starts at once and ends with this one, however this one ends. Where it dies it is started
-    again. For one caller at a time.
+    It starts at once, ends with this one in any case, and is restarted after it died. For one
+    caller at a time.
 
     Parameters
     ----------
     arm : ArmModel
     options : TreeOptions
-        What is to be ready: the kernels are loaded for them.
+        The kernels are loaded for these.
     on_death : callable
-        Called with a sentence when it was found dead.
+        Called with a sentence after it died.
 
     """
 
@@ -134,7 +134,7 @@ class PlanningProcess:
         Raises
         ------
         PlanningProcessError
-            It died over this question; the next one finds another process.
+            It died on this question; the next one gets another process.
 
         """
         answer: MotionPlan = self._ask('plan', question, should_stop=should_stop)
@@ -147,7 +147,7 @@ class PlanningProcess:
         trajectory: Trajectory,
         margin: float,
         ray_guard_length: float,
-        reach: float,
+        target_distance: float,
         escape_time: float = 0.0,
     ) -> Violation | None:
         """
@@ -156,11 +156,18 @@ class PlanningProcess:
         Raises
         ------
         PlanningProcessError
-            It died over this motion.
+            It died on this motion.
 
         """
         answer: Violation | None = self._ask(
-            'violation_seen', arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
+            'violation_seen',
+            arm,
+            scene,
+            trajectory,
+            margin,
+            ray_guard_length,
+            target_distance,
+            escape_time,
         )
         return answer
 
@@ -180,12 +187,12 @@ class PlanningProcess:
 
     def _start(self) -> None:
         self._line, end = Pipe()
-        # Ctrl-C is for all processes of a terminal; this one, which begins with the mask of its
-        # parent, ends with who asks it. A session of its own would have a share of the processors
-        # of its own, too, and may starve beside its parent's.
+        # Ctrl-C is sent to all processes of a terminal; this one, which inherits the signal mask,
+        # ends with its parent instead. In a session of its own it would be scheduled apart from
+        # its parent, and could starve.
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            # Not by `multiprocessing`, which would run the script again that this process runs.
+            # Not by `multiprocessing`, which would import the main script again.
             self._process = subprocess.Popen(
                 [sys.executable, '-m', WORKER, str(end.fileno())],
                 stdin=subprocess.DEVNULL,
@@ -199,7 +206,7 @@ class PlanningProcess:
         self._begin('warm_up', *self._warm_up)
 
     def _require_ready(self) -> None:
-        """Wait for the end of the warm-up, if that has not been waited for yet."""
+        """Wait for the end of the warm-up, unless it has ended."""
         if self._is_busy:
             self._end(lambda: False)
 
@@ -207,19 +214,19 @@ class PlanningProcess:
         self, name: str, *arguments: Any, should_stop: Callable[[], bool] = lambda: False
     ) -> Any:
         if self._process.poll() is not None:
-            self._restart('while it had nothing to do')
+            self._restart('while idle')
         self._require_ready()
         self._begin(name, *arguments)
         return self._end(should_stop)
 
     def _begin(self, name: str, *arguments: Any) -> None:
         self._is_busy = True
-        # One that has died is found out when its answer is waited for.
+        # A dead process is detected while waiting for the answer.
         with suppress(OSError):
             send(self._line, (name, arguments))
 
     def _end(self, should_stop: Callable[[], bool]) -> Any:
-        """Return the answer to what was asked last, or raise what it raised."""
+        """Return the answer to the last call, or raise its error."""
         is_stopped = False
         try:
             while not self._line.poll(POLL_PERIOD):
@@ -228,14 +235,14 @@ class PlanningProcess:
                     send(self._line, STOP)
             answer = receive(self._line)
         except (EOFError, OSError) as problem:
-            raise PlanningProcessError(self._restart('while it worked')) from problem
+            raise PlanningProcessError(self._restart('while working')) from problem
         self._is_busy = False
         if isinstance(answer, Raised):
             raise answer.problem from PlanningTraceback(answer.where)
         return answer
 
     def _restart(self, when: str) -> str:
-        """Start another process in place of one that has died; return what is said of that."""
+        """Replace a process that has died; return the sentence for the log."""
         self._line.close()
         try:
             code = self._process.wait(LONGEST_END)
@@ -257,7 +264,7 @@ def send(line: Connection, value: Any) -> None:
     head = np.array([len(parts), *sizes], dtype=np.int64).tobytes()
     # Compiled code takes aligned arrays only.
     padded = (bytes(part) + bytes(-len(part) % ALIGNMENT) for part in (head, *parts))
-    # At once: each call gives up the interpreter, which has to be waited for afterwards.
+    # In one call: each one releases the interpreter, and waits for it again.
     line.send_bytes(b''.join(padded))
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The process that `PlanningProcess` starts: it plans for who started it, and ends with that."""
+"""The process that `PlanningProcess` starts: it plans for its parent, and ends with it."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -19,12 +19,12 @@ from rrth_planner.pipeline.request import PlanQuestion
 
 
 def main() -> None:
-    """Answer what comes by the file descriptor that is named, until nobody is left to ask."""
-    _stand_back()
+    """Serve the connection of the given file descriptor until it is closed."""
+    _lower_priority()
     line, planner = Connection(int(sys.argv[1])), InProcessPlanner()
 
     def plan(question: PlanQuestion) -> MotionPlan:
-        # Whatever comes meanwhile is a STOP, or the end of who asked.
+        # Anything received meanwhile is a STOP, or the end of the parent.
         return planner.plan(question, line.poll)
 
     work: dict[str, Callable[..., Any]] = {
@@ -36,12 +36,12 @@ def main() -> None:
 
 
 def serve(line: Connection, work: Mapping[str, Callable[..., Any]]) -> None:
-    """Do the work that is asked for by its name, one after the other."""
+    """Serve requests, functions by their names, one after the other."""
     while True:
         try:
             request = receive(line)
             if request is STOP:
-                # It came after the answer.
+                # It came after the answer was sent.
                 continue
             name, arguments = request
             try:
@@ -63,15 +63,15 @@ def _portable(problem: Exception) -> Raised:
     return Raised(problem, where)
 
 
-def _stand_back() -> None:
+def _lower_priority() -> None:
     """
-    Let who asks go before this process, where the system runs them in real time.
+    Lower the real-time priority, if any, below that of the parent.
 
-    Among equals this one would keep its processor until it sleeps, whoever else wakes up.
+    At equal priority this process would keep its processor until it sleeps.
     """
     if not hasattr(os, 'sched_setparam'):
         return
-    # A system that forbids it leaves all as it is.
+    # Without the permission the priority stays.
     with suppress(OSError):
         priority = os.sched_getparam(0).sched_priority
         if priority > 1:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Why a request cannot be planned: the part of the arm, the box, and by how much."""
+"""Reasons of rejected requests: the part of the arm, the box, and by how much."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -20,14 +20,14 @@ from rrth_planner.timing.lead_in import LeadIn
 
 # A joint this far beyond its limit is at it [rad, m].
 ROUNDING = 1e-6
-# A joint that moves faster than its limit by no more than this share is let pass.
+# A joint may move faster than its limit by this share.
 EXCESS = 0.005
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class Rejection:
     """
-    A request that ends without a motion.
+    The reason of a request without a motion.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Refusal:
     sentence: str
 
 
-CANCELLED = Refusal(PlanStatus.CANCELLED, 'the plan was cancelled')
+CANCELLED = Rejection(PlanStatus.CANCELLED, 'the plan was cancelled')
 
 
 def within_limits(arm: ArmModel, q: Array) -> Array:
@@ -50,7 +50,7 @@ def within_limits(arm: ArmModel, q: Array) -> Array:
     return near if float(np.abs(near - q).max()) <= ROUNDING else q
 
 
-def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None:
+def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | None:
     """
     Return why no motion can start at q_start, or None.
 
@@ -58,7 +58,7 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None
     ----------
     arm : ArmModel
     world : World
-        Its boxes grown by the margin and what must be left beyond it.
+        Its boxes grown by the margin and the least clearance beyond it.
     q_start : ndarray, shape (dof,)
         [rad].
 
@@ -67,18 +67,18 @@ def start_refusal(arm: ArmModel, world: World, q_start: Array) -> Refusal | None
         low, high = arm.bounds[:, k]
         if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
             unit = 'm' if arm.is_prismatic[k] else 'rad'
-            return Refusal(
+            return Rejection(
                 PlanStatus.START_OUT_OF_BOUNDS,
                 f'{name} is at {q_start[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}',
             )
     if world.is_valid(q_start):
         return None
-    return Refusal(PlanStatus.START_IN_COLLISION, 'the arm touches the wearer')
+    return Rejection(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
 
 
 def depth_sentence(world: World, depths: Array, margin: float) -> str:
     """
-    Say which part of the arm is deepest in which box, and how deep.
+    Return which part of the arm is deepest in which box, and how deep, as a sentence.
 
     Parameters
     ----------
@@ -98,19 +98,19 @@ def depth_sentence(world: World, depths: Array, margin: float) -> str:
         where = f'{-distance:.4f} m inside box "{name}"'
     else:
         where = f'about {distance:.4f} m, less than the margin of {margin:g} m, from box "{name}"'
-    return f'{part} is {where}: {depth:.4f} m deep in it with its margin'
+    return f'{part} is {where}: penetration depth {depth:.4f} m including the margin'
 
 
-def lead_refusal(
+def lead_rejection(
     arm: ArmModel, world: World, lead: LeadIn, limits: MotionLimits
-) -> Refusal | None:
-    """Return why an arm that moves cannot go straight on until it could rest, or None."""
+) -> Rejection | None:
+    """Return why a moving arm cannot continue straight ahead until it stops, or None."""
     fastest = np.abs(lead.trajectory.velocities) / limits.velocity
     k = int(fastest.max(axis=0).argmax())
     if fastest[:, k].max() > 1.0 + EXCESS:
         speed = np.abs(lead.trajectory.velocities[:, k]).max()
         unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves at up to {speed:.3f} {unit}, expected at most '
             f'{limits.velocity[k]:g} {unit} or an arm at rest',
@@ -121,7 +121,7 @@ def lead_refusal(
     k = int(beyond.argmax())
     if beyond[k] > ROUNDING:
         unit = 'm' if arm.is_prismatic[k] else 'rad'
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
             f'{arm.joint_names[k]} moves too fast to stop straight ahead: it would pass its '
             f'limit by {beyond[k]:.4f} {unit}, expected an arm at rest or further from it',
@@ -131,45 +131,47 @@ def lead_refusal(
         np.clip(lead.trajectory.positions[-1], low, high), np.clip(lead.q_stop, low, high)
     ):
         return None
-    return Refusal(
+    return Rejection(
         PlanStatus.START_MOVES,
-        'the arm moves, and straight ahead it would touch the wearer before it could stop; '
+        'the arm moves, and straight ahead it would violate the margin before it could stop; '
         'expected an arm at rest or one with room ahead',
     )
 
 
-def target_refusal(scene: Scene, goal: PointingGoal, margin: float) -> Refusal | None:
-    """Return why a target cannot be pointed at from anywhere, or None."""
+def target_rejection(scene: Scene, goal: PointingGoal, margin: float) -> Rejection | None:
+    """Return why no configuration may point at a target, or None."""
     where = ', '.join(f'{value:.3f}' for value in goal.target)
     for box in scene.boxes:
         local = (goal.target - box.center) @ box.rotation
         excess = float((np.abs(local) - 0.5 * box.size).max())
         if excess <= 0.0:
-            return Refusal(
+            return Rejection(
                 PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is inside box "{box.name}", {-excess:.4f} m deep',
+                f'the target ({where}) m is inside box "{box.name}", penetration depth '
+                f'{-excess:.4f} m',
             )
         if excess <= margin:
-            return Refusal(
+            return Rejection(
                 PlanStatus.GOAL_IN_COLLISION,
                 f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
-                f'margin of {margin:g} m: {margin - excess:.4f} m deep in it with its margin',
+                f'margin of {margin:g} m: penetration depth {margin - excess:.4f} m including the '
+                'margin',
             )
     return None
 
 
-def goal_refusal(world: World, goals: GoalSet) -> Refusal:
-    """Return why no posture that aims at the target will do."""
+def goal_rejection(world: World, goals: GoalSet) -> Rejection:
+    """Return why no configuration that points at the target is valid."""
     if goals.n_aiming == 0:
-        return Refusal(
+        return Rejection(
             PlanStatus.GOAL_UNREACHABLE,
-            'no posture within the joint limits aims at the target',
+            'no configuration within the joint limits points at the target',
         )
     pairs: Counter[tuple[str, str]] = Counter()
     least: dict[tuple[str, str], float] = {}
     reaches = np.maximum(goals.blocked_reaches, world.ray_length)
     for depths in box_depths(world, goals.q_blocked, reaches):
-        # A link may be two bars: it counts once.
+        # A link of two bars counts once.
         found: dict[tuple[str, str], float] = {}
         for bar, box in np.argwhere(depths > 0.0):
             pair = (world.bar_names[bar], world.box_names[box])
@@ -182,10 +184,10 @@ def goal_refusal(world: World, goals: GoalSet) -> Refusal:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
         blame = (
-            f'most often {bar} and box "{box}" ({share:.0f} %), at least {least[bar, box]:.4f} m '
-            'deep in it with its margin'
+            f'most often {bar} and box "{box}" ({share:.0f} %), penetration depth '
+            f'at least {least[bar, box]:.4f} m including the margin'
         )
-    return Refusal(
+    return Rejection(
         PlanStatus.GOAL_IN_COLLISION,
-        f'all {goals.n_aiming} postures tried that aim at the target touch the wearer, {blame}',
+        f'all {goals.n_aiming} goal configurations tried violate the margin, {blame}',
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a plan begins with, in one value: asked again, it has the same answer."""
+"""All inputs of a plan in one value: the same question has the same answer."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -18,7 +18,7 @@ from rrth_planner.planning.options import TreeOptions
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanQuestion:
     """
-    The arguments of `pipeline.plan_motion` that decide about its answer, by their names.
+    The arguments of `pipeline.plan_motion` that determine its result, by name.
 
     Parameters
     ----------

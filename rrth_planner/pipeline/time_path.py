@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a path to a motion in time that both judges agree about."""
+"""From a path to a trajectory that both collision checkers find free."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -18,17 +18,17 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape
-from rrth_planner.pipeline.rejection import CANCELLED, Refusal
+from rrth_planner.pipeline.rejection import CANCELLED, Rejection
 from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.lead_in import LeadIn, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
 
-# Rounded corners are proven with this on top of the margin, so that the timed curve, whose proof
-# has other intervals, does not fail for a hair [m].
+# Blends are proven with this beyond the margin, so that the timed curve, whose proof has other
+# intervals, does not fail by rounding [m].
 HAIR = 2e-6
-# A motion that begins in motion goes beyond what it may do by no more than this share.
+# A motion from a moving start may exceed its limits by this factor.
 EXCESS = 1.01
-# Sizes of the first blend of an arm that moves, as shares of what is free.
+# Sizes of the first blend of a moving arm, as shares of the free one.
 FIRST_SHARES = (0.5, 0.2, 0.0)
 
 
@@ -43,15 +43,15 @@ def time_path(
     lead: LeadIn | None,
     escape: Escape | None,
     should_stop: Callable[[], bool],
-) -> Trajectory | Disagreement | Refusal:
+) -> Trajectory | Disagreement | Rejection:
     """
-    Return the timed path once both judges agree that it is free, with stops if need be.
+    Return the timed path that both checkers find free, with stops at corners if needed.
 
     Parameters
     ----------
     arm : ArmModel
     scene : Scene
-        The wearer in the base frame, as the second judge sees him.
+        The wearer in the base frame, for the second checker.
     goal : PointingGoal
     world : World
         The same, grown by the margin [m].
@@ -61,11 +61,11 @@ def time_path(
     margin : float
         [m].
     lead : LeadIn or None
-        What comes before the path.
+        Precedes the path.
     escape : Escape or None
-        The lead, where it leads out of boxes that the arm was in.
+        The lead-in, where it is an escape.
     should_stop : callable
-        Polled meanwhile; True cancels.
+        Polled; True cancels.
 
     """
     if lead is not None and lead.speed > 0.0:
@@ -77,7 +77,7 @@ def time_path(
         return CANCELLED
     choices = [rounded]
     if lead is not None and lead.speed > 0.0 and rounded:
-        # The arm must be slow enough where the first blend begins: a smaller one begins later.
+        # The arm must be slow enough at the first blend: a smaller one begins later.
         choices += [
             (replace(rounded[0], half_length=share * rounded[0].half_length), *rounded[1:])
             for share in FIRST_SHARES
@@ -87,24 +87,26 @@ def time_path(
     escape_time = 0.0 if escape is None else escape.trajectory.duration
     timed = in_time(path, choices, limits, lead)
     if not timed:
-        return Refusal(
+        return Rejection(
             PlanStatus.START_MOVES,
-            'the arm moves, and from there no motion that was found holds the limits of its '
-            'joints; expected an arm at rest',
+            'the arm moves, and no motion found from its state respects the limits of its joints; '
+            'expected an arm at rest',
         )
     trajectory = first_proven(timed, world, escape_time)
     if trajectory is None:
-        return Refusal(
-            PlanStatus.NOT_CERTIFIED, 'the path was found but its timed motion is not proven free'
+        return Rejection(
+            PlanStatus.NOT_CERTIFIED, 'a path was found but its trajectory is not proven free'
         )
     if should_stop():
         return CANCELLED
-    reach = reach_to(arm, goal.target, path.waypoints[-1])
-    touch = violation_seen(arm, scene, trajectory, margin, world.ray_length, reach, escape_time)
+    target_distance = reach_to(arm, goal.target, path.waypoints[-1])
+    violation = violation_seen(
+        arm, scene, trajectory, margin, world.ray_length, target_distance, escape_time
+    )
     if should_stop():
         return CANCELLED
-    if touch is not None:
-        return Disagreement(trajectory, touch, escape_time)
+    if violation is not None:
+        return Disagreement(trajectory, violation, escape_time)
     return trajectory
 
 
@@ -118,7 +120,7 @@ def in_time(
     ----------
     path : Path
     choices : sequence of tuple of Blend
-        Ways to take the corners.
+        Blends of the corners.
     limits : MotionLimits
     lead : LeadIn or None
         What comes before the path, whose first edge is then followed from its speed on.
@@ -134,7 +136,7 @@ def in_time(
             whole = joined(lead.trajectory, parameterize(path, blends, within, lead.speed))
             if excess(whole, lead.allowed) <= EXCESS:
                 timed.append(whole)
-    # Where a rounded corner must be taken slowly, stopping at each can be the faster way.
+    # Where blends must be slow, stopping at each corner can be faster.
     return sorted(timed, key=lambda trajectory: trajectory.duration)
 
 
@@ -144,7 +146,7 @@ def first_proven(
     """
     Return the first of some trajectories that is proven free, or None.
 
-    escape_time: until then they are proven to lead out of the world's boxes [s].
+    escape_time: until then they are proven to escape from the world's boxes [s].
     """
     for trajectory in timed:
         if certify(trajectory, world, escape_time).is_proven:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planner as a ROS 2 node: what it offers, and how it starts and ends."""
+"""The planner as a ROS 2 node: its services, start and shutdown."""
 
 from collections.abc import Callable
 import gc
@@ -29,7 +29,7 @@ from rrth_planner.ros.interface.parameters import (
     declare_parameters,
     PlannerParameters,
 )
-from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -40,11 +40,11 @@ SWITCH_INTERVAL = 5e-4
 
 
 class PlannerNode(Node):
-    """Plan a motion that points the arm at a target, from what was heard last, on request."""
+    """Plan a motion that points the arm at a target, from the latest inputs, on request."""
 
     def __init__(self, planner: Planner | None = None, **kwargs: Any) -> None:
         """
-        Listen, compile or load the planner, and only then offer the services.
+        Subscribe, compile or load the planner, and only then offer the services.
 
         Parameters
         ----------
@@ -56,70 +56,70 @@ class PlannerNode(Node):
         Raises
         ------
         RrthError
-            A parameter that is refused, an arm that cannot be planned for, no python-fcl.
+            A rejected parameter, an arm that cannot point, no python-fcl.
 
         """
         super().__init__(NAME, **kwargs)
         parameters = declare_parameters(self)
         self._compile()
-        # It loads while the node does.
+        # It loads in parallel to the node.
         self._planner: Planner = planner or PlanningProcess(
             parameters.arm, parameters.options, self._on_death
         )
         try:
-            self._listen(parameters)
+            self._create_components(parameters)
             self._planner.warm_up(parameters.arm, parameters.options)
         except BaseException:
             self._planner.close()
             raise
         self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
-        for kind, name, answer_it in (
+        for kind, name, callback in (
             (Trigger, '~/plan', self._on_plan),
             (GetPlan, '~/get_plan', self._on_get_plan),
             (Trigger, '~/cancel', self._on_cancel),
         ):
-            self.create_service(kind, name, answer_it, qos_profile=SERVICE, callback_group=group)
+            self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
-    def _listen(self, parameters: PlannerParameters) -> None:
-        """Build what hears, monitors and plans."""
-        # Only now: loading them compiles the kernels that nobody has compiled yet.
+    def _create_components(self, parameters: PlannerParameters) -> None:
+        """Create inputs, monitor and queue."""
+        # Only now: loading them compiles kernels that are not compiled yet.
         from rrth_planner.ros.interface.inputs import Inputs
         from rrth_planner.ros.interface.publishers import PlanPublishers
         from rrth_planner.ros.interface.reporter import Reporter
-        from rrth_planner.ros.interface.scene_monitor import Listener
+        from rrth_planner.ros.interface.scene_monitor import SceneMonitor
         from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
         from rrth_planner.ros.requests.request_queue import PlanQueue
 
-        heard = Inputs(
+        inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        publishers, self._reporter = PlanPublishers(self), Reporter(self, heard, parameters)
-        self._monitor = ExecutionMonitor(self, heard, self._reporter, publishers)
-        self._listener = Listener(
-            self, parameters, heard, self._reporter.publish, self._monitor.on_body, self.fail
+        publishers, self._reporter = PlanPublishers(self), Reporter(self, inputs, parameters)
+        self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
+        self._scene_monitor = SceneMonitor(
+            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
         )
         self._queue = PlanQueue(
             self,
-            heard,
+            inputs,
             self._reporter,
             publishers,
             self._monitor,
             self._planner,
-            self._listener.body_progress,
+            self._scene_monitor.body_progress,
         )
 
     def close(self) -> None:
-        """Stop an arm in motion; end the plan in progress, those that wait, and the worker."""
+        """Stop an arm in motion; end the plan in progress, the queue, and the planning process."""
         self._queue.close()
 
     def fail(self, what: str) -> None:
-        """Stop an arm in motion for an error that nobody expected."""
-        self._monitor.fail(what, is_again=False)
+        """Stop an arm in motion after an unexpected error."""
+        self._monitor.fail(what, is_replanned=False)
 
     def _compile(self) -> None:
-        """Compile all kernels, in processes of their own where they can be kept."""
+        """Compile all kernels, in processes of their own where there is a cache."""
         if find_spec('fcl') is None:
             raise ModelError(
                 'python-fcl: not installed, expected for the second check of every motion '
@@ -156,12 +156,12 @@ class PlannerNode(Node):
                     'start: a pose, expected an empty start (position 0, orientation 0, 0, 0, 1), '
                     'since a plan begins where the arm is'
                 )
-            goal = self._listener.goal(
+            goal = self._scene_monitor.goal(
                 PointStamped(header=request.goal.header, point=request.goal.pose.position)
             )
         except MessageError as problem:
-            code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
-            self._reporter.refuse(code, f'request of get_plan: {problem}')
+            code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+            self._reporter.reject(code, f'request of get_plan: {problem}')
             return response
         found = await self._queue.respond(goal)
         response.plan = found.tool_path()
@@ -169,25 +169,23 @@ class PlannerNode(Node):
 
     def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         response.success = True
-        response.message = answer(
-            ErrorCode.SUCCESS, f'requests that are ended by this: {self._queue.cancel()}'
-        )
+        response.message = answer(ErrorCode.SUCCESS, f'requests cancelled: {self._queue.cancel()}')
         return response
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    # Until the node spins nobody would wake up for ROS's own handlers.
+    # ROS's own handlers take effect only once the node spins.
     _on_signals(_exit_at_once)
     node = None
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = PlannerNode()
         _settle_interpreter()
-        is_told_to_end = Event()
-        # Not ROS's own handlers, which end the context: an arm in motion is still to be stopped.
-        _on_signals(lambda *_: is_told_to_end.set())
-        _spin(node, is_told_to_end)
+        is_shutting_down = Event()
+        # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
+        _on_signals(lambda *_: is_shutting_down.set())
+        _spin(node, is_shutting_down)
     except KeyboardInterrupt:
         pass
     except (RrthError, ParameterException, RuntimeError) as problem:
@@ -203,12 +201,12 @@ def main(args: list[str] | None = None) -> int:
     return 0
 
 
-def _spin(node: PlannerNode, is_told_to_end: Event) -> None:
-    """Run the node until it is told to end; an error of a callback stops the arm, not the node."""
+def _spin(node: PlannerNode, is_shutting_down: Event) -> None:
+    """Run the node until a signal; an error in a callback stops the arm, not the node."""
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    # The timers of the node wake it up often enough to see that it is to end.
-    while rclpy.ok() and not is_told_to_end.is_set():
+    # The timers of the node wake it up often enough to see the signal.
+    while rclpy.ok() and not is_shutting_down.is_set():
         try:
             executor.spin_once()
         except ExternalShutdownException:
@@ -221,12 +219,11 @@ def _spin(node: PlannerNode, is_told_to_end: Event) -> None:
 
 
 def _settle_interpreter() -> None:
-    """Keep what would hold up a plan for milliseconds short."""
-    # The collector need not look again and again at what lives as long as the node: half a million
-    # objects of numba and ROS.
+    """Shorten the pauses of garbage collector and thread switches."""
+    # Half a million objects of numba and ROS live as long as the node: the collector skips them.
     gc.collect()
     gc.freeze()
-    # The worker and the executor hand the interpreter to each other; the default is 5 ms.
+    # Worker and executor share the interpreter; the default is 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL)
 
 

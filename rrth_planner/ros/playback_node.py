@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The node `arm_playback`: an arm that moves exactly as it is told, for trials without one."""
+"""The node `arm_playback`: a kinematic arm that executes motions exactly."""
 
 from array import array
 import gc
@@ -37,14 +37,14 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-# Of a trajectory; what is longer is not decoded, which would hold up the joint states.
+# Longer trajectories are not decoded, which would delay the joint states.
 MOST_BYTES = 2 * 1024 * 1024
-# Two clocks are read as one when that takes no longer [ns]; else again, so many times.
+# Two clocks are read at once where that takes no longer [ns]; else again, so many times.
 AT_ONCE, READINGS = 20_000, 5
 
 
 class PlaybackNode(Node):
-    """Follows the trajectories it is sent, and says where the arm is."""
+    """Executes the trajectories that it receives, and publishes the joint states."""
 
     def __init__(self, **options: Any) -> None:
         """Declare parameters and interfaces; bad values raise, naming the parameter."""
@@ -59,12 +59,12 @@ class PlaybackNode(Node):
         self._latest, _ = self._now()
         self._state = JointState(name=list(self._arm.joint_names))
         self._pose = PoseStamped()
-        # Since when the messages above say where the arm stands for good [s].
-        self._told_rest = float('inf')
+        # Since when the messages above hold the final state of the arm [s].
+        self._rest_published = float('inf')
         reliable = QoSProfile(
             depth=1,
             reliability=ReliabilityPolicy.RELIABLE,
-            # A latched motion of the past must not start by itself.
+            # An old latched motion must not start by itself.
             durability=DurabilityPolicy.VOLATILE,
         )
         self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
@@ -72,7 +72,7 @@ class PlaybackNode(Node):
         self.create_subscription(
             JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
         )
-        # Its messages are those of the subscription above; what counts is who is alive.
+        # Only for the liveliness of the planner: messages come by the subscription above.
         self.create_subscription(
             JointTrajectory,
             'joint_trajectory',
@@ -111,17 +111,17 @@ class PlaybackNode(Node):
         return now, stamp
 
     def _follow(self, playback: Playback) -> None:
-        self._playback, self._told_rest = playback, float('inf')
+        self._playback, self._rest_published = playback, float('inf')
 
     def _publish(self) -> None:
-        """Say where the arm is at the very time that the messages are stamped with."""
+        """Publish the state of the arm at the time of the stamps."""
         time, nanoseconds = self._advance()
         # While it stands still only the stamps change.
-        if not time >= self._told_rest:
+        if not time >= self._rest_published:
             q, v, _ = self._playback.state_at(time)
             self._state.position, self._state.velocity = array('d', q), array('d', v)
             self._pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
-            self._told_rest = time if time >= self._playback.end_time else float('inf')
+            self._rest_published = time if time >= self._playback.end_time else float('inf')
         stamp = Time(nanoseconds=nanoseconds).to_msg()
         self._state.header.stamp = self._pose.header.stamp = stamp
         self._joint_states.publish(self._state)
@@ -131,9 +131,9 @@ class PlaybackNode(Node):
         try:
             self._on_trajectory(decoded(data, JointTrajectory, MOST_BYTES))
         except MessageError as problem:
-            self.get_logger().warning(f'joint_trajectory refused: {problem}')
+            self.get_logger().warning(f'joint_trajectory rejected: {problem}')
         except Exception:
-            # Whatever it is, the arm keeps to what it does.
+            # After any error the arm continues as before.
             self.get_logger().error(traceback.format_exc())
 
     def _on_trajectory(self, msg: JointTrajectory) -> None:
@@ -153,49 +153,51 @@ class PlaybackNode(Node):
                 )
             )
         except RrthError as problem:
-            stays = 'keeps to its motion' if time < self._playback.end_time else 'stays'
-            self.get_logger().warning(f'joint_trajectory refused, the arm {stays}: {problem}')
+            stays = (
+                'continues its motion' if time < self._playback.end_time else 'holds its position'
+            )
+            self.get_logger().warning(f'joint_trajectory rejected, arm {stays}: {problem}')
             return
         self.get_logger().info(
-            f'follows a motion: {len(trajectory.times)} points, at rest in '
+            f'executing a motion: {len(trajectory.times)} points, at rest in '
             f'{self._playback.end_time - time:.2f} s'
         )
 
     def _on_liveliness(self, status: Any) -> None:
         if status.not_alive_count_change > 0 and self._advance()[0] < self._playback.end_time:
             self.get_logger().error(
-                f'the planner is lost, nobody watches over the motion: the arm brakes along its '
-                f'path, at rest in {self._brake():.2f} s'
+                f'planner liveliness lost, the motion is not monitored: stop along the path, at '
+                f'rest in {self._stop():.2f} s'
             )
 
-    def _brake(self) -> float:
+    def _stop(self) -> float:
         """Stop along the path; return how long that takes, <= 0.0 at rest [s]."""
         time, _ = self._advance()
         self._follow(stop(self._playback, playback_rules(self, self._arm).limits, time))
         return self._playback.end_time - time
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        left = self._brake()
+        left = self._stop()
         response.success = True
         response.message = (
-            f'SUCCESS (1): brakes along its path, at rest in {left:.2f} s'
+            f'SUCCESS (1): stop along the path, at rest in {left:.2f} s'
             if left > 0.0
-            else 'SUCCESS (1): at rest already'
+            else 'SUCCESS (1): already at rest'
         )
         self.get_logger().info(f'stop: {response.message}')
         return response
 
 
 def _load_stops() -> None:
-    """Load what a stop needs, while the arm is there."""
+    """Load what a stop needs, while the node runs already."""
     import_module('rrth_planner.timing.fast_stop')
-    # What lives as long as the node need not be looked at by the collector in mid-motion.
+    # The collector must not pause a motion for objects that live as long as the node.
     gc.collect()
     gc.freeze()
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until it is told to end; return the exit code."""
+    """Run the node until a signal; return the exit code."""
     node = None
     # Kernels are plain Python here: a stop is found in some 20 ms, and nothing is compiled.
     os.environ['NUMBA_DISABLE_JIT'] = '1'

@@ -10,7 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.execution.recording import at, brakes, clearances_seen, Recording, told_at
+from rrth_planner.execution.recording import (
+    at,
+    commanded_at,
+    commanded_stops,
+    measured_clearances,
+    Recording,
+)
 from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
@@ -35,9 +41,9 @@ N_DENSE = 300
 MOST_MARKS = 40
 GUARD_COLOURS = {
     'no motion': '#dfe3e8',
-    'watches the motion': '#8cc5a3',
-    'brakes': '#e07a2f',
-    'holds': '#b5838d',
+    'monitoring': '#8cc5a3',
+    'stopping': '#e07a2f',
+    'holding': '#b5838d',
 }
 OTHER, CLEARANCE = '#c3b5d9', '#30506e'
 
@@ -50,7 +56,7 @@ def recording_figure(
 
     Left where the arm went round the wearer as he was at the end; right, over time, joint
     positions and velocities as told and as seen, the arm's distance to the wearer, and what the
-    guard of the motion did.
+    monitor of the motion did.
 
     Parameters
     ----------
@@ -71,13 +77,13 @@ def recording_figure(
     curves = grid[1].subgridspec(4, 1, height_ratios=(1.25, 1.0, 0.9, 0.16), hspace=0.13)
     position = figure.add_subplot(curves[0])
     others = [figure.add_subplot(curves[i], sharex=position) for i in (1, 2, 3)]
-    velocity, distance, guard = others
+    velocity, distance, monitor = others
     _draw_joints(position, velocity, recording, arm, settings)
-    clearances = clearances_seen(recording, arm, settings.ray_guard_length)
+    clearances = measured_clearances(recording, arm, settings.ray_guard_length)
     _draw_distance(distance, recording, clearances, settings.margin)
-    _draw_guard(guard, recording)
+    _draw_monitor(monitor, recording)
     begin, end = _span(recording)
-    stops = [told for told in brakes(recording) if begin <= told.begin <= end]
+    stops = [told for told in commanded_stops(recording) if begin <= told.begin <= end]
     for axes in (position, velocity, distance):
         axes.tick_params(labelbottom=False)
         axes.grid(color='#e4e6ea', lw=0.8)
@@ -113,7 +119,7 @@ def _span(recording: Recording) -> tuple[float, float]:
 
 def _caption(recording: Recording, clearances: Array, n_stops: int) -> str:
     begin, end = _span(recording)
-    n = sum(begin <= told.begin <= end for told in recording.told) - n_stops
+    n = sum(begin <= told.begin <= end for told in recording.commanded) - n_stops
     parts = [_count(n, 'motion'), _count(n_stops, 'stop')]
     seen = clearances[np.isfinite(clearances)]
     if len(seen):
@@ -182,7 +188,7 @@ def _draw_joints(
 ) -> None:
     begin, end = _span(recording)
     times = np.linspace(begin, end, int(min(20_000, 2 + (end - begin) / TIME_STEP)))
-    q, v = told_at(recording, times)
+    q, v = commanded_at(recording, times)
     for i, name in enumerate(arm.joint_names):
         colour = JOINT_COLOURS[i % len(JOINT_COLOURS)]
         for axes, told, seen in (
@@ -239,9 +245,9 @@ def _draw_distance(axes: Axes, recording: Recording, clearances: Array, margin: 
         )
 
 
-def _draw_guard(axes: Axes, recording: Recording) -> None:
+def _draw_monitor(axes: Axes, recording: Recording) -> None:
     begin, end = _span(recording)
-    steps = [*recording.guard, (end, '')]
+    steps = [*recording.monitor_states, (end, '')]
     shown: dict[str, str] = {}
     for (since, state), (until, _) in pairwise(steps):
         left, right = max(since, begin), min(until, end)
@@ -250,7 +256,7 @@ def _draw_guard(axes: Axes, recording: Recording) -> None:
             axes.axvspan(left, right, color=colour, lw=0)
     axes.set_yticks([])
     axes.set_ylim(0.0, 1.0)
-    axes.set_ylabel('guard', rotation=0, ha='right', va='center')
+    axes.set_ylabel('monitor', rotation=0, ha='right', va='center')
     axes.set_xlabel('time [s]', loc='left')
     handles = [axes.plot([], [], lw=6, color=colour)[0] for colour in shown.values()]
     handles += axes.plot([], [], ls='', marker='v', color=CLEARANCE)

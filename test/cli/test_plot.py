@@ -8,7 +8,7 @@ import pytest
 image = pytest.importorskip('matplotlib.image')
 
 from rrth_planner.cli.plot import main  # noqa: E402
-from rrth_planner.execution.recording import Recording, Told  # noqa: E402
+from rrth_planner.execution.recording import CommandedMotion, Recording  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.settings import load_settings  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
@@ -51,10 +51,10 @@ def stopped_run():
         times=times,
         positions=q,
         velocities=v,
-        told=(Told(0.0, way), Told(0.9, stop)),
+        commanded=(CommandedMotion(0.0, way), CommandedMotion(0.9, stop)),
         bodies=((-0.5, wearer[0]), (0.88, wearer[1])),
         targets=((0.0, np.array([1.5, 0.2, 0.3])),),
-        guard=((0.0, 'watches the motion'), (0.95, 'brakes'), (1.3, 'holds')),
+        monitor_states=((0.0, 'monitoring'), (0.95, 'stopping'), (1.3, 'holding')),
     )
 
 
@@ -117,7 +117,7 @@ def test_a_run_is_drawn_with_its_stop_its_distance_and_the_guard():
     assert distance.get_ylabel().endswith('[m]')
     assert guard.get_xlabel() == 'time [s]'
     names = [text.get_text() for text in guard.get_legend().get_texts()]
-    assert names == ['watches the motion', 'brakes', 'holds', 'the wearer is seen anew']
+    assert names == ['monitoring', 'stopping', 'holding', 'the wearer is seen anew']
     # A band where the arm was stopped, in each of the three curves; the stages of the guard.
     for axes in (position, velocity, distance):
         (band,) = axes.patches

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.localization import takeover
+from rrth_planner.execution.localization import predict_start_state
 from rrth_planner.io.incident import disagreement_incident, error_incident, IncidentKind
 from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.goal import PointingGoal
@@ -115,7 +115,7 @@ def test_another_motion_is_no_reproduction(monkeypatch, capsys):
 
 def test_a_motion_of_an_arm_that_moves_is_planned_again_to_the_bit(monkeypatch, capsys, tmp_path):
     running = pipeline.plan_motion(**QUESTION.arguments).trajectory
-    moving = takeover(running.positions[0], running.velocities[0], None, 0.0)
+    moving = predict_start_state(running.positions[0], running.velocities[0], None, 0.0)
     state = replace(moving.state, velocities=np.array([0.2, 0.0, 0.1, 0.0]))
     moving = replace(moving, state=state, running=running, time=0.0)
     question = replace(QUESTION, moving=moving, seed=6)

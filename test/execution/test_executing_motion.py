@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where within its motion an arm is, by what it says."""
+"""Localization of an arm within its motion, by its readings."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_an_arm_that_is_elsewhere_is_nowhere_on_its_motion():
     running = ExecutingMotion(trajectory=_swing(), start_time=10.0)
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 10.5, 10.5) is None
     assert running.phase(np.full(4, np.nan), 10.5, 10.5) is None
-    # It may still be on its way there.
+    # It may still be moving there.
     assert running.phase(np.array([0.2, 0.2, 0.0, 0.0]), 9.8, 9.9) == pytest.approx(-0.1)
 
 
@@ -68,9 +68,10 @@ def _two_swings():
 
 
 @pytest.mark.parametrize(
-    ('at', 'goes_on'), [(0.4, True), (0.99, True), (1.01, True), (1.98, False), (2.0, False)]
+    ('at', 'has_missed_stop'),
+    [(0.4, True), (0.99, True), (1.01, True), (1.98, False), (2.0, False)],
 )
-def test_an_arm_is_on_time_where_its_motion_is(at, goes_on):
+def test_an_arm_is_on_time_where_its_motion_is(at, has_missed_stop):
     motion = _two_swings()
     running = ExecutingMotion(trajectory=motion, start_time=10.0)
     q, v, _ = (values[0] for values in sample(motion, [at]))
@@ -78,7 +79,7 @@ def test_an_arm_is_on_time_where_its_motion_is(at, goes_on):
     assert not running.is_on_time(q + [0.0, 0.001, 0.0, 0.0], v, 10.0 + at)
     assert not running.is_on_time(q, v + [0.0, 0.02, 0.0, 0.0], 10.0 + at)
     assert not running.is_on_time(q, np.full(4, np.nan), 10.0 + at)
-    assert running.will_move(10.0 + at, 0.05) == goes_on
+    assert running.will_move(10.0 + at, 0.05) == has_missed_stop
 
 
 def test_an_arm_that_never_began_is_not_on_time():

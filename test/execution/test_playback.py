@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The kinematic arm follows, brakes along its path, and takes only what fits."""
+"""The kinematic arm executes motions, stops along its path, and accepts only what fits."""
 
 import json
 import os
@@ -58,7 +58,7 @@ def test_a_standing_arm_stands_still_at_any_time():
 
 
 @pytest.mark.parametrize('scale', [1.0, 0.5, 0.1])
-def test_a_motion_is_followed_exactly_and_slowed_down_by_the_time_scale(scale):
+def test_a_motion_is_executed_exactly_and_slowed_down_by_the_time_scale(scale):
     move = motion(FOLDED, FOLDED - 0.4, duration=2.0)
     playback = taken(standing(FOLDED), move, 3.0, time_scale=scale)
     times = np.linspace(0.0, 2.0, 50)
@@ -116,7 +116,7 @@ def test_a_motion_replaces_the_running_one_from_its_present_state():
         ),
         (motion(FOLDED, FOLDED + [2.0, 0.0, 0.0, 0.0], duration=2.0), 'joint_1: velocity'),
         (motion(FOLDED, FOLDED + [0.0, 0.0, 0.0, 0.5], duration=0.7), 'joint_4: acceleration'),
-        # Touched by so little, and so shortly, that no 64 samples of the piece see it: 1.0101
+        # Exceeded by so little, and so shortly, that no 64 samples of the piece show it: 1.0101
         # times the velocity at 1.0 s, 1.0102 times the acceleration 0.4226 s from either end.
         (motion(FOLDED, FOLDED + [1.61616, 0.0, 0.0, 0.0], duration=2.0), 'joint_1: velocity 1.5'),
         (
@@ -125,26 +125,26 @@ def test_a_motion_replaces_the_running_one_from_its_present_state():
         ),
     ],
 )
-def test_a_motion_that_does_not_fit_is_refused(move, words):
+def test_a_motion_that_does_not_fit_is_rejected(move, words):
     with pytest.raises(MessageError, match=words):
         taken(standing(FOLDED), move)
 
 
 @pytest.mark.parametrize('size', [1e200, 1e306, 1e308])
-def test_numbers_that_overflow_are_refused_without_a_warning(size, recwarn):
+def test_numbers_that_overflow_are_rejected_without_a_warning(size, recwarn):
     move = Trajectory(
         times=[0.0, 1.0, 2.0],
         positions=[FOLDED, FOLDED, FOLDED],
         velocities=[STILL, [size, -size, size, 0.0], STILL],
         accelerations=[STILL, [-size] * 4, STILL],
     )
-    with pytest.raises(MessageError) as refusal:
+    with pytest.raises(MessageError) as rejection:
         taken(standing(FOLDED), move)
-    assert len(str(refusal.value)) < 200
+    assert len(str(rejection.value)) < 200
     assert not recwarn.list
 
 
-def test_a_motion_that_ends_more_than_an_hour_ahead_is_refused():
+def test_a_motion_that_ends_more_than_an_hour_ahead_is_rejected():
     move = motion(FOLDED, FOLDED - 0.3, duration=10.0)
     accept(standing(FOLDED), move, ARM, rules(), start_time=3589.0, time=0.0)
     with pytest.raises(MessageError, match=r'ends in 3601 s, expected an end within 3600 s'):
@@ -167,7 +167,7 @@ def test_slow_motion_is_held_to_limits_as_it_is_played():
         {'time_scale': np.nan},
     ],
 )
-def test_rules_out_of_range_are_refused_by_name(bad):
+def test_rules_out_of_range_are_rejected_by_name(bad):
     with pytest.raises(OptionsError, match=next(iter(bad))):
         rules(**bad)
 
@@ -228,7 +228,7 @@ print(json.dumps([stopped.times.tolist(), stopped.positions.tolist()]))
 def test_a_stop_needs_no_compiler():
     root = pathlib.Path(__file__).parents[2]
     paths = os.pathsep.join([str(root), str(root / 'test'), os.environ.get('PYTHONPATH', '')])
-    told = []
+    accepted = []
     for without in '01':
         done = subprocess.run(
             [sys.executable, '-c', STOP],
@@ -238,8 +238,8 @@ def test_a_stop_needs_no_compiler():
             check=True,
         )
         assert not done.stderr
-        told.append(json.loads(done.stdout))
-    for compiled, plain in zip(*told, strict=True):
+        accepted.append(json.loads(done.stdout))
+    for compiled, plain in zip(*accepted, strict=True):
         np.testing.assert_allclose(plain, compiled, rtol=0.0, atol=1e-9)
 
 
@@ -306,7 +306,7 @@ def turn_from(state, q_goal, duration):
         ((0.0, 0.011), 'begins at velocity'),
     ],
 )
-def test_in_mid_motion_only_a_motion_from_the_present_state_takes_over(off, words):
+def test_in_mid_motion_only_a_motion_from_the_present_state_is_accepted(off, words):
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
     q, v, a = running.state_at(0.8)
     turned = turn_from((q + off[0], v + off[1], a), FOLDED, 2.5)
@@ -315,7 +315,7 @@ def test_in_mid_motion_only_a_motion_from_the_present_state_takes_over(off, word
         return
     with pytest.raises(MessageError, match=words):
         taken(running, turned, 0.8)
-    # What was refused is nowhere: the running motion is a value of its own.
+    # What was rejected is nowhere: the running motion is a value of its own.
     assert (running.state_at(2.0)[0] == FOLDED - 0.5).all()
 
 
@@ -338,9 +338,9 @@ def test_a_stop_is_taken_at_the_pace_of_the_motion_whatever_the_time_scale_is_by
     move = motion(FOLDED, FOLDED - 0.8, duration=2.0)
     running = taken(standing(FOLDED), move, time_scale=before)
     phase = 0.9
-    braking = fast_stop(move, phase, LIMITS)
+    stopping = fast_stop(move, phase, LIMITS)
     now = phase / before
-    stopped = taken(running, braking, now, time_scale=after)
+    stopped = taken(running, stopping, now, time_scale=after)
     assert stopped.time_scale == before
     for one, other in zip(stopped.state_at(now), running.state_at(now), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-6)
@@ -352,7 +352,7 @@ def test_a_stop_is_taken_at_the_pace_of_the_motion_whatever_the_time_scale_is_by
     assert back.end_time == pytest.approx(later + 2.0 / after)
 
 
-def test_a_braking_arm_takes_a_motion_from_its_present_state():
+def test_a_stopping_arm_accepts_a_motion_from_its_present_state():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 1.0, duration=2.5))
     stopped = stop(running, LIMITS, 1.0)
     replaced = taken(stopped, turn_from(stopped.state_at(1.1), FOLDED, 2.5), 1.1)
@@ -388,7 +388,7 @@ def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
             try:
                 playback = taken(playback, turned, at)
             except MessageError:
-                # It swings out of the bounds: the running motion goes on.
+                # It swings out of the bounds: the running motion continues.
                 pass
             else:
                 n_turns += 1
@@ -406,15 +406,15 @@ def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
     assert min(n_stops, n_turns) > 100
 
 
-def test_until_a_motion_begins_that_takes_over_the_arm_goes_on():
+def test_until_the_handover_the_arm_continues_its_motion():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
     back = turn_from(running.state_at(0.8), FOLDED, 1.5)
-    told = accept(running, back, ARM, rules(), start_time=0.8, time=0.6)
+    accepted = accept(running, back, ARM, rules(), start_time=0.8, time=0.6)
     times = np.linspace(0.6, 0.79, 20)
-    for one, other in zip(told.states_at(times), running.states_at(times), strict=True):
+    for one, other in zip(accepted.states_at(times), running.states_at(times), strict=True):
         np.testing.assert_array_equal(one, other)
     times = np.linspace(0.8, 2.3, 20)
-    for one, other in zip(told.states_at(times), sample(back, times - 0.8), strict=True):
+    for one, other in zip(accepted.states_at(times), sample(back, times - 0.8), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
     # Where the arm will be counts, not where it is.
     with pytest.raises(MessageError, match='the motion begins at position'):
@@ -423,26 +423,26 @@ def test_until_a_motion_begins_that_takes_over_the_arm_goes_on():
 
 def test_a_motion_that_has_not_begun_never_does_when_another_comes():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
-    told = running
+    accepted = running
     for start in (1.9, 1.95, 1.8):
         q, v, a = running.state_at(start)
         held = turn_from((q, v, a), q + 0.2 * v, 0.5)
-        told = accept(told, held, ARM, rules(), start_time=start, time=1.0)
-        assert told.before is running
-        np.testing.assert_array_equal(told.state_at(1.5)[0], running.state_at(1.5)[0])
-        np.testing.assert_allclose(told.state_at(start + 0.5)[0], q + 0.2 * v)
-    # One that has begun is taken over itself.
-    stay = turn_from(told.state_at(2.0), told.state_at(2.0)[0], 1.0)
-    last = accept(told, stay, ARM, rules(), start_time=2.0, time=1.95)
-    assert last.before.trajectory is told.trajectory
+        accepted = accept(accepted, held, ARM, rules(), start_time=start, time=1.0)
+        assert accepted.before is running
+        np.testing.assert_array_equal(accepted.state_at(1.5)[0], running.state_at(1.5)[0])
+        np.testing.assert_allclose(accepted.state_at(start + 0.5)[0], q + 0.2 * v)
+    # From one that has begun there is a handover, too.
+    stay = turn_from(accepted.state_at(2.0), accepted.state_at(2.0)[0], 1.0)
+    last = accept(accepted, stay, ARM, rules(), start_time=2.0, time=1.95)
+    assert last.before.trajectory is accepted.trajectory
     assert last.before.before is None
 
 
-def test_a_stop_before_the_motion_that_takes_over_brakes_the_one_that_runs():
+def test_a_stop_before_the_handover_stops_the_running_motion():
     running = taken(standing(FOLDED), motion(FOLDED, FOLDED - 0.5, duration=2.0))
     back = turn_from(running.state_at(1.2), FOLDED, 1.5)
-    told = accept(running, back, ARM, rules(), start_time=1.2, time=0.8)
+    accepted = accept(running, back, ARM, rules(), start_time=1.2, time=0.8)
     times = np.linspace(0.9, 3.0, 40)
     expected = stop(running, LIMITS, 0.9).states_at(times)
-    for one, other in zip(stop(told, LIMITS, 0.9).states_at(times), expected, strict=True):
+    for one, other in zip(stop(accepted, LIMITS, 0.9).states_at(times), expected, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -9,12 +9,12 @@ import pytest
 from rrth_planner.collision.reference_checker import least_clearance
 from rrth_planner.execution.recording import (
     at,
-    brakes,
-    clearances_seen,
+    commanded_at,
+    commanded_stops,
+    CommandedMotion,
+    measured_clearances,
     Recording,
     section,
-    Told,
-    told_at,
 )
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import RecordError
@@ -36,7 +36,7 @@ def motion(begin, end, duration=1.0, v_begin=0.0):
 
 
 def seen(n=50, **fields):
-    """Return a recording of an arm that was seen on a straight way for a second."""
+    """Return a recording of an arm on a straight path for a second."""
     times = np.linspace(0.0, 1.0, n)
     q = FOLDED + np.outer(times, [0.5, -0.5, 0.3, 0.2])
     return Recording(times=times, positions=q, velocities=np.zeros((n, 4)), **fields)
@@ -51,8 +51,8 @@ def scene(*centers):
 
 def test_the_motion_that_began_last_counts_and_its_end_is_held():
     first, second = motion(FOLDED, FOLDED + 0.4), motion(FOLDED + 0.2, FOLDED, v_begin=0.3)
-    recording = seen(told=(Told(0.1, first), Told(0.5, second)))
-    q, v = told_at(recording, np.array([0.0, 0.3, 0.5, 0.9, 1.5, 9.0]))
+    recording = seen(commanded=(CommandedMotion(0.1, first), CommandedMotion(0.5, second)))
+    q, v = commanded_at(recording, np.array([0.0, 0.3, 0.5, 0.9, 1.5, 9.0]))
     assert np.isnan(q[0]).all()
     assert np.isnan(v[0]).all()
     np.testing.assert_array_equal(q[1], sample(first, [0.3 - 0.1])[0][0])
@@ -63,10 +63,10 @@ def test_the_motion_that_began_last_counts_and_its_end_is_held():
 
 
 def test_the_distance_is_the_one_to_the_wearer_of_that_time():
-    # Far enough that nothing touches: what is inside a box is signed otherwise.
+    # Far enough that nothing collides: what is inside a box is signed otherwise.
     bodies = (scene([0.4, 0.5, 0.3]), scene([-0.5, 0.7, 0.9], [1.5, 0.0, 0.1]))
     recording = seen(bodies=((0.2, bodies[0]), (0.6, bodies[1])))
-    found = clearances_seen(recording, ARM, 0.4)
+    found = measured_clearances(recording, ARM, 0.4)
     for time, q, clearance in zip(recording.times, recording.positions, found, strict=True):
         if time < 0.2:
             assert np.isnan(clearance)
@@ -78,20 +78,20 @@ def test_the_distance_is_the_one_to_the_wearer_of_that_time():
 
 
 def test_nobody_there_is_no_distance():
-    assert np.isnan(clearances_seen(seen(bodies=((0.0, Scene(())),)), ARM, 1.0)).all()
+    assert np.isnan(measured_clearances(seen(bodies=((0.0, Scene(())),)), ARM, 1.0)).all()
 
 
-def test_a_brake_begins_in_motion_while_the_guard_brakes():
-    plain = Told(0.0, motion(FOLDED, FOLDED + 0.4))
-    turn = Told(0.5, motion(FOLDED + 0.2, FOLDED, v_begin=0.3))
-    stop = Told(2.0, motion(FOLDED, FOLDED + 0.05, v_begin=0.3))
-    again = Told(2.1, motion(FOLDED + 0.05, FOLDED))
+def test_a_stop_begins_in_motion_while_the_monitor_is_stopping():
+    plain = CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4))
+    turn = CommandedMotion(0.5, motion(FOLDED + 0.2, FOLDED, v_begin=0.3))
+    stop = CommandedMotion(2.0, motion(FOLDED, FOLDED + 0.05, v_begin=0.3))
+    again = CommandedMotion(2.1, motion(FOLDED + 0.05, FOLDED))
     recording = seen(
-        told=(plain, turn, stop, again),
-        guard=((0.0, 'watches the motion'), (2.05, 'brakes'), (2.2, 'holds')),
+        commanded=(plain, turn, stop, again),
+        monitor_states=((0.0, 'monitoring'), (2.05, 'stopping'), (2.2, 'holding')),
     )
-    assert brakes(recording) == (stop,)
-    assert brakes(seen(told=(plain, turn, stop))) == ()
+    assert commanded_stops(recording) == (stop,)
+    assert commanded_stops(seen(commanded=(plain, turn, stop))) == ()
 
 
 def test_what_was_the_case_is_what_came_last():
@@ -101,7 +101,7 @@ def test_what_was_the_case_is_what_came_last():
 
 
 class Counted(Sequence):
-    """A sequence that counts how often it is looked into."""
+    """A sequence that counts its accesses."""
 
     def __init__(self, items):
         """Begin at 0."""
@@ -124,12 +124,12 @@ def test_of_many_changes_few_are_looked_at():
 
 
 def test_a_section_keeps_its_times_and_what_led_to_it():
-    told = (Told(0.0, motion(FOLDED, FOLDED + 0.4)),)
-    part = section(seen(told=told), 0.25, 0.75)
+    commanded = (CommandedMotion(0.0, motion(FOLDED, FOLDED + 0.4)),)
+    part = section(seen(commanded=commanded), 0.25, 0.75)
     assert part.times[0] >= 0.25
     assert part.times[-1] <= 0.75
     assert len(part.times) == len(part.positions) == len(part.velocities) == 24
-    assert part.told == told
+    assert part.commanded == commanded
     with pytest.raises(RecordError, match=r'from 3 to 4, expected times between 0\.00 and 1\.00'):
         section(seen(), 3.0, 4.0)
 
@@ -144,7 +144,7 @@ def test_a_section_keeps_its_times_and_what_led_to_it():
         {'velocities': np.zeros((2, 3))},
     ],
 )
-def test_what_is_no_run_is_refused(fields):
+def test_what_is_no_run_is_rejected(fields):
     good = {'times': [0.0, 1.0], 'positions': np.zeros((2, 4)), 'velocities': np.zeros((2, 4))}
     Recording(**good)
     with pytest.raises(RecordError):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A running motion: what is left of it, held against a new body, and how it stops."""
+"""A running motion: checks of the remaining motion against a new body, and its stop."""
 
 import functools
 
@@ -13,10 +13,10 @@ from rrth_planner.collision.reference_checker import frames, quintic_states
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import (
+    escapes_by_continuing,
     is_place_free,
-    is_still_free,
-    leads_away,
-    taken_over,
+    is_remaining_free,
+    with_lead_in,
 )
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
@@ -56,7 +56,7 @@ def off_the_path(trajectory, q):
 
 @examples(25)
 @given(seed=SEEDS)
-def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
+def test_a_fast_stop_begins_as_the_motion_and_rests_on_its_path(seed):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -85,7 +85,7 @@ def test_a_quick_stop_begins_as_the_motion_and_rests_on_its_path(seed):
 
 @examples(60)
 @given(seed=SEEDS, n_more=st.sampled_from([0, 1, 3, 60]), reach=st.sampled_from([0.0, 2.0]))
-def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach):
+def test_the_remaining_motion_is_free_where_the_certificate_says_so(seed, n_more, reach):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -94,8 +94,8 @@ def test_what_is_left_is_free_where_the_certificate_says_so(seed, n_more, reach)
     scene = Scene((*wearer().boxes, *random_boxes(rng, n_more, spread=3.0, largest=0.2).boxes))
     world = arm_world(arm, scene, MARGIN, RAY)
     is_proven = certify(motion, world, max(phase, 0.0)).is_proven
-    running = ExecutingMotion(trajectory=motion, start_time=0.0, reach=reach)
-    is_free = is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
+    running = ExecutingMotion(trajectory=motion, start_time=0.0, target_distance=reach)
+    is_free = is_remaining_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
     assert is_free == (is_proven and world.is_valid(motion.positions[-1], max(reach, RAY)))
 
 
@@ -112,7 +112,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
     where = tool[:3, 3] + rng.uniform(0.0, 0.5) * tool[:3, 2] + rng.normal(0.0, 0.1, 3)
     hand = Box('hand', where, rng.uniform(0.05, 0.2, 3), np.eye(3))
     scene = Scene((*wearer().boxes, hand))
-    is_free = is_still_free(
+    is_free = is_remaining_free(
         ExecutingMotion(trajectory=motion, start_time=0.0),
         phase,
         arm,
@@ -121,13 +121,13 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
         ray_guard_length=RAY,
     )
     rest = part_of(motion, phase, motion.duration)
-    touches = any(
+    is_violated = any(
         dense_touch(arm, scene, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
         for curve, width in zip(piece_coefficients(rest), np.diff(rest.times), strict=True)
     )
-    # Free by a hair may be left unproven; what touches must never be called free.
-    assert not (is_free and touches)
-    if not touches and not is_free:
+    # Free by a hair may be left unproven; a violation must never be called free.
+    assert not (is_free and is_violated)
+    if not is_violated and not is_free:
         larger = Scene((*wearer().boxes, Box('hand', where, hand.size + 2e-3, np.eye(3))))
         assert any(
             dense_touch(arm, larger, MARGIN, RAY, curve, 2 + int(width / 5e-4)) >= 0
@@ -137,7 +137,7 @@ def test_what_is_called_free_is_free_of_a_body_that_moved(seed):
 
 @examples(25)
 @given(seed=SEEDS)
-def test_a_reading_tells_how_far_the_motion_is(seed):
+def test_a_reading_locates_the_arm_on_its_motion(seed):
     rng = np.random.default_rng(seed)
     motion = random_motion(rng)
     if motion is None:
@@ -170,8 +170,8 @@ def hand_beside(rng, q, gap):
     return None
 
 
-def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
-    rng, told = np.random.default_rng(5), {True: 0, False: 0}
+def test_a_motion_that_escapes_is_distinguished_from_one_that_does_not():
+    rng, counts = np.random.default_rng(5), {True: 0, False: 0}
     arm = table_1_arm()
     for _ in range(60):
         motion = random_motion(rng)
@@ -184,29 +184,35 @@ def test_a_motion_that_leads_away_is_told_from_one_that_does_not():
         if scene is None:
             continue
         running = ExecutingMotion(trajectory=motion, start_time=0.0)
-        assert not is_still_free(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
-        found = leads_away(running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY)
-        told[found] += 1
+        assert not is_remaining_free(
+            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
+        )
+        found = escapes_by_continuing(
+            running, phase, arm, scene, margin=MARGIN, ray_guard_length=RAY
+        )
+        counts[found] += 1
         hand = Scene(scene.boxes[-1:])
         gaps = [reference_checker.least_clearance(arm, hand, row[None], RAY) for row in q]
         if found:
             assert min(gaps) > gaps[0] - 1e-4
             assert gaps[-1] >= MARGIN - 1e-6
-        # Nearer for a while: going on is no way out.
+        # Nearer for a while: continuing is no escape.
         assert not (found and min(gaps) < gaps[0] - 1e-3)
-        assert not leads_away(running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY)
-    assert min(told.values()) >= 5, told
+        assert not escapes_by_continuing(
+            running, phase, arm, wearer(), margin=MARGIN, ray_guard_length=RAY
+        )
+    assert min(counts.values()) >= 5, counts
 
 
 def test_a_place_is_free_by_the_boxes_of_a_moment_as_by_the_world():
-    rng, arm, told = np.random.default_rng(8), table_1_arm(), {True: 0, False: 0}
+    rng, arm, counts = np.random.default_rng(8), table_1_arm(), {True: 0, False: 0}
     low, high = arm.bounds
     for _ in range(300):
         q, ray = rng.uniform(low, high), rng.uniform(0.0, 1.0)
         found = is_place_free(q, arm, wearer(), MARGIN, ray)
         assert found == arm_world(arm, wearer(), MARGIN, ray).is_valid(q)
-        told[found] += 1
-    assert min(told.values()) >= 20, told
+        counts[found] += 1
+    assert min(counts.values()) >= 20, counts
 
 
 @functools.cache
@@ -219,7 +225,7 @@ def some_motions():
 @pytest.mark.parametrize(
     ('late', 'rate'), [(0.0, 1.0), (1e-5, 1.0), (-1e-5, 1.0), (0.003, 1.0), (0.0, 0.5), (0.0, 0.1)]
 )
-def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
+def test_a_handover_is_tracked_from_its_publication_on(late, rate):
     n_known = 0
     for motion in some_motions():
         before = ExecutingMotion(trajectory=motion, start_time=100.0)
@@ -231,8 +237,8 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
         )
         after = ExecutingMotion(trajectory=later, start_time=150.0)
         now = 150.0 - begin_ahead
-        whole = taken_over(before, begin - late, after, now)
-        # Where nothing moves no place tells the time.
+        whole = with_lead_in(before, begin - late, after, now)
+        # At rest the position does not determine the time.
         if np.abs(sample(motion, [at])[1]).max() < 0.05:
             continue
         n_known += 1
@@ -248,16 +254,16 @@ def test_a_motion_that_takes_over_is_known_from_now_on(late, rate):
     assert n_known >= 5
 
 
-def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
+def test_an_arm_off_its_motion_is_not_located_before_the_handover():
     motion = some_motions()[0]
     before = ExecutingMotion(trajectory=motion, start_time=100.0)
     half = 0.5 * motion.duration
     later = part_of(motion, half, motion.duration)
     after = ExecutingMotion(trajectory=later, start_time=100.0 + half)
-    assert taken_over(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
+    assert with_lead_in(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
     # Its motion is over before, has not begun, or does not lead there.
-    assert taken_over(before, 0.9 * motion.duration, after, 100.0) is after
-    assert taken_over(before, -0.1, after, 100.0) is after
+    assert with_lead_in(before, 0.9 * motion.duration, after, 100.0) is after
+    assert with_lead_in(before, -0.1, after, 100.0) is after
     aside = Trajectory(
         times=later.times,
         positions=later.positions + [0.0, 1e-4, 0.0, 0.0],
@@ -265,4 +271,4 @@ def test_of_an_arm_elsewhere_nothing_is_known_until_a_motion_takes_over():
         accelerations=later.accelerations,
     )
     aside = ExecutingMotion(trajectory=aside, start_time=100.0 + half)
-    assert taken_over(before, half - 0.02, aside, 100.0 + half - 0.02) is aside
+    assert with_lead_in(before, half - 0.02, aside, 100.0 + half - 0.02) is aside

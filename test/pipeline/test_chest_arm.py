@@ -51,7 +51,7 @@ def test_it_is_of_the_size_that_it_should_be():
     assert 0.4 < reach < 0.5
 
 
-def test_it_plans_round_the_seated_wearer_without_a_touch():
+def test_it_plans_round_the_seated_wearer_without_contact():
     pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
     arm, scene = load_arm(resource_path(ARM)), load_body(resource_path(BODY))
     settings = load_settings(arm.dof, improve_time=1000.0, time_limit=1000.0)
@@ -79,7 +79,9 @@ def test_it_plans_round_the_seated_wearer_without_a_touch():
         states = positions_at(trajectory, times)
         assert np.array_equal(states[0], q)
         assert first_contact(arm, scene, states, ray, margin) is None
-        assert first_contact(arm, scene, states[-1:], max(ray, plan.reach), margin) is None
+        assert (
+            first_contact(arm, scene, states[-1:], max(ray, plan.target_distance), margin) is None
+        )
         q = trajectory.positions[-1]
         assert pointing_error(arm, q, target) < 1e-6
     assert n_bent >= 2

@@ -14,7 +14,7 @@ from rrth_planner.collision.reference_checker import bar_box_touch, first_contac
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import is_still_free
+from rrth_planner.execution.remaining_motion import is_remaining_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
@@ -66,8 +66,8 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
     )
 
 
-def is_touched(arm, box, q, growth):
-    """Return at which of the instants q, (n, dof), the oracle sees the arm touch a grown box."""
+def collides(arm, box, q, growth):
+    """Return at which of the instants q, (n, dof), the reference finds the arm in a grown box."""
     ends = oracle_bars(arm, q, RAY)
     radii = [arm.radii[row] for row, _ in bar_ends(arm)]
     hits = [
@@ -77,14 +77,14 @@ def is_touched(arm, box, q, growth):
     return np.any(hits, axis=0)
 
 
-def oracle_depth(arm, box, q):
+def reference_depth(arm, box, q):
     """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
     low, high = -0.5 * box.size.min(), FREE
-    if not is_touched(arm, box, q[None], high)[0]:
+    if not collides(arm, box, q[None], high)[0]:
         return MARGIN - FREE
     for _ in range(48):
         middle = 0.5 * (low + high)
-        if is_touched(arm, box, q[None], middle)[0]:
+        if collides(arm, box, q[None], middle)[0]:
             high = middle
         else:
             low = middle
@@ -101,7 +101,7 @@ def leaned(arm, scene, q, rng, depth):
 
     def is_deeper(share):
         pushed = replace(box, center=box.center + share * towards)
-        return is_touched(arm, pushed, q[None], MARGIN - depth)[0]
+        return collides(arm, pushed, q[None], MARGIN - depth)[0]
 
     if is_deeper(low) or not is_deeper(high):
         return None
@@ -128,7 +128,7 @@ def is_shoulder_covered(arm, scene):
 
 
 def leaned_case(seed, low, high):
-    """Return arm, wearer, start and oracle depths of the boxes, the deepest from low to high."""
+    """Return arm, wearer, start and reference depths of the boxes, the deepest within bounds."""
     rng = np.random.default_rng(seed)
     while True:
         arm = table_1_arm(rng.choice([0.0, 0.02]))
@@ -138,14 +138,14 @@ def leaned_case(seed, low, high):
         found = leaned(arm, scene, q, rng, rng.uniform(low, high))
         if found is None or is_shoulder_covered(arm, found):
             continue
-        depths = np.array([oracle_depth(arm, box, q) for box in found.boxes])
+        depths = np.array([reference_depth(arm, box, q) for box in found.boxes])
         if depths.max() < high:
             return arm, found, q, depths
 
 
 @examples(40)
 @given(SEEDS)
-def test_depths_are_those_of_the_oracle(seed):
+def test_depths_are_those_of_the_reference(seed):
     rng = np.random.default_rng(seed)
     arm = table_1_arm(rng.choice([0.0, 0.02]))
     scene = BODIES[int(rng.integers(len(BODIES)))]
@@ -153,7 +153,7 @@ def test_depths_are_those_of_the_oracle(seed):
     q = rng.uniform(*world.bounds)
     depths = box_depths(world, q).max(axis=0)
     for box, depth in zip(scene.boxes, depths, strict=True):
-        expected = oracle_depth(arm, box, q)
+        expected = reference_depth(arm, box, q)
         if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
             assert depth == pytest.approx(expected, abs=1e-7)
     assert world.is_valid(q) == (depths.max() < 0.0)
@@ -171,7 +171,7 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     if plan.status is not PlanStatus.SOLVED:
         assert plan.trajectory is None
         if plan.status is PlanStatus.START_IN_COLLISION:
-            assert 'no straight way out of it is proven free' in plan.sentence
+            assert 'no straight escape is proven free' in plan.sentence
         return
     n_solved.append(seed)
     trajectory, out = plan.trajectory, plan.escape_time
@@ -179,27 +179,29 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     assert np.array_equal(plan.path.waypoints[0], q_start)
     assert out in trajectory.times
     deepest = scene.boxes[int(np.argmax(depths))].name
-    said = re.search(r'first leaves box "(\w+)", (\d\.\d+) m deep at ([\w ]+)', plan.sentence)
+    said = re.search(
+        r'escape from box "(\w+)", penetration depth (\d\.\d+) m at ([\w ]+)', plan.sentence
+    )
     assert said[1] == deepest
     assert float(said[2]) == pytest.approx(depths.max(), abs=1e-3)
-    assert plan.sentence.count(' m deep at ') == np.count_nonzero(depths > -1e-5)
+    assert plan.sentence.count('penetration depth') == np.count_nonzero(depths > -1e-5)
     assert plan.clearance >= MARGIN - 1e-6
     times = np.union1d(np.arange(0.0, trajectory.duration, 1e-3), [out, trajectory.duration])
     q, v, _ = sample(trajectory, times)
     assert (np.abs(v) <= limits().velocity * 1.001).all()
     looks = np.linspace(0.0, out, 9)
     for box, is_entered in zip(scene.boxes, is_in, strict=True):
-        touched = is_touched(arm, box, q, MARGIN)
-        assert not touched[times >= out].any()
+        is_hit = collides(arm, box, q, MARGIN)
+        assert not is_hit[times >= out].any()
         if not is_entered:
-            assert not touched.any()
+            assert not is_hit.any()
             continue
-        # In, then out for good; and from each look on no deeper than there.
-        assert not (np.diff(touched.astype(int)) > 0).any()
+        # In, then out for good; and from each sample on no deeper than there.
+        assert not (np.diff(is_hit.astype(int)) > 0).any()
         for time in looks:
-            depth = max(0.0, oracle_depth(arm, box, positions_at(trajectory, [time])[0]))
+            depth = max(0.0, reference_depth(arm, box, positions_at(trajectory, [time])[0]))
             later = q[times >= time]
-            assert not is_touched(arm, box, later, MARGIN - depth - 2e-6).any()
+            assert not collides(arm, box, later, MARGIN - depth - 2e-6).any()
 
 
 n_solved: list[int] = []
@@ -209,19 +211,19 @@ def test_most_arms_come_out():
     assert len(n_solved) >= 45
 
 
-def test_an_arm_whose_shoulder_is_covered_has_no_way_out():
+def test_an_arm_whose_shoulder_is_covered_has_no_escape():
     arm = table_1_arm()
     shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
     center = shoulder - [0.0, 0.05, 0.0]
     hand = Box('hand', center, [0.1, 0.1 - 2 * MARGIN + 0.02, 0.1], np.eye(3))
     plan = ask(arm, Scene((hand,)), FOLDED)
     assert plan.status is PlanStatus.START_IN_COLLISION
-    assert 'no straight way out of it is proven free' in plan.sentence
+    assert 'no straight escape is proven free' in plan.sentence
 
 
 @examples(15)
 @given(SEEDS)
-def test_deeper_is_refused_with_part_box_and_depth(seed):
+def test_deeper_is_rejected_with_part_box_and_depth(seed):
     arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06)
     plan = ask(arm, scene, q_start)
     assert plan.status is PlanStatus.START_IN_COLLISION
@@ -230,7 +232,9 @@ def test_deeper_is_refused_with_part_box_and_depth(seed):
     box = scene.boxes[int(np.argmax(depths))]
     assert f'm inside box "{box.name}": ' in plan.sentence
     assert 'expected less than 0.05 m (escape_depth)' in plan.sentence
-    depth = float(re.search(r'(\d\.\d+) m deep in it with its margin', plan.sentence)[1])
+    depth = float(
+        re.search(r'penetration depth (\d\.\d+) m including the margin', plan.sentence)[1]
+    )
     assert depth == pytest.approx(depths.max(), abs=1e-3)
     inside = float(re.search(r'is (\d\.\d+) m inside', plan.sentence)[1])
     assert inside == pytest.approx(depths.max() - MARGIN, abs=1e-3)
@@ -240,7 +244,7 @@ def test_deeper_is_refused_with_part_box_and_depth(seed):
     for more, is_hit in ((1e-4, False), (-1e-4, True)):
         half = 0.5 * box.size + MARGIN - depths.max() - more + arm.radii[0]
         assert bar_box_touch(ends, box.center, box.rotation, half) == is_hit
-    # One that may be that deep gets out, or is told that there is no way.
+    # One that may be that deep escapes, or is rejected since there is no escape.
     plan = ask(arm, scene, q_start, escape_depth=0.1)
     assert 'escape_depth' not in plan.sentence
 
@@ -259,7 +263,7 @@ def pressed(depth=0.03):
 
 
 @pytest.mark.parametrize('seed', [None, 4, 7, 8])
-def test_no_way_out_that_is_shorter_is_found_by_trying_many(seed):
+def test_no_shorter_escape_is_found_by_trying_many(seed):
     if seed is None:
         (arm, scene), q_start = pressed(), FOLDED
     else:
@@ -283,7 +287,9 @@ def test_an_arm_that_moves_is_not_led_out():
     state = MotionState(positions=FOLDED, velocities=still + 0.1, accelerations=still)
     plan = ask(arm, scene, FOLDED, moving=StartState(state=state))
     assert plan.status is PlanStatus.START_IN_COLLISION
-    assert 'pointing ray is 0.0100 m inside box "hand": 0.0300 m deep' in plan.sentence
+    assert (
+        'pointing ray is 0.0100 m inside box "hand": penetration depth 0.0300 m' in plan.sentence
+    )
     assert 'at rest' in plan.sentence
 
 
@@ -293,7 +299,7 @@ def test_an_arm_beyond_its_limits_is_not_led_out():
     assert ask(arm, scene, q).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_a_hand_that_is_closed_round_the_arm_is_refused():
+def test_a_hand_that_is_closed_round_the_arm_is_rejected():
     arm, scene = pressed()
     hand = scene.boxes[-1]
     others = [
@@ -305,7 +311,7 @@ def test_a_hand_that_is_closed_round_the_arm_is_refused():
     ]
     plan = ask(arm, Scene((*scene.boxes, *others)), FOLDED)
     assert plan.status is PlanStatus.START_IN_COLLISION
-    assert 'no straight way out of it is proven free' in plan.sentence
+    assert 'no straight escape is proven free' in plan.sentence
     assert '"hand"' in plan.sentence or '"finger_' in plan.sentence
 
 
@@ -323,14 +329,14 @@ def test_a_cancelled_request_leads_nowhere():
 
 
 @pytest.mark.parametrize('after', [5, 20])
-def test_a_search_for_a_way_out_is_cancelled_in_mid_look(after):
+def test_a_search_for_an_escape_is_cancelled(after):
     arm = table_1_arm()
     shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, 0]
     hand = Box('hand', shoulder - [0.0, 0.05, 0.0], [0.1, 0.08, 0.1], np.eye(3))
     polls = []
     plan = ask(arm, Scene((hand,)), FOLDED, should_stop=lambda: polls.append(None))
     assert plan.status is PlanStatus.START_IN_COLLISION
-    # In every one of the directions that it looks in.
+    # In all directions of the search.
     assert len(polls) > 100
     n_polls = itertools.count()
     plan = ask(arm, Scene((hand,)), FOLDED, should_stop=lambda: next(n_polls) >= after)
@@ -338,7 +344,7 @@ def test_a_search_for_a_way_out_is_cancelled_in_mid_look(after):
     assert next(n_polls) < after + 8
 
 
-def test_a_target_in_the_wearer_is_refused_wherever_the_arm_is():
+def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED, target=[0.0, 0.0, 0.0])
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
@@ -351,14 +357,14 @@ def second_opinion(arm, scene, world, trajectory):
     )
 
 
-def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
+def test_an_escape_that_violates_for_the_second_checker_is_rejected(monkeypatch):
     arm, scene = pressed()
-    touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
-    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: touch)
+    violation = Violation(0.001, 0.005, 'pointing ray', 'hand')
+    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: violation)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None
-    assert plan.disagreement.touch == touch
+    assert plan.disagreement.touch == violation
     assert 'at 0.001 s, on the way out of the wearer; expected no part deeper' in plan.sentence
 
 
@@ -367,20 +373,20 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     world = arm_world(arm, scene, MARGIN, RAY)
     plan = ask(arm, scene, FOLDED)
     way = plan.path.waypoints[1] - FOLDED
-    judged = {}
+    verdicts = {}
     for share in (1.0, -0.2, 0.5):
         q = FOLDED + share * way
         trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
         end = trajectory.duration
-        touch = second_opinion(arm, scene, world, trajectory)
-        judged[share] = leads_out(trajectory, world, end), touch
-    assert judged[1.0] == (True, None)
-    is_out, touch = judged[-0.2]
+        violation = second_opinion(arm, scene, world, trajectory)
+        verdicts[share] = leads_out(trajectory, world, end), violation
+    assert verdicts[1.0] == (True, None)
+    is_out, violation = verdicts[-0.2]
     assert not is_out
-    assert (touch.bar, touch.box) == ('pointing ray', 'hand')
+    assert (violation.bar, violation.box) == ('pointing ray', 'hand')
     # Half way it is no deeper but not out.
-    assert judged[0.5] == (False, None)
-    # A plate in the way, which the arm does not touch yet.
+    assert verdicts[0.5] == (False, None)
+    # A plate in the way, which the arm does not reach yet.
     middle = oracle_bars(arm, (FOLDED + 0.8 * way)[None], RAY)[0, -1]
     plate = Box('plate', middle[0] + 0.9 * (middle[1] - middle[0]), [1e-3] * 3, np.eye(3))
     blocked = Scene((*scene.boxes, plate))
@@ -389,28 +395,28 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     if first_contact(arm, Scene((plate,)), FOLDED[None], RAY, MARGIN) is None:
         world = arm_world(arm, blocked, MARGIN, RAY)
         assert not leads_out(trajectory, world, trajectory.duration)
-        touch = second_opinion(arm, blocked, world, trajectory)
-        assert touch.box == 'plate'
+        violation = second_opinion(arm, blocked, world, trajectory)
+        assert violation.box == 'plate'
 
 
-def test_a_running_way_out_is_still_free_until_the_wearer_comes_nearer():
+def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
     arm, scene = pressed()
     plan = ask(arm, scene, FOLDED)
     running = ExecutingMotion(
         trajectory=plan.trajectory,
         start_time=0.0,
-        reach=plan.reach,
+        target_distance=plan.target_distance,
         escape_time=plan.escape_time,
     )
     kept = {'margin': MARGIN, 'ray_guard_length': RAY}
     for phase in np.linspace(0.0, plan.trajectory.duration, 12):
-        assert is_still_free(running, phase, arm, scene, **kept)
-    assert not is_still_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
+        assert is_remaining_free(running, phase, arm, scene, **kept)
+    assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, scene, **kept)
     # The hand follows the arm further than it goes.
     hand = scene.boxes[-1]
     near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
     followed = Scene((*scene.boxes[:-1], near))
-    assert not is_still_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+    assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
 
 
 def test_an_empty_world_has_no_depth():

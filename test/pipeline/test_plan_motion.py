@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a body and a target to a motion: what is solved is safe, what is refused had to be."""
+"""From a body and a target to a motion: what is solved is safe, what is rejected had to be."""
 
 from dataclasses import replace
 import re
@@ -18,7 +18,7 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import sample
-from rrth_planner.pipeline.rejection import goal_refusal
+from rrth_planner.pipeline.rejection import goal_rejection
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
 from rrth_planner.timing.lead_in import lead_in
@@ -77,7 +77,7 @@ def test_most_requests_are_solved(answers):
     assert np.mean(solved) > 0.6
 
 
-def test_what_is_solved_never_touches_and_ends_on_target(answers):
+def test_what_is_solved_is_never_in_collision_and_ends_on_target(answers):
     arm, bounds = table_1_arm(), limits()
     for scene, q_start, target, plan in answers:
         if plan.status is not PlanStatus.SOLVED:
@@ -88,7 +88,7 @@ def test_what_is_solved_never_touches_and_ends_on_target(answers):
         assert first_contact(arm, scene, q, RAY, MARGIN) is None
         reach = np.linalg.norm(target - tool_pose(arm, q[-1])[:3, 3])
         assert first_contact(arm, scene, q[-1:], max(RAY, reach), MARGIN) is None
-        assert plan.reach == pytest.approx(reach, abs=1e-9)
+        assert plan.target_distance == pytest.approx(reach, abs=1e-9)
         assert pointing_error(arm, q[-1], target) < 1e-6
         assert np.array_equal(q[0], q_start)
         assert not trajectory.velocities[[0, -1]].any()
@@ -97,14 +97,14 @@ def test_what_is_solved_never_touches_and_ends_on_target(answers):
         assert (q <= arm.bounds[1] + 1e-9).all()
         assert (np.abs(v) <= bounds.velocity * 1.001).all()
         assert (np.abs(a) <= bounds.acceleration * 1.001).all()
-        # Grown by the margin the oracle saw no contact, so the figure cannot be less.
+        # Grown by the margin the reference checker found no contact, so the figure cannot be less.
         assert plan.clearance >= MARGIN - 1e-6
         assert 'clearance' in plan.sentence
         assert f'seed {plan.seed}' in plan.sentence
 
 
 def aiming_postures(arm, scene, target, rng, n):
-    """Return random postures that aim, with their reach."""
+    """Return random configurations that point at the target, with its distance."""
     world = arm_world(arm, scene, MARGIN, RAY)
     local = target_in_mount(arm, PointingGoal(target))
     for q_near in rng.uniform(*arm.bounds, (n, arm.dof)):
@@ -115,14 +115,14 @@ def aiming_postures(arm, scene, target, rng, n):
                 yield q, reach
 
 
-def test_what_is_refused_had_to_be(answers):
+def test_what_is_rejected_had_to_be(answers):
     rng = np.random.default_rng(92)
     arm = table_1_arm()
-    n_refused = 0
+    n_rejected = 0
     for scene, _, target, plan in answers:
         if plan.status is PlanStatus.SOLVED:
             continue
-        n_refused += 1
+        n_rejected += 1
         assert plan.trajectory is None
         assert plan.path is None
         assert np.isnan(plan.clearance)
@@ -138,22 +138,25 @@ def test_what_is_refused_had_to_be(answers):
             for q, reach in aiming_postures(arm, scene, target, rng, 5000):
                 ray = max(RAY, reach)
                 assert dense_touch(arm, scene, MARGIN, ray, line(q, q), 1) >= 0
-    assert n_refused >= 2
+    assert n_rejected >= 2
 
 
-def test_a_target_in_the_wearer_is_refused_by_name():
+def test_a_target_in_the_wearer_is_rejected_by_name():
     for box in wearer().boxes:
         plan = ask(wearer(), FOLDED, box.center)
         assert plan.status is PlanStatus.GOAL_IN_COLLISION
-        assert f'inside box "{box.name}", {0.5 * box.size.min():.4f} m deep' in plan.sentence
+        assert (
+            f'inside box "{box.name}", penetration depth {0.5 * box.size.min():.4f} m'
+            in plan.sentence
+        )
     near = wearer().boxes[0].center + [0.15 + 0.5 * MARGIN, 0.0, 0.0]
     plan = ask(wearer(), FOLDED, near)
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'is 0.0100 m from box "torso"' in plan.sentence
-    assert 'margin of 0.02 m: 0.0100 m deep' in plan.sentence
+    assert 'margin of 0.02 m: penetration depth 0.0100 m' in plan.sentence
 
 
-def test_a_share_of_postures_is_no_more_than_all_of_them():
+def test_a_share_of_configurations_is_at_most_all_of_them():
     # Bars of one link have one name: a box round all of the arm counts once for each.
     box = Box('everywhere', np.zeros(3), np.full(3, 5.0), np.eye(3))
     world = arm_world(table_1_arm(), Scene((box,)), MARGIN, RAY)
@@ -162,16 +165,16 @@ def test_a_share_of_postures_is_no_more_than_all_of_them():
     goals = GoalSet(
         q_goals=q[:0], n_bent=0, n_aiming=40, q_blocked=q, blocked_reaches=np.full(40, 2.0)
     )
-    refusal = goal_refusal(world, goals)
-    (share,) = re.findall(r'\((\d+) %\)', refusal.sentence)
+    rejection = goal_rejection(world, goals)
+    (share,) = re.findall(r'\((\d+) %\)', rejection.sentence)
     assert share == '100'
-    # What the proof says, not a distance that may be greater; of both bars the deeper.
+    # The bound of the proof, not a distance that may be greater; of both bars the deeper.
     depths = box_depths(world, q, np.full(40, 2.0)).max(axis=1)
-    (deep,) = re.findall(r'at least (\d\.\d+) m deep', refusal.sentence)
+    (deep,) = re.findall(r'penetration depth at least (\d\.\d+) m', rejection.sentence)
     assert float(deep) == pytest.approx(depths.min(), abs=1e-4)
 
 
-def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_and_box():
+def test_a_target_that_every_ray_must_cross_the_wearer_for_is_rejected_with_bar_and_box():
     # A target walled in on all sides but not inside a box.
     target = np.array([1.5, -0.1, 0.4])
     walls = []
@@ -187,10 +190,10 @@ def test_a_target_that_every_ray_must_cross_the_wearer_for_is_refused_with_bar_a
     assert plan.status is PlanStatus.GOAL_IN_COLLISION
     assert 'pointing ray' in plan.sentence
     assert '"wall_' in plan.sentence
-    assert 'm deep in it with its margin' in plan.sentence
+    assert 'm including the margin' in plan.sentence
 
 
-def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
+def test_a_start_in_the_wearer_is_rejected_with_bar_and_box():
     rng = np.random.default_rng(93)
     world = wearer_world()
     bare = wearer_world(margin=0.0)
@@ -201,7 +204,7 @@ def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
             continue
         plan = ask(wearer(), q, [1.5, 0.0, 0.3], escape_depth=0.0)
         assert plan.status is PlanStatus.START_IN_COLLISION
-        assert 'm deep in it with its margin, expected less than 0 m' in plan.sentence
+        assert 'm including the margin, expected less than 0 m' in plan.sentence
         bar = next(name for name in world.bar_names if plan.sentence.startswith(name))
         box = next(name for name in world.box_names if f'"{name}"' in plan.sentence)
         pair = world.bar_names.index(bar), world.box_names.index(box)
@@ -213,7 +216,7 @@ def test_a_start_in_the_wearer_is_refused_with_bar_and_box():
     assert True in said
 
 
-def test_a_start_beyond_a_limit_is_refused_with_joint_and_limits():
+def test_a_start_beyond_a_limit_is_rejected_with_joint_and_limits():
     arm = table_1_arm()
     for k, name in enumerate(arm.joint_names):
         for side in range(2):
@@ -230,7 +233,7 @@ def test_a_start_beyond_a_limit_is_refused_with_joint_and_limits():
         assert ask(wearer(), q, [1.5, 0.0, 0.3]).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_an_arm_that_aims_already_holds_still():
+def test_an_arm_that_points_already_holds_still():
     rng = np.random.default_rng(94)
     arm, world = table_1_arm(), wearer_world()
     n = 0
@@ -300,7 +303,7 @@ def test_an_arm_that_moves_may_stop_past_a_limit_by_rounding(excess):
 
 
 @pytest.mark.parametrize('opinion', [None, Violation(0.1, 0.01, 'ray', 'torso')])
-def test_what_is_cancelled_while_the_second_judge_looks_ends_so(monkeypatch, opinion):
+def test_a_request_is_cancelled_during_the_second_check(monkeypatch, opinion):
     looked = []
 
     def look(*_, **__):
@@ -324,7 +327,7 @@ def test_a_start_a_hair_from_the_margin_is_not_blamed_on_the_goal():
     scene = Scene((Box('plate', center, (0.1, 0.2, 0.4), T[:3, :3]),))
     world = arm_world(arm, scene, MARGIN, RAY)
     assert world.is_valid(q)
-    # Plenty of postures aim at a target on the other side.
+    # Many configurations point at a target on the other side.
     target = T[:3, 3] - 1.5 * T[:3, 0] + 0.5 * T[:3, 2]
     plan = ask(scene, q, target)
     assert plan.status is not PlanStatus.GOAL_IN_COLLISION, plan.sentence

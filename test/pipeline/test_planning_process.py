@@ -62,7 +62,7 @@ def shut_in():
 
 @pytest.fixture(name='said', scope='module')
 def _said():
-    """Give what was said of deaths."""
+    """Give the sentences of deaths."""
     return []
 
 
@@ -79,7 +79,11 @@ def test_it_answers_as_this_process_would(process, target):
     here, there = (
         planner.plan(question(target)) for planner in (in_process.InProcessPlanner(), process)
     )
-    assert (there.status, there.reach, there.seed) == (here.status, here.reach, here.seed)
+    assert (there.status, there.target_distance, there.seed) == (
+        here.status,
+        here.target_distance,
+        here.seed,
+    )
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         values = getattr(there.trajectory, name)
         np.testing.assert_array_equal(values, getattr(here.trajectory, name))
@@ -101,7 +105,7 @@ def test_the_second_checker_sees_what_it_sees_here(process):
     assert found.box == 'hand'
 
 
-def test_what_nobody_wants_any_more_ends(process):
+def test_cancelled_requests_end(process):
     # Without a limit that it could reach soon.
     endless = RRTHOptions(max_samples=10**7, time_limit=3600.0)
     asked = [False]
@@ -141,7 +145,7 @@ def test_one_that_dies_over_a_question_says_so_and_another_one_goes_on(process, 
         return False
 
     endless = RRTHOptions(max_samples=10**7, time_limit=3600.0)
-    expected = 'the planning process ended with code -9 while it worked; another one is started'
+    expected = 'the planning process ended with code -9 while working; another one is started'
     with pytest.raises(PlanningProcessError, match=expected):
         process.plan(question(scene=shut_in(), options=endless), kill)
     assert said[-1] == expected
@@ -154,7 +158,7 @@ def test_one_that_has_died_is_replaced_before_it_is_asked(process, said):
     os.kill(before, signal.SIGKILL)
     os.waitid(os.P_PID, before, os.WEXITED | os.WNOWAIT)
     assert process.plan(question()).status is PlanStatus.SOLVED
-    assert 'ended with code -9 while it had nothing to do' in said[-1]
+    assert 'ended with code -9 while idle' in said[-1]
     assert process.pid != before
 
 
@@ -174,7 +178,7 @@ def test_an_error_is_raised_here_with_where_it_was_raised_there(process):
     assert process.plan(question()).status is PlanStatus.SOLVED
 
 
-def test_an_error_that_cannot_be_sent_is_told_in_words():
+def test_an_error_that_cannot_be_sent_becomes_a_sentence():
     class LocalError(Exception):
         pass
 
@@ -190,7 +194,7 @@ def test_an_error_that_cannot_be_sent_is_told_in_words():
     ours.close()
 
 
-def test_an_arm_that_cannot_point_is_refused(process):
+def test_an_arm_that_cannot_point_is_rejected(process):
     turns = ArmModel(
         joint_names=('turn',),
         is_prismatic=(False,),

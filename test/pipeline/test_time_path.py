@@ -26,7 +26,7 @@ WORLD = arm_world(ARM, WEARER, MARGIN, RAY)
 
 @functools.cache
 def paths_without_room(n):
-    """Return n paths round the body, pulled taut in the very world in which they are timed."""
+    """Return n paths round the body, shortcut in the very world in which they are timed."""
     rng, found = np.random.default_rng(8), []
     options = RRTHOptions(time_limit=60.0, improve_time=60.0, club_attempts=0)
     while len(found) < n:
@@ -73,12 +73,12 @@ def test_a_motion_that_is_not_proven_with_rounded_corners_stops_at_each(monkeypa
     monkeypatch.setattr(path_timing, 'grown', lambda world, by: roomy)
     asked = []
 
-    def refuse_the_first(trajectory, world, escape_time):
+    def reject_the_first(trajectory, world, escape_time):
         asked.append(trajectory)
         found = certify(trajectory, world, escape_time)
         return replace(found, is_proven=False) if len(asked) == 1 else found
 
-    monkeypatch.setattr(path_timing, 'certify', refuse_the_first)
+    monkeypatch.setattr(path_timing, 'certify', reject_the_first)
     for path in paths_without_room(20):
         asked.clear()
         motion = timed(path)

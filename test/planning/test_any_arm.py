@@ -106,7 +106,7 @@ def test_motions_of_any_arm_never_touch_and_end_on_target(shape):
         assert first_contact(arm, scene, q, RAY, MARGIN) is None
         reach = np.linalg.norm(target - tool_pose(arm, q[-1])[:3, 3])
         assert first_contact(arm, scene, q[-1:], max(RAY, reach), MARGIN) is None
-        assert plan.reach == pytest.approx(reach, abs=1e-9)
+        assert plan.target_distance == pytest.approx(reach, abs=1e-9)
         assert pointing_error(arm, q[-1], target) < 1e-6
         assert ((q >= arm.bounds[0] - 1e-9) & (q <= arm.bounds[1] + 1e-9)).all()
     assert n_solved >= 6

@@ -12,7 +12,7 @@ import weakref
 import pytest
 
 LONGEST_WAIT = 30.0
-# Answers of a planner that has not heard everything yet, or whose machine is too busy to plan in
+# Answers of a planner that still lacks an input, or whose machine is too busy to plan in
 # time for an arm that moves.
 AGAIN = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'TIMED_OUT')
 
@@ -25,12 +25,12 @@ def wait_until(condition: Callable[[], object], timeout: float = LONGEST_WAIT) -
         time.sleep(0.005)
 
 
-def tell(node, publisher, message) -> None:
+def send(node, publisher, message) -> None:
     """Publish a message, by a latched publisher; return once all have it who are reliable."""
     from rclpy.duration import Duration
-    from rrth_planner.ros.client.planner_client import is_heard
+    from rrth_planner.ros.client.planner_client import is_matched
 
-    wait_until(lambda: is_heard(node, publisher))
+    wait_until(lambda: is_matched(node, publisher))
     publisher.publish(message)
     assert publisher.wait_for_all_acked(Duration(seconds=LONGEST_WAIT))
 
@@ -79,7 +79,7 @@ def _destroyed_nodes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """
     Destroy what nodes a test has made and left, whether it passed or not.
 
-    A node outlives its context. A publisher of one would go on giving its last body to each
+    A node outlives its context. Its publishers would give their last body to each
     planner of the tests after it, whose own body that may replace.
     """
     if 'rclpy.node' not in sys.modules:
@@ -97,7 +97,7 @@ def _destroyed_nodes(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setattr(Node, '__init__', noted)
     yield
     for node in list(made):
-        # One that has been destroyed, or was refused before it had begun.
+        # One that has been destroyed, or was rejected before it had begun.
         with suppress(InvalidHandle, AttributeError), node.handle:
             node.destroy_node()
 
@@ -108,10 +108,10 @@ def _wait_until() -> Callable[..., None]:
     return wait_until
 
 
-@pytest.fixture(name='tell')
-def _tell() -> Callable[..., None]:
-    """Give `tell` to tests."""
-    return tell
+@pytest.fixture(name='send')
+def _send() -> Callable[..., None]:
+    """Give `send` to tests."""
+    return send
 
 
 @pytest.fixture(name='ask')

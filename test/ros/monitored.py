@@ -40,24 +40,24 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
-        # How long a body waits until it is judged [s].
+        # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
             parameters=replace(parameters or declare_parameters(node), replan=False),
-            guard=('', ''),
+            monitor_state=('', ''),
             publish_soon=lambda: None,
-            recertified=lambda took: self.said.append('free'),
-            braked=lambda took: self.said.append('braked') or self.took.append(took),
+            remaining_motion_checked=lambda took: self.said.append('free'),
+            stop_published=lambda took: self.said.append('stopped') or self.took.append(took),
         )
-        self.heard = Inputs('body', 'target', 'joints')
+        self.inputs = Inputs('body', 'target', 'joints')
         publishers = SimpleNamespace(
             publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin)),
             assert_liveliness=lambda: self.alive.append(self.now),
             flush=lambda: None,
         )
-        self.guard = ExecutionMonitor(node, self.heard, self.reporter, publishers)
-        self.guard._now = lambda: self.now
-        self.guard._waited = lambda arrived: self.late
+        self.monitor = ExecutionMonitor(node, self.inputs, self.reporter, publishers)
+        self.monitor._now = lambda: self.now
+        self.monitor._elapsed = lambda arrived: self.late
         self.see(FAR)
         self.read(*self.on_time(PHASE))
         self.begin()
@@ -66,11 +66,11 @@ class Monitored:
     def begin(self):
         """Let a motion begin."""
         running = ExecutingMotion(trajectory=self.motion, start_time=100.0)
-        self.tell(running)
+        self.command(running)
 
-    def tell(self, running, publish=lambda: None):
-        """Tell the arm a motion."""
-        self.guard.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
+    def command(self, running, publish=lambda: None):
+        """Command a motion."""
+        self.monitor.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
 
     def on_time(self, phase):
         """Return positions and velocities of an arm that follows."""
@@ -79,16 +79,16 @@ class Monitored:
     def read(self, q, v):
         """Let joint states come."""
         reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
-        self.heard.joints.value, self.heard.joints.received = reading, self.now
+        self.inputs.joints.value, self.inputs.joints.received = reading, self.now
 
     def see(self, *boxes, expires=float('inf')):
         """Let a body come."""
         parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
-        self.heard.body.value, self.heard.body.received = WearerBody(parts), self.now
-        self.guard.on_body(self.heard.body.value, 0)
+        self.inputs.body.value, self.inputs.body.received = WearerBody(parts), self.now
+        self.monitor.on_body(self.inputs.body.value, 0)
 
     def hand(self, ahead, away, motion=None):
-        """Return a hand so far ahead on the way of the ray [s], and aside of that [m]."""
+        """Return a hand so far ahead along the path of the ray [s], and aside of that [m]."""
         at = PHASE + ahead if motion is None else ahead
         T = reference_checker.frames(ARM, sample(motion or self.motion, [at, at + 0.01])[0])
         tip, next_tip = T[:, -1, :3, 3] + 0.5 * T[:, -1, :3, 2]
@@ -101,9 +101,9 @@ class Monitored:
             self.now = 100.0 + PHASE + 0.01 * k
             self.read(*arm(0.01 * k))
             if k % 2 == 0:
-                self.guard._on_timer()
+                self.monitor._on_timer()
 
-    def obeys(self):
+    def executes(self):
         """Return where an arm is, and how fast, that follows the last stop that was published."""
         stop, begin = self.published[-1]
         return tuple(row[0] for row in sample(stop, [self.now - begin])[:2])

@@ -50,7 +50,7 @@ def target(x=1.5, y=0.1, z=0.3, frame='torso'):
 
 
 def joints(position=FOLDED, name=JOINTS, velocity=None):
-    """Return joint positions, of an arm at rest where nothing else is said."""
+    """Return joint positions, by default of an arm at rest."""
     speeds = [0.0] * len(name) if velocity is None else list(velocity)
     return JointState(name=list(name), position=list(position), velocity=speeds)
 

@@ -32,7 +32,7 @@ MARGIN, RAY = 0.02, 1.0
 
 
 class Client(Node):
-    """Tells the planner where to point, and writes down how the arm moves."""
+    """Publishes inputs of the planner, and records the joint states."""
 
     def __init__(self):
         """Connect to both nodes."""
@@ -55,7 +55,7 @@ def _body(scene):
     return samples.array(*boxes)
 
 
-def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
+def test_both_nodes_work_with_another_arm(wait_until, send, ask, spinning):
     file = resource_path(ARM)
     arm, scene = load_arm(file), load_body(resource_path(BODY))
     client, said = Client(), []
@@ -69,9 +69,9 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
         wait_until(client.plan.service_is_ready, 240.0)
         wait_until(lambda: client.states)
         assert client.states[0].name == list(arm.joint_names)
-        tell(client, client.body, _body(scene))
+        send(client, client.body, _body(scene))
         for target in TARGETS:
-            tell(client, client.target, samples.target(*target))
+            send(client, client.target, samples.target(*target))
             n_states, n_motions = len(client.states), len(client.motions)
             answer = ask(client.plan)
             assert answer.success, (target, answer.message)
@@ -90,10 +90,10 @@ def test_both_nodes_work_with_another_arm(wait_until, tell, ask, spinning):
             assert pointing_error(arm, end, np.array(target)) < 1e-6
             seen = np.array([state.position for state in client.states[n_states:]])
             assert first_contact(arm, scene, seen, RAY, MARGIN) is None
-    assert not [line for line in said if 'refused' in line or 'ERROR' in line]
+    assert not [line for line in said if 'rejected' in line or 'ERROR' in line]
 
 
-def test_a_start_for_another_number_of_joints_is_refused_in_a_sentence(wait_until):
+def test_a_start_for_another_number_of_joints_is_rejected_in_a_sentence(wait_until):
     said = []
     arguments = ['--ros-args', '-p', f'arm:={resource_path(ARM)}']
     with ChildProcess('rrth_planner.ros.playback_node', arguments, said.append):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo from outside: it ends well, or says in one sentence why not, and leaves nothing."""
+"""The demo from outside: it succeeds, or reports in one sentence why not, and leaves nothing."""
 
 import signal
 import subprocess

@@ -23,13 +23,13 @@ from std_msgs.msg import Int32  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 N = 5
-# For messages to come that nobody reads yet [s].
+# For messages to arrive that are not read yet [s].
 DELIVERY = 0.3
 
 
 @pytest.fixture(name='node')
 def _node():
-    """Give a node that hears numbers."""
+    """Give a node that receives numbers."""
     node = Node('barrier')
     node.numbers = []
     node.create_subscription(Int32, 'numbers', lambda msg: node.numbers.append(msg.data), 50)
@@ -51,7 +51,7 @@ def _busy(executor):
     return end
 
 
-def test_what_came_before_is_heard_before(node, spinning, wait_until, monkeypatch):
+def test_what_came_before_is_processed_before(node, spinning, wait_until, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     barrier = ExecutorBarrier(node, lambda: (len(node.numbers), 0))
     with spinning(node) as executor:
@@ -105,11 +105,11 @@ def test_one_that_came_later_ends_the_waiting(node, spinning, monkeypatch, age, 
         came = time.time_ns() - int(age * 1e9)
         with nullcontext() if is_news else pytest.raises(NodeIsBusyError):
             barrier.call(lambda: None)
-    # Who hears more and more, and nothing new, is not waited for for ever.
+    # An executor that handles only old messages is not waited for for ever.
     assert (next(rounds) == 1) == is_news
 
 
-def test_what_nobody_waits_for_any_more_is_not_done(node, spinning, monkeypatch):
+def test_cancelled_work_does_not_run(node, spinning, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 0.3)
     barrier, done = ExecutorBarrier(node, lambda: (0, 0)), []
     with spinning(node) as executor:
@@ -123,12 +123,12 @@ def test_what_nobody_waits_for_any_more_is_not_done(node, spinning, monkeypatch)
     assert done == ['second']
 
 
-def test_a_round_that_was_asked_for_before_tells_nothing(node, spinning, wait_until, monkeypatch):
+def test_a_round_that_was_asked_for_before_does_not_count(node, spinning, wait_until, monkeypatch):
     monkeypatch.setattr(executor_barrier, 'LONGEST', 30.0)
     barrier = ExecutorBarrier(node, lambda: (len(node.numbers), 0))
     with spinning(node) as executor:
         wait_until(lambda: node.out.get_subscription_count() == 1)
-        # One of its rounds is about to end: what comes now has not been looked for in that.
+        # One of its rounds is about to end: what comes now is not part of it.
         end, call = Event(), Event()
         executor.create_task(lambda: call.set() or end.wait(10.0))
         assert call.wait(10.0)

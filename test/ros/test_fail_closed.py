@@ -60,7 +60,7 @@ class Injector:
         self._kind, self._at, self._on_delay = kind, at, on_delay
 
     def __call__(self, frame, event, _):
-        """Look at one event of the interpreter."""
+        """Check one event of the interpreter."""
         wanted = 'return' if self._kind == 'return late' else 'call'
         if event.removeprefix('c_') != wanted:
             return
@@ -96,28 +96,28 @@ def supervised(arm, step):
     try:
         step()
     except Fault as problem:
-        arm.guard.fail(f'{problem}', is_again=False)
+        arm.monitor.fail(f'{problem}', is_replanned=False)
 
 
 def follow(arm):
-    """Let the arm do what it was told last, with bodies and timers, for the time of a stop."""
+    """Let the arm execute its last motion, with bodies and timers, for the time of a stop."""
     begin, waits = arm.now, 0.0
     while arm.now - begin < LONGEST_STOP:
         arm.now += PERIOD
         waits = arm.now - (arm.alive[-1] if arm.alive else begin)
         if not arm.published and waits > LEASE:
-            # The playback, or who watches on a real arm, stops it.
+            # The playback, or the controller of a real arm, stops it.
             return 'its planner is lost'
-        arm.read(*(arm.obeys() if arm.published else arm.on_time(arm.now - 100.0)))
+        arm.read(*(arm.executes() if arm.published else arm.on_time(arm.now - 100.0)))
         supervised(arm, lambda: arm.see(*arm.boxes))
-        # A body that came while the one before was still looked at has waited since then.
+        # A body that came while the one before was still checked has waited since then.
         arm.late = 0.0
-        supervised(arm, arm.guard._on_timer)
-    return 'stopped' if arm.published and not arm.obeys()[1].any() else 'goes on'
+        supervised(arm, arm.monitor._on_timer)
+    return 'stopped' if arm.published and not arm.executes()[1].any() else 'continues'
 
 
-def look(arm, which, kind, at):
-    """Have the monitor look once, with a fault at one call; return the injector."""
+def check(arm, which, kind, at):
+    """Have the monitor check once, with a fault at one call; return the injector."""
 
     def delay():
         arm.now += DELAY
@@ -125,7 +125,9 @@ def look(arm, which, kind, at):
 
     arm.late = 0.0
     with Injector(kind, at, delay) as injector:
-        supervised(arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.guard._on_timer)
+        supervised(
+            arm, (lambda: arm.see(*arm.boxes)) if which == 'body' else arm.monitor._on_timer
+        )
     arm.late = max(0.0, arm.late - PERIOD)
     return injector
 
@@ -138,22 +140,23 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
     while True:
         arm = monitored()
         arm.boxes = [FAR]
-        look(arm, 'body', kind, None)
+        check(arm, 'body', kind, None)
         arm.boxes += [arm.hand(0.6, 0.0)] * is_hand
-        if not look(arm, which, kind, n_hit).is_hit:
+        if not check(arm, which, kind, n_hit).is_hit:
             break
         assert follow(arm) == 'stopped', f'{kind} at call {n_hit}'
-        arm.guard.close()
+        arm.monitor.close()
         n_hit += 1
     assert n_hit >= (50 if which == 'body' else 25)
 
 
 def places():
     """Return what the monitor calls, as (owner, name)."""
-    names = 'scene_of out_of_sight is_still_free leads_away fast_stop arm_world'
+    names = 'scene_of stale_input is_remaining_free escapes_by_continuing fast_stop arm_world'
     found = [(execution_monitor, name) for name in names.split()]
     found += [
-        (execution_tracker, name) for name in ('phase_of', 'sample', 'goes_on', 'is_on_other')
+        (execution_tracker, name)
+        for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
     ]
     for owner in (ExecutionMonitor, ExecutionTracker, Input, WearerBody, ExecutingMotion):
         found += [
@@ -185,13 +188,13 @@ def test_what_fails_for_ever_stops_the_arm_or_loses_its_planner(
     if is_hand or n_calls:
         assert found in ('stopped', 'its planner is lost')
     else:
-        assert found == 'goes on'
+        assert found == 'continues'
 
 
 def test_a_message_that_cannot_be_published_is_published_again(monitored, monkeypatch):
     arm, publish = monitored(), None
     arm.boxes = [FAR, arm.hand(0.6, 0.0)]
-    publish, n_tries = arm.guard._publishers.publish_motion, []
+    publish, n_tries = arm.monitor._publishers.publish_motion, []
 
     def at_the_third_time(*arguments):
         n_tries.append(arm.now)
@@ -199,42 +202,43 @@ def test_a_message_that_cannot_be_published_is_published_again(monitored, monkey
             raise Fault('no middleware')
         publish(*arguments)
 
-    arm.guard._publishers.publish_motion = at_the_third_time
+    arm.monitor._publishers.publish_motion = at_the_third_time
     assert follow(arm) == 'stopped'
     assert len(n_tries) == 3
-    # Nobody said meanwhile that the motion was watched.
+    # Meanwhile liveliness was not asserted.
     assert not [time for time in arm.alive if n_tries[0] <= time < n_tries[-1]]
 
 
-def test_a_body_that_is_refused_stops_the_arm_and_says_why(monitored):
+def test_a_rejected_body_stops_the_arm_with_the_reason(monitored):
     arm = monitored()
     arm.boxes = [FAR]
 
-    def refuse():
+    def reject():
         raise MessageError('marker 3 ("shoe"): pose.position: nan')
 
-    arm.heard.body.accept(refuse, arm.now)
-    arm.guard.on_body(arm.heard.body.value, 0)
+    arm.inputs.body.accept(reject, arm.now)
+    arm.monitor.on_body(arm.inputs.body.value, 0)
     assert len(arm.published) == 1
-    assert arm.reporter.guard[0] == 'brakes'
-    assert 'the last body was refused, marker 3 ("shoe")' in arm.reporter.guard[1]
+    assert arm.reporter.monitor_state[0] == 'stopping'
+    assert 'the last body was rejected, marker 3 ("shoe")' in arm.reporter.monitor_state[1]
 
 
-def test_joint_positions_that_are_refused_stop_the_arm(monitored):
+def test_joint_positions_that_are_rejected_stop_the_arm(monitored):
     arm = monitored()
-    arm.heard.joint_refusal = MessageError('position: nan')
-    arm.guard._on_timer()
+    arm.inputs.joint_rejection = MessageError('position: nan')
+    arm.monitor._on_timer()
     assert len(arm.published) == 1
-    assert 'the last joint positions were refused, position: nan' in arm.reporter.guard[1]
+    assert 'the last joint positions were rejected, position: nan' in arm.reporter.monitor_state[1]
 
 
 @pytest.mark.parametrize(('late', 'n_stops'), [(0.049, 0), (0.051, 1)])
-def test_a_body_that_is_judged_late_stops_the_arm(monitored, late, n_stops):
+def test_a_body_that_is_checked_late_stops_the_arm(monitored, late, n_stops):
     arm = monitored()
     arm.late = late
     arm.see(FAR)
     assert len(arm.published) == n_stops
-    assert ('was judged 0.051 s after it came' in arm.reporter.guard[1]) == bool(n_stops)
+    is_late = 'was checked 0.051 s after its arrival' in arm.reporter.monitor_state[1]
+    assert is_late == bool(n_stops)
 
 
 @pytest.mark.parametrize('replan', [True, False])
@@ -246,17 +250,17 @@ def test_after_an_error_nothing_is_planned_by_itself(
     arm.reporter.parameters = replace(arm.reporter.parameters, replan=replan)
     arm.late = late
     if not late:
-        monkeypatch.setattr(execution_monitor, 'is_still_free', lambda *_, **__: 1 / 0)
+        monkeypatch.setattr(execution_monitor, 'is_remaining_free', lambda *_, **__: 1 / 0)
     arm.see(FAR)
     assert len(arm.published) == 1
-    (stop,) = arm.guard.take_stops()
-    assert stop.is_again == (n_again * replan == 1)
+    (stop,) = arm.monitor.take_stops()
+    assert stop.is_replanned == (n_again * replan == 1)
 
 
 def test_a_planner_that_ends_stops_its_arm(monitored):
     arm = monitored()
-    arm.guard.close()
+    arm.monitor.close()
     assert len(arm.published) == 1
-    assert 'the planner ends' in arm.reporter.guard[1]
-    arm.guard.close()
+    assert 'the planner is shutting down' in arm.reporter.monitor_state[1]
+    arm.monitor.close()
     assert len(arm.published) == 1

@@ -67,7 +67,7 @@ def _planner(ros_context, udp):
 
 @pytest.mark.parametrize('topic', TOPICS)
 def test_requests_are_answered_while_a_topic_is_flooded(
-    client, planner, spinning, tell, wait_until, monkeypatch, tmp_path, topic
+    client, planner, spinning, send, wait_until, monkeypatch, tmp_path, topic
 ):
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join(sys.path))
     process = psutil.Process(planner.pid)
@@ -88,7 +88,7 @@ def test_requests_are_answered_while_a_topic_is_flooded(
     with spinning(client):
         wait_until(client.plan.service_is_ready, 120.0)
         for name, (_, make) in TOPICS.items():
-            tell(client, client.publishers_of[name], make())
+            send(client, client.publishers_of[name], make())
         # The first request finds nothing loaded.
         work_of_answers(lambda: None)
         quiet = work_of_answers(lambda: None).mean()

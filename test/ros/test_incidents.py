@@ -37,7 +37,7 @@ from test_planner_node import _start, inputs_of, say_all  # noqa: E402, F401
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 ROOT = Path(__file__).parent.parent.parent
-TOUCH = Violation(0.25, 0.0123, 'pointing ray', 'head')
+VIOLATION = Violation(0.25, 0.0123, 'pointing ray', 'head')
 SENTENCE = (
     'FAILURE (99999): the two collision checks disagree: pointing ray is 0.0123 m from box "head" '
     'at 0.250 s, expected at least 0.02 m'
@@ -63,12 +63,12 @@ def replayed(file):
 
 
 def level(stranger):
-    return stranger.heard['/diagnostics'][-1].status[0].level
+    return stranger.received['/diagnostics'][-1].status[0].level
 
 
 def nothing_published(stranger):
     topics = ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers')
-    return not any(stranger.heard[topic] for topic in topics)
+    return not any(stranger.received[topic] for topic in topics)
 
 
 @pytest.mark.parametrize('velocity', [None, [0.3, 0.0, 0.0, -0.2]], ids=['at rest', 'moving'])
@@ -80,7 +80,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     )
     say_all(planner, stranger, joint_states=samples.joints(velocity=velocity))
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == f'{SENTENCE}, seed 5; to replay it: ./run exec replay {file}'
@@ -93,7 +93,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     incident = read_incident(file)
     question = incident.question
     assert incident.kind is IncidentKind.DISAGREEMENT
-    assert incident.touch == TOUCH
+    assert incident.touch == VIOLATION
     assert incident.present is None
     assert (question.seed, question.margin, question.ray_guard_length) == (5, 0.02, 1.0)
     assert question.options == RRTStarOptions(max_samples=500)
@@ -120,7 +120,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
+def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     start, monkeypatch, tmp_path
 ):
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
@@ -131,7 +131,7 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     scene, goal = scene_of(inputs_of(planner).body.value), inputs_of(planner).target.value
 
     def follow_up():
-        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_begun))
+        monitor._stops.append(Stop(stop, goal, parameters, scene, False, monitor.n_motions))
         stranger.wait_until(lambda: not monitor._stops)
         # Whatever the node's thread is at.
         time.sleep(0.05)
@@ -141,13 +141,13 @@ def test_a_stop_that_touches_for_the_second_judge_is_kept_to_be_replayed(
     with monkeypatch.context() as patch:
         # What agrees leaves nothing behind.
         assert not list(tmp_path.iterdir())
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         follow_up()
     (file,) = tmp_path.iterdir()
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
     incident = read_incident(file)
-    assert incident.touch == TOUCH
+    assert incident.touch == VIOLATION
     np.testing.assert_array_equal(incident.trajectory.positions, stop.positions)
     assert replayed(file)[0] == 1
 
@@ -158,7 +158,7 @@ def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkey
     planner, stranger = start(incident_folder=str(file / 'folder'), seed=5)
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     assert message.startswith(
         f'{SENTENCE}, seed 5; no file was written to replay it: NotADirectoryError: '
@@ -174,7 +174,7 @@ def test_files_are_kept_among_the_logs_by_default(start, monkeypatch, tmp_path):
     say_all(planner, stranger)
     with monkeypatch.context() as patch:
         patch.setenv('ROS_LOG_DIR', str(tmp_path))
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         message = stranger.answer().message
     (file,) = (tmp_path / 'rrth_planner').iterdir()
     assert message.endswith(str(file))
@@ -188,7 +188,7 @@ def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
         raise OSError('nothing works')
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'tell', fail)
+        patch.setattr(planner._queue._publishers, 'publish', fail)
         patch.setattr(incidents, 'error_incident', fail)
         message = stranger.answer().message
     assert message == 'FAILURE (99999): planning failed unexpectedly: OSError: nothing works'
@@ -203,7 +203,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
         raise OSError('no publisher')
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'tell', fail)
+        patch.setattr(planner._queue._publishers, 'publish', fail)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == (
@@ -239,20 +239,22 @@ def test_an_error_before_anything_was_asked_leaves_no_file(start, monkeypatch, t
 
 def test_each_request_is_logged_once_with_figures_or_with_its_code(start, monkeypatch, tmp_path):
     planner, stranger = start(seed=3, incident_folder=str(tmp_path))
-    stranger.hear('/rosout', Log, 100)
+    stranger.subscribe('/rosout', Log, 100)
     name = planner.get_logger().name
     say_all(planner, stranger)
     stranger.wait_until(lambda: planner.count_subscribers('/rosout') > 0)
     answers = [stranger.answer() for _ in range(2)]
     with monkeypatch.context() as patch:
-        patch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
+        patch.setattr(trajectory_validation, 'first_violation', lambda *_: VIOLATION)
         answers.append(stranger.answer())
     stranger.say('target', samples.target(0.0, 0.0, 0.0))
     stranger.wait_until(lambda: not inputs_of(planner).target.value.target.any())
     answers.append(stranger.answer())
 
     def lines():
-        return [msg for msg in stranger.heard['/rosout'] if msg.name == name and '): ' in msg.msg]
+        return [
+            msg for msg in stranger.received['/rosout'] if msg.name == name and '): ' in msg.msg
+        ]
 
     stranger.wait_until(lambda: len(lines()) == len(answers))
     assert [msg.msg for msg in lines()] == [answer.message for answer in answers]
@@ -275,37 +277,37 @@ def test_diagnostics_say_everything(start):
             for name in ('body', 'target', 'joints')
             for kind, unit in (
                 *(('age of', ' [s]'), ('good messages,', '')),
-                ('refused messages,', ''),
+                ('rejected messages,', ''),
             )
         ),
     ):
         assert float(stranger.value(name)) >= 0.0, name
-    for name in ('last sentence', 'last incident', 'guard', 'last stop', 'last refusal, body'):
+    for name in ('last sentence', 'last incident', 'monitor', 'last stop', 'last rejection, body'):
         assert isinstance(stranger.value(name), str)
 
 
 def test_the_summary_of_diagnostics_is_what_is_worst(start):
     planner, _ = start(body_timeout=1.0)
-    heard = Inputs('body', 'target', 'joints')
+    inputs = Inputs('body', 'target', 'joints')
 
     def summary(now=10.0, code=None, sentence=''):
         report = PlanReport(code=code, sentence=sentence)
         parameters = planner._reporter.parameters
-        (status,) = diagnostics_msg('', Time(), now, heard, parameters, report).status
+        (status,) = diagnostics_msg('', Time(), now, inputs, parameters, report).status
         return status.level, status.message
 
-    def refuse():
+    def reject():
         raise MessageError('no point')
 
     assert summary() == (DiagnosticStatus.WARN, 'waiting for body, target, joints')
-    for topic in heard.all.values():
+    for topic in inputs.all.values():
         topic.accept(lambda topic=topic: topic.value, 10.0)
     assert summary() == (DiagnosticStatus.OK, 'ready')
     assert summary(code=ErrorCode.SUCCESS, sentence='so') == (DiagnosticStatus.OK, 'so')
     late = {'code': ErrorCode.TIMED_OUT, 'sentence': 'no path'}
     assert summary(**late) == (DiagnosticStatus.WARN, 'TIMED_OUT (-6): no path')
-    heard.target.accept(refuse, 10.0)
-    assert summary(**late) == (DiagnosticStatus.WARN, 'target refused: no point')
+    inputs.target.accept(reject, 10.0)
+    assert summary(**late) == (DiagnosticStatus.WARN, 'target rejected: no point')
     assert summary(11.5, **late) == (DiagnosticStatus.STALE, 'body is 1.500 s old')
     broken = (DiagnosticStatus.ERROR, 'FAILURE (99999): it broke')
     assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken
@@ -314,11 +316,11 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
 def test_only_so_many_expired_boxes_are_remembered_as_named(start, monkeypatch):
     monkeypatch.setattr(reporter, 'MOST_NAMED', 3)
     planner, _ = start()
-    heard = inputs_of(planner).body
+    source = inputs_of(planner).body
     for k in range(20):
         hat = samples.box('hat', k)
         hat.lifetime.nanosec = 1
-        heard.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
+        source.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
         planner._reporter._warn_of_expired(1.0)
         named = planner._reporter._named
         assert ('hat', k) in named
@@ -347,10 +349,10 @@ def test_what_is_in_the_way_is_named_with_the_part_of_the_arm(start):
     assert ' m inside box "back pack"' in message
 
 
-def test_postures_that_all_touch_are_told_with_part_and_box(start):
+def test_configurations_that_all_violate_are_reported_with_part_and_box(start):
     planner, stranger = start()
     body = samples.wearer()
-    # A wall between the arm and the target, larger than the arm can look past.
+    # A wall between the arm and the target, larger than the arm can point past.
     body.markers.append(samples.box('wall', 7, (1.0, 0.0, 0.0), (0.1, 20.0, 20.0)))
     say_all(planner, stranger, body_boxes=body)
     message = stranger.answer().message

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes promise of names, frames, clocks and lives, seen from outside."""
+"""Names, frames, clocks and liveliness of the nodes, from outside."""
 
 import time
 from types import SimpleNamespace
@@ -102,20 +102,20 @@ def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_
         strangers[0].say('/wearer', wearer())
         strangers[0].say('joint_states', joints())
         strangers[0].say('target', target(*points[0]))
-        heard = [inputs_of(p) for p in planners]
-        wait_until(lambda: heard[0].target.received is not None)
-        wait_until(lambda: heard[0].joints.received is not None)
-        wait_until(lambda: all(inputs.body.received is not None for inputs in heard))
+        all_inputs = [inputs_of(p) for p in planners]
+        wait_until(lambda: all_inputs[0].target.received is not None)
+        wait_until(lambda: all_inputs[0].joints.received is not None)
+        wait_until(lambda: all(inputs.body.received is not None for inputs in all_inputs))
         assert strangers[0].answer().success
         assert 'no target yet on /b/target' in strangers[1].answer().message
         strangers[1].say('joint_states', joints())
         strangers[1].say('target', target(*points[1]))
-        wait_until(lambda: heard[1].joints.received is not None)
-        wait_until(lambda: heard[1].target.received is not None)
+        wait_until(lambda: all_inputs[1].joints.received is not None)
+        wait_until(lambda: all_inputs[1].target.received is not None)
         assert strangers[1].answer().success
-        wait_until(lambda: all(s.heard['joint_trajectory'] for s in strangers))
+        wait_until(lambda: all(s.received['joint_trajectory'] for s in strangers))
     for stranger, point in zip(strangers, points, strict=True):
-        (msg,) = stranger.heard['joint_trajectory']
+        (msg,) = stranger.received['joint_trajectory']
         q = np.array(msg.points[-1].positions)
         assert pointing_error(load_arm(), q, np.array(point)) < 1e-6
     for planner, stranger in zip(planners, strangers, strict=True):
@@ -167,7 +167,7 @@ def _tf(monkeypatch):
 @pytest.mark.usefixtures('tf')
 def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     planner, stranger = start()
-    buffer = planner._listener._frames._buffer
+    buffer = planner._scene_monitor._frames._buffer
     assert buffer.node is buffer.listener is planner
     # (0.1, -0.5, 0.3) from the camera is (1.5, 0.1, 0.3) from the torso.
     say_all(planner, stranger, target=target(0.1, -0.5, 0.3, 'camera'))
@@ -181,7 +181,7 @@ def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     np.testing.assert_allclose(placed.rotation[:, 0], [0.0, 1.0, 0.0], atol=1e-12)
     assert stranger.answer().success
     stranger.publishers['target'].publish(target(frame='gone'))
-    stranger.wait_until(lambda: inputs.target.is_last_refused)
+    stranger.wait_until(lambda: inputs.target.is_last_rejected)
     message = stranger.answer().message
     assert message.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
     assert 'frame "gone", expected a frame that TF can transform to "torso": ' in message
@@ -193,12 +193,12 @@ def _clock(spinning):
     node = Node('clock')
     publisher = node.create_publisher(Clock, '/clock', 10)
 
-    def tell(seconds):
+    def send(seconds):
         sec, nanosec = divmod(round(seconds * 10**9), 10**9)
         msg = Clock(clock=Time(sec=sec, nanosec=nanosec))
         publisher.publish(msg)
 
-    yield tell
+    yield send
     node.destroy_node()
 
 
@@ -209,23 +209,23 @@ def seconds(node):
 
 
 def set_clock(clock, now, wait_until, *nodes):
-    """Tell a time until everybody has heard it; clocks are often said, not latched."""
+    """Publish a time until all nodes have it; clocks are published often, not latched."""
 
-    def is_told():
+    def is_received():
         clock(now)
         return all(abs(seconds(node) - now) < 1e-6 for node in nodes)
 
-    wait_until(is_told)
+    wait_until(is_received)
 
 
 def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until):
     planner, stranger = start(use_sim_time=True, body_timeout=1.0, joint_timeout=5.0)
-    # Before anybody has told the time it is 0, and plans are made all the same.
+    # Before the first clock message the time is 0, and plans are made all the same.
     say_all(planner, stranger)
     assert seconds(planner) == 0.0
     assert stranger.answer().success
-    n = len(stranger.heard['/diagnostics'])
-    wait_until(lambda: len(stranger.heard['/diagnostics']) > n + 2)
+    n = len(stranger.received['/diagnostics'])
+    wait_until(lambda: len(stranger.received['/diagnostics']) > n + 2)
     set_clock(clock, 100.0, wait_until, planner)
     inputs = inputs_of(planner)
     for now, is_fresh in ((100.0, True), (100.5, True), (101.5, False), (20.0, False)):
@@ -234,7 +234,7 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
         set_clock(clock, now, wait_until, planner)
         message = stranger.answer().message
         assert message.startswith('SUCCESS' if is_fresh else 'SENSOR_INFO_STALE (-24)'), message
-    # What is heard after the clock was set back counts from then on.
+    # Messages after the clock was set back count from then on.
     say_inputs(stranger, inputs, wait_until, 20.0)
     assert stranger.answer().success
     for _ in range(3):
@@ -242,15 +242,13 @@ def test_simulated_time_may_stand_still_or_be_set_back(start, clock, wait_until)
 
 
 def say_inputs(stranger, inputs, wait_until, now):
-    """Say all inputs again and wait until they are heard at a time [s]."""
+    """Publish all inputs again and wait until they are received at a time [s]."""
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: all(abs(heard.received - now) < 1e-6 for heard in inputs.all.values()))
+    wait_until(lambda: all(abs(source.received - now) < 1e-6 for source in inputs.all.values()))
 
 
-def test_an_arm_in_motion_is_taken_over_while_simulated_time_stands_still(
-    start, clock, wait_until
-):
+def test_a_handover_works_while_simulated_time_stands_still(start, clock, wait_until):
     planner, stranger = start(use_sim_time=True)
     set_clock(clock, 7.0, wait_until, planner)
     say_all(planner, stranger, joint_states=joints(velocity=[0.1, 0.0, 0.0, 0.0]))
@@ -315,7 +313,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_is_set)
-    # The motion is watched by them too.
+    # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.endswith(f'seed {seed}')
         assert planner._monitor._parameters.margin == margin
@@ -323,7 +321,7 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
 
 
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE])
-def test_the_playback_hears_reliable_publishers(spinning, wait_until, profile):
+def test_the_playback_receives_from_reliable_publishers(spinning, wait_until, profile):
     node, planner = PlaybackNode(namespace='/quality'), Node('planner', namespace='/quality')
     motions = planner.create_publisher(JointTrajectory, 'joint_trajectory', profile)
     with spinning(node, planner):
@@ -339,23 +337,23 @@ def test_bytes_and_huge_messages_from_the_wire_end_no_node(start, spinning, wait
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, topics = inputs_of(planner), ('body_boxes', 'target', 'joint_states')
-    for k, (topic, heard) in enumerate(zip(topics, inputs.all.values(), strict=True)):
-        before = heard.value
+    for k, (topic, source) in enumerate(zip(topics, inputs.all.values(), strict=True)):
+        before = source.value
         stranger.publishers[topic].publish(b'\0\1\0\0' + b'\xff' * 40)
-        wait_until(lambda h=heard: h.n_refused == 1)
-        assert 'bytes that are no ' in str(heard.refusal)
-        assert heard.value is before, k
+        wait_until(lambda h=source: h.n_rejected == 1)
+        assert 'bytes that are no ' in str(source.rejection)
+        assert source.value is before, k
     stranger.publishers['body_boxes'].publish(array(*(box(index=k) for k in range(3000))))
-    wait_until(lambda: inputs.body.n_refused == 2)
-    assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.refusal)
+    wait_until(lambda: inputs.body.n_rejected == 2)
+    assert 'bytes, expected a MarkerArray of at most' in str(inputs.body.rejection)
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: not any(heard.is_last_refused for heard in inputs.all.values()))
+    wait_until(lambda: not any(source.is_last_rejected for source in inputs.all.values()))
     assert stranger.answer().success
 
 
 class Watcher(Node):
-    """Tells a planner of its own namespace where to point, and writes down the states."""
+    """Publishes inputs of the planner of its namespace, and records the joint states."""
 
     def __init__(self):
         super().__init__('watcher', namespace='/killed')
@@ -368,8 +366,8 @@ class Watcher(Node):
         self.plan = self.create_client(Trigger, 'rrth_planner/plan')
         self.arm = self.create_publisher(JointTrajectory, 'joint_trajectory', 1)
 
-    def tell_slowly(self, positions):
-        """Tell the arm a motion of 100 s."""
+    def publish_slowly(self, positions):
+        """Command a motion of 100 s."""
         msg = motion(positions, 100)
         msg.points[0].positions = list(self.states[-1].position)
         self.arm.publish(msg)
@@ -386,7 +384,7 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
     module = 'rrth_planner.ros.planner_node'
 
     def ask():
-        # A killed node stays in the lists of others for a while: some requests are for nobody.
+        # A killed node stays in the lists of others for a while: some requests reach no node.
         wait_until(watcher.plan.service_is_ready, 120.0)
         while True:
             future, end = watcher.plan.call_async(Trigger.Request()), time.monotonic() + 2.0
@@ -413,9 +411,9 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
         wait_until(lambda: watcher.speed == 0.0)
         goal = watcher.motions[0].points[-1].positions
         assert np.abs(np.array(watcher.states[-1].position) - goal).max() > 0.1
-        wait_until(lambda: any('the planner is lost' in line for line in said))
-        # Somebody whose liveliness nobody asks for moves the arm on.
-        watcher.tell_slowly(goal)
+        wait_until(lambda: any('planner liveliness lost' in line for line in said))
+        # A publisher without supervised liveliness moves the arm on.
+        watcher.publish_slowly(goal)
         wait_until(lambda: watcher.speed > 0.011)
         watcher.target.publish(target(1.2, 0.9, 0.6))
         with ChildProcess(module, ros, lines.append) as second:
@@ -423,13 +421,13 @@ def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinnin
             # All this time the playback went on.
             assert watcher.speed > 0.011
             playback.check()
-            # A motion that takes over from one that nobody knows may come too late for it.
+            # A handover from an unknown motion may come too late.
             while watcher.speed > 0.0:
                 n_said, answer, end = len(said), ask(), time.monotonic() + 10.0
                 assert answer.success, answer.message
                 while watcher.speed > 0.0 and time.monotonic() < end:
                     time.sleep(0.01)
-                assert watcher.speed == 0.0 or 'refused' in str(said[n_said:]), said
+                assert watcher.speed == 0.0 or 'rejected' in str(said[n_said:]), said
             second.check()
     q = np.array([state.position for state in watcher.states])
     stamps = np.array([s.header.stamp.sec + 1e-9 * s.header.stamp.nanosec for s in watcher.states])

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How much of everything is taken: more is refused in one sentence, at once and whole."""
+"""How much of everything is taken: more is rejected in one sentence, at once and whole."""
 
 import bisect
 from pathlib import Path
@@ -26,7 +26,7 @@ from rrth_planner.model.errors import LONGEST_SENTENCE, MessageError, one_line  
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input, PlanInputs, RequestError  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, InputSnapshot, RequestError  # noqa: E402
 from rrth_planner.ros.messages.body import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -51,7 +51,7 @@ from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 SECURITY = Path(__file__).parents[2] / 'docs' / 'security.md'
 
 
-def refusal(call, *arguments):
+def rejection(call, *arguments):
     """Return the sentence of a MessageError, which is one line of bounded length."""
     with pytest.raises(MessageError) as caught:
         call(*arguments)
@@ -68,13 +68,13 @@ def cube_list(n, index=0):
     return marker
 
 
-def test_a_million_markers_are_refused_before_they_are_decoded():
+def test_a_million_markers_are_rejected_before_they_are_decoded():
     one = serialize_message(array(box()))
     # What the middleware hands over: header, number of markers, markers.
     data = one[:4] + (10**6).to_bytes(4, 'little') + one[8:] * 10**6
     assert len(data) > 10**8
     begin = time.process_time()
-    sentence = refusal(decoded, data, MarkerArray)
+    sentence = rejection(decoded, data, MarkerArray)
     assert time.process_time() - begin < 0.1
     assert sentence == f'{len(data)} bytes, expected a MarkerArray of at most {MOST_BYTES}'
 
@@ -83,24 +83,24 @@ def test_a_million_markers_are_refused_before_they_are_decoded():
 @pytest.mark.parametrize('msg_type', [MarkerArray, JointState, JointTrajectory])
 def test_a_length_that_the_message_does_not_have_is_no_message(msg_type, length):
     lie = length.to_bytes(4, 'little')
-    assert 'bytes that are no ' in refusal(decoded, b'\0\1\0\0' + lie * 20, msg_type)
+    assert 'bytes that are no ' in rejection(decoded, b'\0\1\0\0' + lie * 20, msg_type)
 
 
 def test_as_many_boxes_as_are_taken_fit_into_a_message():
     msg = decoded(serialize_message(array(cube_list(MOST_BOXES))), MarkerArray)
     body = WearerBody().edited(read_edits(msg, 0.0, 'torso'), 0.0)
     assert body.n_boxes == MOST_BOXES
-    sentence = refusal(body.edited, read_edits(array(box('hat')), 0.0, 'torso'), 0.0)
+    sentence = rejection(body.edited, read_edits(array(box('hat')), 0.0, 'torso'), 0.0)
     assert sentence == f'{MOST_BOXES + 1} boxes, expected at most {MOST_BOXES} in all'
-    sentence = refusal(read_edits, array(cube_list(MOST_BOXES + 1)), 0.0, 'torso')
+    sentence = rejection(read_edits, array(cube_list(MOST_BOXES + 1)), 0.0, 'torso')
     assert f'points: {MOST_BOXES + 1}, expected 1 to {MOST_BOXES}' in sentence
 
 
-def test_a_long_namespace_is_refused_and_a_long_text_cut_short():
-    sentence = refusal(read_edits, array(box('n' * (LONGEST_NAMESPACE + 1))), 0.0, 'torso')
+def test_a_long_namespace_is_rejected_and_a_long_text_cut_short():
+    sentence = rejection(read_edits, array(box('n' * (LONGEST_NAMESPACE + 1))), 0.0, 'torso')
     assert f'ns of {LONGEST_NAMESPACE + 1} characters, expected at most' in sentence
     gone = command(Marker.DELETE, 'n' * 10**6)
-    assert 'ns of 1000000 characters' in refusal(read_edits, array(gone), 0.0, 'torso')
+    assert 'ns of 1000000 characters' in rejection(read_edits, array(gone), 0.0, 'torso')
     hat = box('n' * LONGEST_NAMESPACE, text='hat\n' * 10**5)
     (edit,) = read_edits(array(hat), 0.0, 'torso')
     name = edit.part.boxes[0].name
@@ -109,9 +109,9 @@ def test_a_long_namespace_is_refused_and_a_long_text_cut_short():
 
 
 def test_a_long_frame_is_named_in_short():
-    sentence = refusal(read_edits, array(box(frame='f' * 10**6)), 0.0, 'torso')
+    sentence = rejection(read_edits, array(box(frame='f' * 10**6)), 0.0, 'torso')
     assert sentence.startswith('marker 0 ("torso/0"): frame "fff')
-    assert refusal(goal_from_msg, target(frame='a\nb\x1b'), 'torso').startswith('frame "a b?", ')
+    assert rejection(goal_from_msg, target(frame='a\nb\x1b'), 'torso').startswith('frame "a b?", ')
 
 
 def test_many_joints_of_others_are_passed_over_and_named_in_short():
@@ -120,9 +120,9 @@ def test_many_joints_of_others_are_passed_over_and_named_in_short():
     reading = joint_reading(joints([*zeros, *FOLDED], [*names, *JOINTS]), JOINTS, 1.0, None)
     assert reading.positions.tolist() == FOLDED
     bad = joints([*zeros, *FOLDED[:3]], [*names, *JOINTS[:3]])
-    assert "no ['joint_4'] in" in refusal(joint_reading, bad, JOINTS, 1.0, None)
+    assert "no ['joint_4'] in" in rejection(joint_reading, bad, JOINTS, 1.0, None)
     more = JointState(name=[f'wheel_{k}' for k in range(50_000)])
-    assert 'expected a JointState of at most' in refusal(
+    assert 'expected a JointState of at most' in rejection(
         decoded, serialize_message(more), JointState
     )
 
@@ -138,19 +138,19 @@ def _motion(n):
     return msg
 
 
-def test_a_motion_of_too_many_points_is_refused():
+def test_a_motion_of_too_many_points_is_rejected():
     longest = decoded(
         serialize_message(_motion(MOST_POINTS)), JointTrajectory, MOST_BYTES_OF_MOTION
     )
     assert len(joint_trajectory_from_msg(longest, JOINTS).times) == MOST_POINTS
     more = _motion(MOST_POINTS + 1)
-    sentence = refusal(joint_trajectory_from_msg, more, JOINTS)
+    sentence = rejection(joint_trajectory_from_msg, more, JOINTS)
     assert sentence == f'points: {MOST_POINTS + 1}, expected at most {MOST_POINTS}'
     data = serialize_message(more)
     head, point = data[:-136], data[-136:]
     data = head + 90_000 * point
     begin = time.process_time()
-    assert 'bytes, expected a JointTrajectory of at most' in refusal(
+    assert 'bytes, expected a JointTrajectory of at most' in rejection(
         decoded, data, JointTrajectory, MOST_BYTES_OF_MOTION
     )
     assert time.process_time() - begin < 0.1
@@ -159,7 +159,7 @@ def test_a_motion_of_too_many_points_is_refused():
 def test_long_names_of_a_motion_are_named_in_short():
     msg = _motion(1)
     msg.joint_names = ['j' * 10**6]
-    assert refusal(joint_trajectory_from_msg, msg, JOINTS).startswith('joint_names: ')
+    assert rejection(joint_trajectory_from_msg, msg, JOINTS).startswith('joint_names: ')
 
 
 def test_the_last_of_many_that_have_expired_are_kept():
@@ -177,20 +177,20 @@ def test_what_has_expired_is_kept_by_its_first_box_only():
     assert [b.name for _, part in body.expired for b in part.boxes] == ['torso/0[0]']
 
 
-def test_a_box_of_next_to_no_size_is_an_obstacle_and_huge_numbers_are_refused():
+def test_a_box_of_next_to_no_size_is_an_obstacle_and_huge_numbers_are_rejected():
     tiny = WearerBody().apply(array(box(size=(5e-324, 1e-310, 1e-300))), 0.0, 'torso')
     assert scene_of(tiny).boxes[0].size[0] == 5e-324
-    assert 'expected' in refusal(read_edits, array(box(center=(1.7e308,) * 3)), 0.0, 'torso')
-    assert 'expected' in refusal(goal_from_msg, target(1.7e308, 1.7e308), 'torso')
+    assert 'expected' in rejection(read_edits, array(box(center=(1.7e308,) * 3)), 0.0, 'torso')
+    assert 'expected' in rejection(goal_from_msg, target(1.7e308, 1.7e308), 'torso')
 
 
-def test_joints_and_motions_beyond_what_is_proven_are_refused():
+def test_joints_and_motions_beyond_what_is_proven_are_rejected():
     for bad in (1.1e4, -1e300):
-        sentence = refusal(joint_reading, joints([bad, *FOLDED[1:]]), JOINTS, 1.0, None)
+        sentence = rejection(joint_reading, joints([bad, *FOLDED[1:]]), JOINTS, 1.0, None)
         assert 'expected numbers of at most 10000 [rad]' in sentence
         msg = _motion(2)
         msg.points[1].positions[0] = bad
-        sentence = refusal(joint_trajectory_from_msg, msg, JOINTS)
+        sentence = rejection(joint_trajectory_from_msg, msg, JOINTS)
         assert sentence.startswith('positions: ')
         assert 'expected numbers of at most 10000 [rad]' in sentence
 
@@ -226,7 +226,7 @@ def test_an_answer_of_somebody_else_is_one_line():
     answered = answer_from_text('SUCCESS (1): a\nb \x1b[31m, seed 7')
     assert answered.sentence == 'a b ?[31m, seed 7'
     assert answered.figures == {'seed': 7}
-    assert 'expected NAME' in refusal(answer_from_text, f'SUCCESS ({"1" * 5000}): a')
+    assert 'expected NAME' in rejection(answer_from_text, f'SUCCESS ({"1" * 5000}): a')
 
 
 def test_answers_are_one_line_whatever_they_quote():
@@ -238,14 +238,14 @@ def test_answers_are_one_line_whatever_they_quote():
 
 
 def test_an_age_is_unknown_once_the_clock_was_set_back():
-    heard = Input('target', None)
-    assert heard.age(5.0) == float('inf')
-    heard.accept(lambda: None, 100.0)
-    assert heard.age(100.5) == 0.5
-    assert heard.age(99.99) == 0.0
-    assert heard.age(50.0) == float('inf')
-    heard.accept(lambda: None, 50.0)
-    assert heard.age(50.25) == 0.25
+    source = Input('target', None)
+    assert source.age(5.0) == float('inf')
+    source.accept(lambda: None, 100.0)
+    assert source.age(100.5) == 0.5
+    assert source.age(99.99) == 0.0
+    assert source.age(50.0) == float('inf')
+    source.accept(lambda: None, 50.0)
+    assert source.age(50.25) == 0.25
 
 
 def test_a_clock_that_was_set_back_makes_no_speed():
@@ -263,9 +263,9 @@ def test_stamps_of_any_time_do_not_date_a_reading():
         assert joint_reading(msg, JOINTS, 1000.0, None).taken == 1000.0
 
 
-def test_an_arm_that_is_nowhere_soon_is_refused():
+def test_an_arm_that_is_nowhere_soon_is_rejected():
     reading = joint_reading(joints(velocity=[0.0, -1.5e308, 0.0, 0.0]), JOINTS, 0.0, None)
-    inputs = PlanInputs(Scene(()), PointingGoal([1.0, 0.0, 0.0]), reading)
-    assert np.isfinite(inputs.ahead(None, 1.0, load_arm()).state.positions).all()
-    with pytest.raises(RequestError, match=r'joint_2 moves at .*somewhere 2\.000 s later'):
-        inputs.ahead(None, 2.0, load_arm())
+    inputs = InputSnapshot(Scene(()), PointingGoal([1.0, 0.0, 0.0]), reading)
+    assert np.isfinite(inputs.start_state_at(None, 1.0, load_arm()).state.positions).all()
+    with pytest.raises(RequestError, match=r'joint_2 moves at .*a finite position 2\.000 s later'):
+        inputs.start_state_at(None, 2.0, load_arm())

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Two hundred requests to a node of its own, each answer judged by the oracle."""
+"""Two hundred requests to a node of its own, each answer checked by the reference checker."""
 
 import re
 import time
@@ -39,7 +39,7 @@ RESPONSE = 'request to trajectory [ms]'
 
 
 class Client(Node):
-    """Tells the planner everything, and keeps what it publishes."""
+    """Publishes all inputs, and keeps what the planner publishes."""
 
     def __init__(self):
         """Connect to the planner's topics and service."""
@@ -69,42 +69,42 @@ def _body_message(scene):
 
 
 def _free_start(rng, arm, scene):
-    """Return the folded posture where it is free, or a random free one."""
+    """Return the folded configuration where it is free, or a random free one."""
     q = np.array(samples.FOLDED)
     while reference_checker.first_contact(arm, scene, q[None], RAY, MARGIN + 0.002) is not None:
         q = rng.uniform(*arm.bounds)
     return q
 
 
-def _is_blocked_by_oracle(rng, arm, scene, target):
-    """Return whether the target is too near to a box, or random postures that aim all touch."""
+def _is_blocked_by_reference(rng, arm, scene, target):
+    """Return whether the target is too near a box, or random goal configurations all violate."""
     for box in scene.boxes:
         local = box.rotation.T @ (target - box.center)
         if (np.abs(local) <= 0.5 * box.size + MARGIN).all():
             return True
     world = arm_world(arm, scene, MARGIN, RAY)
     in_mount = target_in_mount(arm, PointingGoal(target))
-    postures, rays = [], []
+    configurations, rays = [], []
     for _ in range(4000):
         q = rng.uniform(*arm.bounds)
         reach = pan_tilt_ik.aim(
             world.robot, arm.bounds, in_mount, q.copy(), int(rng.integers(2)), q
         )
         if reach >= 0.0:
-            postures.append(q)
+            configurations.append(q)
             rays.append([max(RAY, reach)])
-    ends = reference_checker.bars(arm, np.array(postures), np.array(rays))
-    is_touching = np.zeros(len(ends), dtype=bool)
+    ends = reference_checker.bars(arm, np.array(configurations), np.array(rays))
+    collides = np.zeros(len(ends), dtype=bool)
     for box in scene.boxes:
         # Half a centimetre of room: what is only just free may be missed by a finite search.
         half = 0.5 * box.size + MARGIN + 0.005
-        is_touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+        collides |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
             axis=1
         )
-    return bool(is_touching.all())
+    return bool(collides.all())
 
 
-def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, tell, spinning):
+def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, send, spinning):
     rng = np.random.default_rng(2024)
     arm, limits = worlds.table_1_arm(), worlds.limits()
     client = Client()
@@ -116,17 +116,17 @@ def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, tell, s
         for _ in range(N_BODIES):
             scene = worlds.varied_body(rng)
             q = _free_start(rng, arm, scene)
-            # The last motion is seen not to be followed: another body is no reason to stop it.
+            # The last motion is found not to be executed: another body does not stop it.
             time.sleep(0.4)
-            tell(client, client.joints, samples.joints(q.tolist()))
+            send(client, client.joints, samples.joints(q.tolist()))
             time.sleep(0.05)
-            tell(client, client.body, _body_message(scene))
+            send(client, client.body, _body_message(scene))
             for k in range(N_TARGETS + N_NEAR):
                 direction = rng.standard_normal(3)
                 length = rng.uniform(0.7, 4.0) if k < N_TARGETS else rng.uniform(0.1, 0.5)
                 target = length * direction / np.linalg.norm(direction)
-                tell(client, client.joints, samples.joints(q.tolist()))
-                tell(client, client.target, samples.target(*target))
+                send(client, client.joints, samples.joints(q.tolist()))
+                send(client, client.target, samples.target(*target))
                 n_before, n_asked = len(client.motions), sum(codes.values())
                 future = client.plan.call_async(Trigger.Request())
                 wait_until(future.done)
@@ -138,14 +138,14 @@ def test_two_hundred_motions_round_twenty_bodies_never_touch(wait_until, tell, s
                     assert code == 'GOAL_IN_COLLISION', answer.message
                     name = re.search(r'box "([^"]+)"', answer.message).group(1)
                     assert name in {box.name for box in scene.boxes}
-                    assert _is_blocked_by_oracle(rng, arm, scene, target), answer.message
+                    assert _is_blocked_by_reference(rng, arm, scene, target), answer.message
                     assert len(client.motions) == n_before
                     continue
                 wait_until(lambda n=n_before: len(client.motions) == n + 1)
                 wait_until(lambda n=n_asked: int(client.figures.get('requests', 0)) > n)
                 times.append(float(client.figures[RESPONSE]))
                 motion = joint_trajectory_from_msg(client.motions[-1], arm.joint_names)
-                # Raises where the motion touches at 0.5 ms sampling, or misses by 1 mm.
+                # Raises where the motion violates at 0.5 ms sampling, or misses by 1 mm.
                 inspect_motion(
                     arm,
                     scene,

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to the core's types and back: round trips, and a sentence for each refusal."""
+"""Messages to the core's types and back: round trips, and a sentence for each rejection."""
 
 from itertools import pairwise
 
@@ -21,7 +21,7 @@ from rrth_planner.ros.messages import body as bodies, marker_edits  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import (  # noqa: E402
     answer,
-    code_of_refusal,
+    code_of_rejection,
     CODE_OF_STATUS,
     ErrorCode,
 )
@@ -153,7 +153,7 @@ BAD_MARKERS = [
 
 
 @pytest.mark.parametrize(('spoil', 'sentence'), BAD_MARKERS)
-def test_an_array_with_a_bad_marker_is_refused_whole(spoil, sentence):
+def test_an_array_with_a_bad_marker_is_rejected_whole(spoil, sentence):
     body = body_of(box('old'))
     bad = box('hand', 3)
     spoil(bad)
@@ -169,7 +169,7 @@ def test_an_unknown_frame_is_an_error_of_its_own():
         goal_from_msg(target(frame='camera'), 'torso')
 
 
-def test_more_boxes_than_the_limit_are_refused(monkeypatch):
+def test_more_boxes_than_the_limit_are_rejected(monkeypatch):
     for module in (bodies, marker_edits):
         monkeypatch.setattr(module, 'MOST_BOXES', 3)
     body = body_of(*(box(index=i) for i in range(3)))
@@ -227,7 +227,7 @@ def test_any_markers_leave_what_a_dictionary_would(arrays):
         (target(1e6), r'expected numbers of at most 10000 \[m\]'),
     ],
 )
-def test_a_bad_target_is_refused(msg, sentence):
+def test_a_bad_target_is_rejected(msg, sentence):
     with pytest.raises(MessageError, match=sentence):
         goal_from_msg(msg, 'torso')
 
@@ -251,7 +251,7 @@ def test_joints_are_found_by_name_and_others_ignored():
         ),
     ],
 )
-def test_bad_joint_positions_are_refused(msg, sentence):
+def test_bad_joint_positions_are_rejected(msg, sentence):
     with pytest.raises(MessageError, match=sentence):
         configuration_from_msg(msg, JOINTS)
 
@@ -307,7 +307,7 @@ def test_a_trajectory_that_does_not_end_at_rest_is_no_message():
         joint_trajectory_to_msg(moving, JOINTS, 'torso')
 
 
-def test_points_closer_than_a_nanosecond_are_refused():
+def test_points_closer_than_a_nanosecond_are_rejected():
     with pytest.raises(MessageError, match='expected strictly increasing times'):
         joint_trajectory_to_msg(motion((0.0, 1.0, 1.0 + 1e-10)), JOINTS, 'torso')
 
@@ -363,7 +363,7 @@ def stamped(msg):
         (points(0, 'velocities', [INF, 0.0, 0.0, 0.0]), r'expected finite numbers \[rad/s\]'),
     ],
 )
-def test_a_trajectory_that_no_controller_would_take_is_refused(spoil, sentence):
+def test_a_trajectory_that_no_controller_would_take_is_rejected(spoil, sentence):
     msg = joint_trajectory_to_msg(motion(), JOINTS, 'torso')
     spoil(msg)
     with pytest.raises(MessageError, match=sentence):
@@ -391,7 +391,7 @@ def test_each_status_has_a_code():
     assert answer(ErrorCode.TIMED_OUT, 'too late') == 'TIMED_OUT (-6): too late'
 
 
-def test_a_frame_at_fault_is_told_from_other_refusals():
+def test_a_bad_frame_has_a_code_of_its_own():
     for other in (ErrorCode.INVALID_GOAL_CONSTRAINTS, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA):
-        assert code_of_refusal(MessageError('x'), other) is other
-        assert code_of_refusal(FrameError('x'), other) is ErrorCode.FRAME_TRANSFORM_FAILURE
+        assert code_of_rejection(MessageError('x'), other) is other
+        assert code_of_rejection(FrameError('x'), other) is ErrorCode.FRAME_TRANSFORM_FAILURE

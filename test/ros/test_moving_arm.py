@@ -18,13 +18,13 @@ from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E40
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input, Inputs, PlanInputs  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.requests import handover as start  # noqa: E402
+from rrth_planner.ros.requests import handover  # noqa: E402
 from rrth_planner.ros.requests.handover import EARLY, LEADS  # noqa: E402
 from rrth_planner.ros.requests.plan_request import plan_request  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
@@ -36,10 +36,10 @@ BEGIN, TARGET = 100.0, PointingGoal(np.array([2.0, 0.3, 0.4]))
 
 
 class Following(Input):
-    """Joint states of an arm that is where its motion is whenever somebody looks."""
+    """Joint states of an arm that executes its motion exactly."""
 
     def __init__(self, motion, clock, pace):
-        """Say where the arm is by a clock."""
+        """Follow a clock."""
         self._motion, self._clock, self._pace = motion, clock, pace
         super().__init__('joints', None)
 
@@ -54,7 +54,7 @@ class Following(Input):
 
 
 class Clock:
-    """A clock on which a little time passes whenever somebody looks at it."""
+    """A clock on which a little time passes at each reading."""
 
     def __init__(self, now, tick):
         """Begin at a time [s]."""
@@ -77,12 +77,12 @@ def _ask(monkeypatch):
         if tick > 0.0:
             # No time but that of the clock, however busy the machine.
             still = SimpleNamespace(monotonic=lambda: 0.0, sleep=lambda _: None)
-            monkeypatch.setattr(start, 'time', still)
+            monkeypatch.setattr(handover, 'time', still)
 
         def publish(_, revalidation):
             clock.now += reading
             if checking is not None:
-                hear(0.01 * next(n_heard))
+                publish_body(0.01 * next(n_bodies))
             revalidation.require_fit()
             return not revalidation.is_late()
 
@@ -90,21 +90,21 @@ def _ask(monkeypatch):
             clock.now += checking
             return disagreement(*args)
 
-        def hear(shift):
+        def publish_body(shift):
             """Let a body come whose parts are so much further back [m]."""
             boxes = [replace(b, center=b.center - [shift, 0, 0]) for b in worlds.wearer().boxes]
             parts = tuple(((box.name, 0), BodyPart((box,), float('inf'))) for box in boxes)
-            heard.body.accept(lambda: WearerBody(parts), clock())
+            inputs.body.accept(lambda: WearerBody(parts), clock())
 
         if checking is not None:
             monkeypatch.setattr(Revalidation, 'disagreement', check_slowly)
-        n_heard = count()
-        heard = Inputs('body', 'target', 'joints')
-        hear(0.01 * next(n_heard))
-        heard.joints = Following(motion, clock, pace)
+        n_bodies = count()
+        inputs = Inputs('body', 'target', 'joints')
+        publish_body(0.01 * next(n_bodies))
+        inputs.joints = Following(motion, clock, pace)
         running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
         outcome = plan_request(
-            heard, parameters, clock, planner, lambda: False, publish, TARGET, running
+            inputs, parameters, clock, planner, lambda: False, publish, TARGET, running
         )
         return outcome, clock.now
 
@@ -137,13 +137,13 @@ def _slow():
 
 
 @pytest.mark.parametrize('since', [0.4, 0.995, 1.0, 1.003, 1.5])
-def test_the_motion_goes_on_from_where_the_arm_will_be(ask, since):
+def test_the_motion_begins_where_the_arm_will_be(ask, since):
     motion = _swings()
     outcome, now = ask(motion, since)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    start = outcome.start
+    start = outcome.handover
     assert LEADS[0] <= start.time - BEGIN - since <= LEADS[0] + 0.01
-    # Told before it begins, and not long before.
+    # Published before it begins, and not long before.
     assert start.time - EARLY * LEADS[0] <= now <= start.time
     expected = [values[0] for values in sample(motion, [start.time - BEGIN])]
     found = outcome.trajectory
@@ -156,96 +156,96 @@ def test_the_motion_goes_on_from_where_the_arm_will_be(ask, since):
 def test_where_the_motion_ends_the_next_one_begins_at_rest(ask, since):
     outcome, _ = ask(_swings(), since)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start is None
+    assert outcome.handover is None
 
 
-def test_an_arm_whose_motion_is_unknown_is_looked_at_as_late_as_can_be(ask):
+def test_an_arm_whose_motion_is_unknown_is_checked_as_late_as_possible(ask):
     outcome, now = ask(_slow(), 3.0, is_known=False)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.takeover.running is None
-    assert abs(now - outcome.start.time) < 5e-3
+    assert outcome.handover.start_state.running is None
+    assert abs(now - outcome.handover.time) < 5e-3
 
 
 def test_a_clock_that_stands_still_is_not_waited_for(ask):
     outcomes = []
-    # As a simulation that is paused: the time to tell the motion never comes.
+    # As a simulation that is paused: the time to publish the motion never comes.
     thread = Thread(target=lambda: outcomes.append(ask(_swings(), 0.4, tick=0.0)), daemon=True)
     thread.start()
     thread.join(30.0)
     ((outcome, _),) = outcomes
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
+    assert outcome.handover.time == pytest.approx(BEGIN + 0.4 + LEADS[0])
 
 
 def test_a_motion_whose_time_has_passed_is_planned_anew(ask):
     # So long the node needs to read what came.
     outcome, now = ask(_slow(), 3.0, reading=0.1)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
-    assert now <= outcome.start.latest
+    assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[1] + 0.1, abs=0.05)
+    assert now <= outcome.handover.deadline
     outcome, _ = ask(_slow(), 3.0, reading=0.5)
     assert outcome.code is ErrorCode.TIMED_OUT
     assert outcome.trajectory is None
 
 
-def test_an_arm_whose_motion_is_unknown_is_not_told_late(ask):
+def test_an_arm_whose_motion_is_unknown_gets_no_late_motion(ask):
     outcome, _ = ask(_slow(), 3.0, is_known=False, reading=0.1)
     assert outcome.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
-    assert 'off its course' in outcome.sentence
+    assert 'deviates from its trajectory' in outcome.sentence
     assert outcome.trajectory is None
 
 
 def test_a_motion_whose_time_has_passed_when_all_is_read_is_planned_anew(ask):
-    # It is not late yet when it is looked at.
+    # It is not late yet at the check.
     outcome, now = ask(_slow(), 3.0, reading=0.03)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time > BEGIN + 3.0 + LEADS[1]
-    assert now <= outcome.start.latest
+    assert outcome.handover.time > BEGIN + 3.0 + LEADS[1]
+    assert now <= outcome.handover.deadline
 
 
 def test_a_wearer_who_never_stands_still_does_not_make_a_motion_late(ask):
     # There is time for one more check, but not for two.
     outcome, now = ask(_slow(), 3.0, checking=0.02)
     assert outcome.code is ErrorCode.SUCCESS, outcome.sentence
-    assert outcome.start.time == pytest.approx(BEGIN + 3.0 + LEADS[0], abs=0.01)
-    assert now <= outcome.start.latest
+    assert outcome.handover.time == pytest.approx(BEGIN + 3.0 + LEADS[0], abs=0.01)
+    assert now <= outcome.handover.deadline
 
 
-def test_a_motion_that_nobody_knows_pauses_unseen(ask):
+def test_a_pause_of_an_unknown_motion_is_not_detected(ask):
     # The arm's own rest is all there is to go by.
     outcome, _ = ask(_swings(), 1.0, is_known=False)
-    assert outcome.start is None
+    assert outcome.handover is None
 
 
-def test_a_stop_is_taken_over_by_an_arm_that_was_read_before_it_began():
+def test_a_handover_from_a_stop_that_began_after_the_reading():
     motion = _swings()
     stop = fast_stop(motion, 0.4, worlds.limits())
     q, v, _ = (row[0] for row in sample(motion, [0.39]))
     reading = JointReading(q, v, BEGIN + 0.39, BEGIN + 0.39, float('inf'))
-    inputs = PlanInputs(worlds.wearer(), TARGET, reading)
+    inputs = InputSnapshot(worlds.wearer(), TARGET, reading)
     running = ExecutingMotion(trajectory=stop, start_time=BEGIN + 0.4)
-    found = inputs.ahead(running, BEGIN + 0.46, worlds.table_1_arm())
+    found = inputs.start_state_at(running, BEGIN + 0.46, worlds.table_1_arm())
     assert found.running is stop
     assert np.abs(found.state.positions - sample(stop, [0.06])[0][0]).max() < 1e-9
-    # Where it was before the stop began its own velocity tells.
-    found = inputs.ahead(running, BEGIN + 0.395, worlds.table_1_arm())
+    # Its state before the stop began is known by its velocity.
+    found = inputs.start_state_at(running, BEGIN + 0.395, worlds.table_1_arm())
     assert np.abs(found.state.positions - (q + 0.005 * v)).max() < 1e-12
 
 
 def test_an_arm_that_begins_to_move_while_a_plan_is_made_is_planned_for_as_it_moves(ask):
     outcome, _ = ask(_swings(), since=-1e-3, reading=0.05)
     assert outcome.code is ErrorCode.SUCCESS
-    assert outcome.start is not None
-    # By somebody else it is not known how it goes on.
+    assert outcome.handover is not None
+    # Without the running motion its course is unknown.
     outcome, _ = ask(_swings(), since=-1e-3, reading=0.05, is_known=False)
     assert outcome.code is ErrorCode.START_STATE_INVALID
 
 
 @pytest.mark.parametrize('pace', [0.5, 1.0])
 def test_an_arm_that_has_hardly_begun_its_motion_is_not_one_at_rest(ask, pace):
-    # By its velocity alone it still rests, and would move faster by the time that it is told.
+    # By its velocity alone it still rests, and would move faster by the time of publication.
     motion, reading = _swings(), 0.02
     assert np.abs(pace * sample(motion, [pace * reading])[1]).max() < 0.5 * REST_SPEED
     outcome, _ = ask(motion, since=-1e-3, reading=reading, pace=pace)
     assert outcome.code is ErrorCode.SUCCESS
-    assert outcome.start is not None
+    assert outcome.handover is not None

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planner's parameters: defaults, descriptions, and a sentence for each refusal."""
+"""The planner's parameters: defaults, descriptions, and a sentence for each rejection."""
 
 from dataclasses import fields
 
@@ -102,7 +102,7 @@ def test_a_change_is_there_for_the_next_plan(started):
         ('base_frame', 'camera', 'read-only'),
     ],
 )
-def test_a_bad_value_is_refused_and_changes_nothing(started, name, value, sentence):
+def test_a_bad_value_is_rejected_and_changes_nothing(started, name, value, sentence):
     node, _ = started()
     before = node.get_parameter(name).value
     (result,) = node.set_parameters([Parameter(name=name, value=value)])
@@ -112,7 +112,7 @@ def test_a_bad_value_is_refused_and_changes_nothing(started, name, value, senten
     assert node.get_parameter(name).value == before
 
 
-def test_an_empty_array_is_refused(started):
+def test_an_empty_array_is_rejected(started):
     node, _ = started()
     empty = Parameter('max_jerk', Parameter.Type.DOUBLE_ARRAY, [])
     (result,) = node.set_parameters([empty])
@@ -138,7 +138,7 @@ def test_an_empty_array_is_refused(started):
         ('arm', '/nowhere/arm.yaml', ModelError),
     ],
 )
-def test_a_bad_override_is_refused_at_the_start(started, name, value, error):
+def test_a_bad_override_is_rejected_at_the_start(started, name, value, error):
     with pytest.raises(error, match=name):
         started(**{name: value})
 
@@ -154,7 +154,7 @@ def test_an_arm_of_ones_own_is_loaded(started, tmp_path):
     assert parameters.arm.joint_names == ('axis_1', 'axis_2', 'axis_3', 'axis_4')
 
 
-def test_files_that_are_no_arm_are_refused_by_name(tmp_path):
+def test_files_that_are_no_arm_are_rejected_by_name(tmp_path):
     (tmp_path / 'bad.yaml').write_text('joints: [')
     (tmp_path / 'empty.yaml').write_text('')
     for name in ('bad.yaml', 'empty.yaml', 'none.yaml'):

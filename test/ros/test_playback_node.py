@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The node arm_playback, from outside: what it takes, what it refuses, how it ends."""
+"""The node arm_playback, from outside: what it takes, what it rejects, how it ends."""
 
 import os
 import signal
@@ -43,7 +43,7 @@ MODULE = [sys.executable, '-m', 'rrth_planner.ros.playback_node']
 
 
 class Observer(Node):
-    """Sends trajectories as a planner does, and remembers what the playback says."""
+    """Sends trajectories as a planner does, and records what the playback publishes."""
 
     def __init__(self):
         super().__init__('observer')
@@ -71,9 +71,9 @@ class Observer(Node):
         wanted = len(self.states) + n
         wait_until(lambda: len(self.states) >= wanted)
 
-    def wait_for_refusal(self, *words, first):
-        """Wait until a line after the first ones is a refusal with some words."""
-        words = ('joint_trajectory refused, ', *words)
+    def wait_for_rejection(self, *words, first):
+        """Wait until a line after the first ones is a rejection with some words."""
+        words = ('joint_trajectory rejected, ', *words)
         wait_until(lambda: any(all(w in line.msg for w in words) for line in self.logs[first:]))
 
 
@@ -130,7 +130,7 @@ def _set(name, value):
     return lambda point: setattr(point, name, value)
 
 
-# What is done to a good motion, and the words of its refusal.
+# What is done to a good motion, and the words of its rejection.
 BAD = {
     'a joint is missing': (
         lambda m: setattr(m, 'joint_names', list(ARM.joint_names[:3])),
@@ -218,7 +218,7 @@ BAD = {
 }
 
 
-def test_a_resting_arm_says_where_it_is(playback, observer):
+def test_an_arm_at_rest_publishes_its_state(playback, observer):
     playback(initial_positions=[0.1, -0.2, 0.3, 0.4], base_frame='chest')
     observer.wait_for_states(20)
     wait_until(lambda: observer.poses)
@@ -250,30 +250,30 @@ def test_a_motion_is_followed_to_its_end_and_the_next_from_there(playback, obser
     wait_until(lambda: observer.is_still_at(FOLDED))
 
 
-def test_whatever_is_refused_is_named_and_moves_nothing(playback, observer):
+def test_whatever_is_rejected_is_named_and_moves_nothing(playback, observer):
     playback()
     for change, words in BAD.values():
         n_logs, n_states = len(observer.logs), len(observer.states)
         observer.motions.publish(changed(change))
-        observer.wait_for_refusal('the arm stays: ', words, first=n_logs)
+        observer.wait_for_rejection('arm holds its position: ', words, first=n_logs)
         observer.wait_for_states(3)
         assert all((state.position == FOLDED).all() for state in observer.states[n_states:])
         assert not any(np.any(state.velocity) for state in observer.states[n_states:])
 
 
-def test_the_list_of_refusals_begins_with_a_motion_that_is_taken(playback, observer):
+def test_the_list_of_rejections_begins_with_a_motion_that_is_taken(playback, observer):
     playback()
     observer.motions.publish(changed(lambda m: None))
     wait_until(lambda: observer.is_still_at(FOLDED - 0.3))
 
 
-def test_a_refused_motion_leaves_the_running_one_alone(playback, observer):
+def test_a_rejected_motion_leaves_the_running_one_alone(playback, observer):
     playback()
     observer.motions.publish(motion(FOLDED, FOLDED - 0.5, 1.5))
     wait_until(lambda: observer.v.any())
     n_logs = len(observer.logs)
     observer.motions.publish(changed(BAD['not a number'][0]))
-    observer.wait_for_refusal('keeps to its motion', first=n_logs)
+    observer.wait_for_rejection('continues its motion', first=n_logs)
     wait_until(lambda: observer.is_still_at(FOLDED - 0.5))
 
 
@@ -287,7 +287,7 @@ def test_a_motion_from_the_present_state_replaces_the_running_one(playback, obse
 
 
 @pytest.mark.parametrize('scale', [1.0, 0.5])
-def test_stop_brakes_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
+def test_a_stop_is_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
     playback(time_scale=scale)
     way = np.array([-1.0, -1.0, 0.5, 0.5])
     observer.motions.publish(motion(FOLDED, FOLDED + way, 3.0))

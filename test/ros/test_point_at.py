@@ -57,7 +57,7 @@ def run(*arguments):
 
 
 def report_of(*arguments):
-    """Return what the command says with --json; its exit code is in it."""
+    """Return the output of the command with --json, its exit code included."""
     ended = run(*arguments, '--json')
     (line,) = ended.stdout.splitlines()
     report = json.loads(line)
@@ -66,10 +66,10 @@ def report_of(*arguments):
 
 
 class Bystander(Node):
-    """Hears what the planner publishes and is told, and stands in for an arm."""
+    """Receives inputs and outputs of the planner, and stands in for an arm."""
 
     def __init__(self):
-        """Listen."""
+        """Subscribe."""
         super().__init__('bystander')
         self.motions, self.bodies = [], []
         # Not latched: what an earlier test has the planner publish is none of this one's.
@@ -93,7 +93,7 @@ def planner(ros_context):
 
 @pytest.fixture
 def bystander(ros_context, spinning):
-    """Give a node that listens."""
+    """Give a node that subscribes."""
     node = Bystander()
     with spinning(node):
         yield node
@@ -108,8 +108,8 @@ def arm(planner):
 
 
 @pytest.mark.slow
-def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
-    # Who listens live must be known to the planner before it publishes.
+def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
+    # Volatile subscribers must be known to the planner before it publishes.
     wait_until(lambda: bystander.count_publishers('joint_trajectory'), START)
     wait_until(lambda: bystander.count_subscribers('joint_trajectory') > 1, START)
     time.sleep(1.0)
@@ -127,14 +127,14 @@ def test_the_arm_points_where_it_is_told(arm, bystander, wait_until):
         pointing_error(load_arm(), np.array(motion.points[-1].positions), [1.5, 0.1, 0.3]) < 1e-6
     )
 
-    # The body stays; without --json the figures come as the planner says them.
+    # The body stays; without --json the figures are those of the answer.
     ended = run(0.3, 1.3, 0.2)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('SUCCESS (1): ')
     assert 'mm past the target' in ended.stdout
     wait_until(lambda: len(bystander.motions) == 2)
 
-    # A target that the planner refuses moves nothing.
+    # A target that the planner rejects moves nothing.
     report = report_of(0, 0, 0)
     assert (report['exit_code'], report['name']) == (1, 'GOAL_IN_COLLISION')
     assert 'inside box' in report['sentence']
@@ -155,22 +155,22 @@ def test_planning_without_moving_publishes_nothing(planner, bystander, body):
     assert report['figures']['seed'] == 3
     assert report['figures']['duration'] > 0.5
     assert report['pointing_error'] < 1e-6
-    refused = report_of(0, 0, 0, '--no-move', '--body', body)
-    assert (refused['exit_code'], refused['name']) == (1, 'GOAL_IN_COLLISION')
+    rejected = report_of(0, 0, 0, '--no-move', '--body', body)
+    assert (rejected['exit_code'], rejected['name']) == (1, 'GOAL_IN_COLLISION')
     assert not bystander.motions
     assert not bystander.bodies
 
 
 @pytest.mark.slow
-def test_planning_without_moving_goes_round_the_body_that_is_heard(planner, bystander):
+def test_a_dry_run_plans_round_the_received_body(planner, bystander):
     bystander.stand()
     silent = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', '5')
     assert silent['exit_code'] == 3
     assert '/body_boxes' in silent['sentence']
     latched = bystander.create_publisher(MarkerArray, 'body_boxes', LATCHED)
     latched.publish(body_to_msg(load_body(), 'torso'))
-    heard = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
-    assert heard['exit_code'] == 0, heard
+    received = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
+    assert received['exit_code'] == 0, received
     assert not bystander.motions
 
 
@@ -268,7 +268,7 @@ def test_the_help_names_every_exit_code(monkeypatch, capsys):
 
 @pytest.fixture
 def client(ros_context):
-    """Give a client that nobody answers."""
+    """Give a client without a planner."""
     client = PlannerClient('point_at', 0.5)
     yield client
     client.destroy_node()
@@ -296,23 +296,23 @@ def turn(to, duration):
     return motion, joint_trajectory_to_msg(motion, load_arm().joint_names, '', 0.0)
 
 
-def test_what_another_machine_is_told_is_no_motion_of_the_arm(client):
+def test_a_motion_of_another_machine_is_ignored(client):
     arm = load_arm()
     first, message = turn(np.array(FOLDED) + 0.1, 0.1)
     second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
     other = JointTrajectory(joint_names=['wheel'])
-    client.told = [other]
+    client.commanded = [other]
     with pytest.raises(NotInTimeError, match='joint_trajectory: nothing for'):
         announced_motion(client, arm, 0.1)
-    client.told = [other, message, other]
+    client.commanded = [other, message, other]
     assert announced_motion(client, arm, 0.1).positions.tolist() == first.positions.tolist()
-    # Afterwards the planner sends the arm elsewhere, and the other machine is told something.
+    # Afterwards the planner sends the arm elsewhere, and the other machine gets a motion.
     came = iter([[], [other], [newer, other]])
 
     def take_messages(_):
         time.sleep(0.02)
-        client.told += next(came, [])
-        ours = [msg for msg in client.told if msg.points][-1]
+        client.commanded += next(came, [])
+        ours = [msg for msg in client.commanded if msg.points][-1]
         client._on_state(joints(ours.points[-1].positions), ARRIVAL)
         client._on_state(joints(FOLDED[:2]), ARRIVAL)
 
@@ -327,13 +327,13 @@ def test_joint_positions_that_are_none_do_not_count(client):
     for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
         client._on_state(bad, ARRIVAL)
     assert client.positions(client._joint_names).tolist() == FOLDED
-    assert len(client.seen) == 1
+    assert len(client.observed) == 1
 
 
 def test_an_answer_is_read_back():
     answer = answer_from_text(
         'SUCCESS (1): 2 waypoints, duration 1.426 s, path length 1.9430 rad, least clearance '
-        '-0.0389 m, planning time 3.90 ms, seed 1043618065; the clock ended the improvement'
+        '-0.0389 m, planning time 3.90 ms, seed 1043618065; improvement ended by the time limit'
     )
     assert answer.code is ErrorCode.SUCCESS
     assert answer.figures == {
@@ -368,7 +368,7 @@ def test_a_body_replaces_every_box_before():
     assert after.n_boxes == len(load_body().boxes)
 
 
-def test_a_file_that_is_no_body_is_refused_by_name(tmp_path):
+def test_a_file_that_is_no_body_is_rejected_by_name(tmp_path):
     file = tmp_path / 'boxes.yaml'
     for text in ('boxes: []', 'markers: 7', 'markers: [{nothing: 1}]', '[]', '}{'):
         file.write_text(text)

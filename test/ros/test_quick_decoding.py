@@ -13,7 +13,7 @@ pytest.importorskip('rosbags')
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.messages import fast_decoding  # noqa: E402
-from rrth_planner.ros.messages.fast_decoding import quick_decoder  # noqa: E402
+from rrth_planner.ros.messages.fast_decoding import fast_decoder  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import read_edits  # noqa: E402
 from rrth_planner.ros.middleware.open_subscription import decoded  # noqa: E402
 from samples import array, box, wearer  # noqa: E402
@@ -28,7 +28,7 @@ from visualization_msgs.msg import (  # noqa: E402
 )
 import worlds  # noqa: E402
 
-DECODE = quick_decoder(MarkerArray)
+DECODE = fast_decoder(MarkerArray)
 COLORS = st.builds(ColorRGBA, r=st.floats(width=32), a=st.floats(width=32))
 BYTES = st.binary(max_size=5).map(list)
 
@@ -50,18 +50,18 @@ def _full_markers(draw):
 ARRAYS = st.builds(MarkerArray, markers=st.lists(_full_markers(), max_size=3))
 
 
-def told(value, like):
-    """Return what a message says in all fields of a message of ROS, in numbers and texts."""
+def values_of(value, like):
+    """Return the values of a message in all fields of a message of ROS, in numbers and texts."""
     if hasattr(like, 'get_fields_and_field_types'):
         names = like.get_fields_and_field_types()
-        return {name: told(getattr(value, name), getattr(like, name)) for name in names}
+        return {name: values_of(getattr(value, name), getattr(like, name)) for name in names}
     if isinstance(like, list):
         assert len(value) == len(like)
-        return [told(*pair) for pair in zip(value, like, strict=True)]
+        return [values_of(*pair) for pair in zip(value, like, strict=True)]
     if isinstance(like, str | bool):
         assert type(value) is type(like)
         return value
-    # Numbers, and arrays of them; NaN is told as well.
+    # Numbers, and arrays of them; NaN included.
     return repr([int(v) for v in value]) if hasattr(like, '__len__') else repr(value)
 
 
@@ -72,12 +72,12 @@ def test_every_field_comes_through(msg):
     expected = deserialize_message(data, MarkerArray)
     found = DECODE(data)
     assert not isinstance(found, MarkerArray)
-    assert told(found, expected) == told(expected, expected)
+    assert values_of(found, expected) == values_of(expected, expected)
 
 
 @worlds.examples(200)
 @given(msg=ARRAYS, data=st.data())
-def test_what_is_no_message_is_refused_as_by_rclpy(msg, data):
+def test_what_is_no_message_is_rejected_as_by_rclpy(msg, data):
     whole = bytearray(serialize_message(msg))
     for _ in range(data.draw(st.integers(0, 3))):
         whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
@@ -124,6 +124,6 @@ def test_without_rosbags_or_the_definition_rclpy_decodes(monkeypatch, missing):
         monkeypatch.setitem(sys.modules, 'rosbags.typesys', None)
     else:
         monkeypatch.setattr(fast_decoding, 'definition_of', not_found)
-    found = quick_decoder(MarkerArray)(serialize_message(wearer()))
+    found = fast_decoder(MarkerArray)(serialize_message(wearer()))
     assert found == wearer()
     assert isinstance(found.markers[0], Marker)

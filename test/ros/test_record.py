@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is recorded of a run is what was said, read back by a library that shares nothing."""
+"""A recording holds the published messages, as an independent library reads them."""
 
 from contextlib import contextmanager
 from itertools import pairwise
@@ -69,8 +69,8 @@ def recording(*arguments):
         process.wait()
 
 
-def hears(node, *topics):
-    """Return whether the recorder listens to some topics, besides its best-effort reader."""
+def subscribes(node, *topics):
+    """Return whether the recorder subscribes to some topics, besides its best-effort reader."""
     return all(
         'rrth_recorder' in {info.node_name for info in node.get_subscriptions_info_by_topic(topic)}
         for topic in topics
@@ -94,10 +94,10 @@ def nanoseconds(stamp):
 
 @pytest.fixture(scope='module', name='run')
 def _run(ros_context, tmp_path_factory):
-    """Record one motion of planner and playback; return the file and what a node heard."""
+    """Record one motion of planner and playback; return the file and what a node received."""
     path = tmp_path_factory.mktemp('run') / 'run.mcap'
-    node, lines, told, states = Node('test_client'), [], [], []
-    node.create_subscription(JointTrajectory, 'joint_trajectory', told.append, LATCHED)
+    node, lines, motion, states = Node('test_client'), [], [], []
+    node.create_subscription(JointTrajectory, 'joint_trajectory', motion.append, LATCHED)
     node.create_subscription(JointState, 'joint_states', states.append, 10)
     bodies = node.create_publisher(MarkerArray, 'body_boxes', LATCHED)
     targets = node.create_publisher(PointStamped, 'target', BEST_EFFORT)
@@ -111,7 +111,7 @@ def _run(ros_context, tmp_path_factory):
             assert time.monotonic() < end, 'the condition did not come true in time'
             executor.spin_once(timeout_sec=0.05)
 
-    # Before anybody listens.
+    # Before any subscription.
     bodies.publish(wearer())
     with (
         ChildProcess(
@@ -123,28 +123,28 @@ def _run(ros_context, tmp_path_factory):
         wait_until(lambda: states)
         with recording('-o', path) as process:
             topics = [topic if topic[0] == '/' else f'/{topic}' for topic in TOPICS]
-            wait_until(lambda: hears(node, *topics))
+            wait_until(lambda: subscribes(node, *topics))
             wait_until(lambda: node.count_subscribers('target') > 1)
             # The planner and the arm know of the recorder.
-            missing = {'hears /diagnostics', 'hears /joint_states'}
+            missing = {'subscribes /diagnostics', 'subscribes /joint_states'}
             while missing:
                 line = process.stdout.readline()
                 assert line, process.stderr.read()
                 missing.discard(line.strip())
-            while not told:
+            while not motion:
                 targets.publish(target())
                 time.sleep(0.3)
                 answer = plan.call_async(Trigger.Request())
                 wait_until(answer.done)
                 if answer.result().success:
-                    wait_until(lambda: told)
-            q_end = np.array(told[0].points[-1].positions)
+                    wait_until(lambda: motion)
+            q_end = np.array(motion[0].points[-1].positions)
             wait_until(lambda: np.abs(np.array(states[-1].position) - q_end).max() < 1e-6)
-            # The file has seen the arm at rest, and the planner's second of diagnostics.
+            # The file has the arm at rest, and a second of the planner's diagnostics.
             time.sleep(1.5)
         words = process.communicate()
     node.destroy_node()
-    return path, told[0], process.returncode, words
+    return path, motion[0], process.returncode, words
 
 
 def test_a_recorder_ends_well_and_says_what_it_has(run):
@@ -164,14 +164,14 @@ def test_all_topics_of_a_run_are_there_with_their_types(run):
     assert types == {topic.lstrip('/'): type_name(kind) for topic, kind in expected}
 
 
-def test_the_recorded_trajectory_is_the_one_that_was_heard(run):
+def test_the_recorded_trajectory_is_the_received_one(run):
     ((_, found),) = messages_of(run[0])['/joint_trajectory']
-    heard = run[1]
-    assert list(found.joint_names) == list(heard.joint_names)
-    assert nanoseconds(found.header.stamp) == nanoseconds(heard.header.stamp)
-    assert found.header.frame_id == heard.header.frame_id
-    assert len(found.points) == len(heard.points)
-    for one, other in zip(found.points, heard.points, strict=True):
+    received = run[1]
+    assert list(found.joint_names) == list(received.joint_names)
+    assert nanoseconds(found.header.stamp) == nanoseconds(received.header.stamp)
+    assert found.header.frame_id == received.header.frame_id
+    assert len(found.points) == len(received.points)
+    for one, other in zip(found.points, received.points, strict=True):
         assert nanoseconds(one.time_from_start) == nanoseconds(other.time_from_start)
         for field in ('positions', 'velocities', 'accelerations', 'effort'):
             np.testing.assert_array_equal(getattr(one, field), getattr(other, field))
@@ -214,29 +214,29 @@ def test_every_message_has_its_times_and_none_comes_twice(run):
 
 
 def test_a_recording_reads_back_as_a_run(run):
-    path, heard, *_ = run
+    path, received, *_ = run
     arm = load_arm()
     reader = RecordingReader(path, arm, 'torso')
     found = reader.recording()
-    assert not reader.refused
-    expected = joint_trajectory_from_msg(heard, arm.joint_names)
-    (told,) = found.told
+    assert not reader.rejected
+    expected = joint_trajectory_from_msg(received, arm.joint_names)
+    (motion,) = found.commanded
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         np.testing.assert_array_equal(
-            getattr(told.trajectory, name), getattr(expected, name), name
+            getattr(motion.trajectory, name), getattr(expected, name), name
         )
     np.testing.assert_allclose(found.positions[-1], expected.positions[-1], atol=1e-6)
-    # The playback follows to the bit, from when it heard of the motion, which is a little later.
-    late = found.times[np.flatnonzero(found.velocities.any(axis=1))[0]] - told.begin
+    # The playback executes it to the bit, from its reception on, which is a little later.
+    late = found.times[np.flatnonzero(found.velocities.any(axis=1))[0]] - motion.begin
     assert late > 0.0
     (since, scene), (_, aim) = found.bodies[-1], found.targets[-1]
     assert [box.name for box in scene.boxes] == ['torso/0', 'head/0']
-    assert since < told.begin
+    assert since < motion.begin
     point = target().point
     np.testing.assert_array_equal(aim, [point.x, point.y, point.z])
-    states = {state for _, state in found.guard}
+    states = {state for _, state in found.monitor_states}
     assert states
-    assert states <= {'no motion', 'watches the motion'}
+    assert states <= {'no motion', 'monitoring'}
 
 
 @pytest.mark.parametrize('kind', ['png', 'svg', 'pdf'])
@@ -259,7 +259,7 @@ def test_names_follow_namespace_and_remaps_and_types_are_looked_up(tmp_path, spi
     options = ['--topics', 'target', 'words', 'words', '--duration', LONGEST_WAIT]
     remaps = ['--ros-args', '-r', '__ns:=/left', '-r', 'target:=/aim']
     with spinning(node), recording('-o', path, *options, *remaps) as process:
-        wait_until(lambda: hears(node, '/aim', '/left/words'), LONGEST_WAIT)
+        wait_until(lambda: subscribes(node, '/aim', '/left/words'), LONGEST_WAIT)
         wait_until(lambda: aims.get_subscription_count() > 0, LONGEST_WAIT)
         for k in range(5):
             aims.publish(target(x=float(k)))
@@ -275,7 +275,7 @@ def test_names_follow_namespace_and_remaps_and_types_are_looked_up(tmp_path, spi
     assert x == sorted(set(x))
 
 
-def refusal(*arguments, **options):
+def rejection(*arguments, **options):
     """Return the one sentence of a recorder that ends with code 1."""
     ended = subprocess.run(
         [*MODULE, *map(str, arguments)],
@@ -290,9 +290,9 @@ def refusal(*arguments, **options):
     return ended.stderr
 
 
-def test_a_recorder_that_hears_nothing_says_so_and_leaves_no_file(tmp_path):
+def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path):
     path = tmp_path / 'run.mcap'
-    said = refusal('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
+    said = rejection('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
     assert 'nothing was heard' in said
     assert 'ROS_DOMAIN_ID' in said
     assert not path.exists()
@@ -301,12 +301,12 @@ def test_a_recorder_that_hears_nothing_says_so_and_leaves_no_file(tmp_path):
 def test_a_file_is_never_overwritten(tmp_path):
     path = tmp_path / 'run.mcap'
     path.write_text('precious')
-    assert 'exists already' in refusal('-o', path, '--duration', 0.5)
+    assert 'exists already' in rejection('-o', path, '--duration', 0.5)
     assert path.read_text() == 'precious'
 
 
 def test_a_folder_that_is_missing_is_named(tmp_path):
-    said = refusal('-o', tmp_path / 'nowhere' / 'run.mcap', '--duration', 0.5)
+    said = rejection('-o', tmp_path / 'nowhere' / 'run.mcap', '--duration', 0.5)
     assert 'No such file or directory' in said
 
 
@@ -317,16 +317,16 @@ def test_a_folder_that_is_missing_is_named(tmp_path):
         (['--ros-args', '-r', 'nonsense'], 'nonsense'),
     ],
 )
-def test_names_that_are_none_are_refused(tmp_path, arguments, words):
+def test_names_that_are_none_are_rejected(tmp_path, arguments, words):
     path = tmp_path / 'run.mcap'
-    said = refusal('-o', path, '--duration', 0.5, *arguments)
+    said = rejection('-o', path, '--duration', 0.5, *arguments)
     assert words in said
     assert '.c:' not in said
     assert not path.exists()
 
 
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'soon'])
-def test_a_bad_duration_is_refused(value):
+def test_a_bad_duration_is_rejected(value):
     ended = subprocess.run(
         [*MODULE, f'--duration={value}'], capture_output=True, text=True, timeout=LONGEST_WAIT
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of all kinds are read as the nodes would, or refused in one sentence."""
+"""Recordings of all kinds are read as the nodes would, or rejected in one sentence."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.cli.plot import main  # noqa: E402
-from rrth_planner.execution.recording import brakes  # noqa: E402
+from rrth_planner.execution.recording import commanded_stops  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import ArmModel  # noqa: E402
 from rrth_planner.model.errors import RecordError  # noqa: E402
@@ -60,7 +60,7 @@ def state(time, position=FOLDED, **fields):
     return 'joint_states', time, msg
 
 
-def told(time, speed=0.0, stamp=0.0):
+def commanded(time, speed=0.0, stamp=0.0):
     """Return a motion."""
     trajectory = Trajectory(
         times=[0.0, 1.0],
@@ -76,10 +76,10 @@ def told(time, speed=0.0, stamp=0.0):
     )
 
 
-def said(time, guard, name='rrth_planner'):
+def said(time, state, name='rrth_planner'):
     """Return diagnostics."""
     status = DiagnosticStatus(name=f'{name}: planning', hardware_id='rrth_planner')
-    status.values = [KeyValue(key='guard', value=guard)]
+    status.values = [KeyValue(key='monitor', value=state)]
     return 'diagnostics', time, DiagnosticArray(status=[status])
 
 
@@ -100,18 +100,18 @@ def test_a_run_is_read_on_one_clock(tmp_path):
         ('body_boxes', 0.1, wearer()),
         ('body_boxes', 0.3, array(hat)),
         ('target', 0.15, target()),
-        told(0.2),
-        told(0.5, speed=0.3, stamp=0.45),
-        said(0.2, 'watches the motion'),
-        said(0.5, 'brakes'),
+        commanded(0.2),
+        commanded(0.5, speed=0.3, stamp=0.45),
+        said(0.2, 'monitoring'),
+        said(0.5, 'stopping'),
         said(0.4, 'no motion', name='elsewhere/rrth_planner'),
     )
     run = read(path)
     np.testing.assert_allclose(run.times, 0.1 * np.arange(10), atol=1e-5)
     np.testing.assert_array_equal(run.velocities[3], np.full(4, 0.1 * 3))
-    assert [motion.begin for motion in run.told] == pytest.approx([0.2, 0.45], abs=1e-5)
-    assert brakes(run) == (run.told[1],)
-    assert [state for _, state in run.guard] == ['watches the motion', 'brakes']
+    assert [motion.begin for motion in run.commanded] == pytest.approx([0.2, 0.45], abs=1e-5)
+    assert commanded_stops(run) == (run.commanded[1],)
+    assert [state for _, state in run.monitor_states] == ['monitoring', 'stopping']
     # The hat is there for a quarter of a second.
     assert [time for time, _ in run.bodies] == pytest.approx([0.1, 0.3, 0.55], abs=1e-5)
     assert [len(scene.boxes) for _, scene in run.bodies] == [2, 3, 2]
@@ -127,7 +127,7 @@ def test_without_velocities_the_change_of_the_positions_counts(tmp_path):
     np.testing.assert_allclose(read(path).velocities, np.full((5, 4), 0.5), rtol=1e-3)
 
 
-def test_what_the_nodes_would_refuse_is_left_out_and_said(tmp_path, capsys):
+def test_what_the_nodes_would_reject_is_left_out_and_said(tmp_path, capsys):
     path = write(
         tmp_path / 'run.mcap',
         *STATES,
@@ -142,8 +142,8 @@ def test_what_the_nodes_would_refuse_is_left_out_and_said(tmp_path, capsys):
     assert len(run.times) == 10
     assert len(run.bodies) == 1
     assert not run.targets
-    assert not run.told
-    assert set(reader.refused) == {'/joint_states', '/body_boxes', '/target', '/joint_trajectory'}
+    assert not run.commanded
+    assert set(reader.rejected) == {'/joint_states', '/body_boxes', '/target', '/joint_trajectory'}
     assert main(['recording', str(path), '-o', str(tmp_path / 'run.png')]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4
@@ -157,8 +157,8 @@ def test_a_message_that_cannot_be_read_costs_no_other(tmp_path, garbage):
     path = write(tmp_path / 'run.mcap', *STATES[:2], ('joint_states', 0.15, garbage), *STATES[2:])
     reader = RecordingReader(path, ARM, 'torso')
     assert len(reader.recording().times) == len(STATES)
-    assert set(reader.refused) == {'/joint_states'}
-    (sentence,) = reader.refused.values()
+    assert set(reader.rejected) == {'/joint_states'}
+    (sentence,) = reader.rejected.values()
     assert sentence.startswith(f'{len(garbage)} bytes')
     assert sentence.endswith('expected a sensor_msgs/msg/JointState')
 
@@ -216,7 +216,7 @@ def flipped(path):
         (None, 'No such file'),
     ],
 )
-def test_a_bad_file_is_refused_in_one_sentence(tmp_path, capsys, content, words):
+def test_a_bad_file_is_rejected_in_one_sentence(tmp_path, capsys, content, words):
     path, output = tmp_path / 'bad.mcap', tmp_path / 'bad.png'
     if content is not None:
         path.write_bytes(content(tmp_path / 'good.mcap') if callable(content) else content)
@@ -227,7 +227,7 @@ def test_a_bad_file_is_refused_in_one_sentence(tmp_path, capsys, content, words)
     assert not output.exists()
 
 
-def test_a_section_outside_of_the_run_is_refused(tmp_path, capsys):
+def test_a_section_outside_of_the_run_is_rejected(tmp_path, capsys):
     path = write(tmp_path / 'run.mcap', *STATES)
     assert main(['recording', str(path), '--begin', '7', '-o', str(tmp_path / 'run.png')]) == 1
     (line,) = capsys.readouterr().err.splitlines()

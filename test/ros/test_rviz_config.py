@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RViz shows what the planner says and hears, and its clicks are heard."""
+"""RViz shows inputs and outputs of the planner, and its clicks are received."""
 
 from xml.etree import ElementTree
 
@@ -55,7 +55,7 @@ def planner(ros_context):
 
 @pytest.fixture(scope='module')
 def topics(planner):
-    """Return the planner's topics with their types, without its namespace: said and heard."""
+    """Return the planner's topics and types, without its namespace: published and subscribed."""
     return [
         {name.removeprefix(NAMESPACE): types[0] for name, types in names}
         for names in (
@@ -75,15 +75,15 @@ def by_topic(entries, key='Topic'):
 
 
 def test_every_topic_is_one_of_the_planner_and_of_its_type(manager, topics):
-    said, heard = topics
+    published, subscribed = topics
     shown = by_topic(manager['Displays'])
     clicked = by_topic(manager['Tools'])
     assert shown
     for kind, topic, _ in shown:
-        assert {**said, **heard}.get(topic) == TYPES[kind], topic
+        assert {**published, **subscribed}.get(topic) == TYPES[kind], topic
     ((kind, topic, _),) = clicked
     assert kind == 'PublishPoint'
-    assert heard.get(topic) == TYPES[kind]
+    assert subscribed.get(topic) == TYPES[kind]
 
 
 def test_all_that_can_be_shown_is_shown(manager, topics):
@@ -94,12 +94,12 @@ def test_all_that_can_be_shown_is_shown(manager, topics):
     assert shown == can_be
 
 
-def test_displays_hear_what_was_said_before_and_every_quality(manager, topics, planner):
+def test_displays_receive_latched_messages_of_every_quality(manager, topics, planner):
     said, _ = topics
     for _, topic, settings in by_topic(manager['Displays']):
         asked = settings['Durability Policy'], settings['Reliability Policy']
         if topic not in said:
-            # Whoever speaks there is heard.
+            # Any publisher there is received.
             assert asked == ('Volatile', 'Best Effort')
             continue
         (info,) = planner.get_publishers_info_by_topic(f'{NAMESPACE}{topic}')

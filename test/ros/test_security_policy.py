@@ -19,7 +19,7 @@ from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NODES = {'/rrth_planner': PlannerNode, '/arm_playback': PlaybackNode}
-# What is done with topics and services, and how a node tells its own.
+# What is done with topics and services, and how a node names its own.
 DEEDS = {
     ('topics', 'publish'): 'publisher',
     ('topics', 'subscribe'): 'subscriber',
@@ -27,7 +27,7 @@ DEEDS = {
     ('services', 'request'): 'client',
 }
 TF = {'/tf', '/tf_static'} if tf2_ros is None else set()
-# These decide whether the arm is safe: nobody but their owner may say them.
+# These decide whether the arm is safe: only their owner may publish them.
 ONE_SPEAKER = {
     '/body_boxes': '/wearer',
     '/target': '/operator',

@@ -31,7 +31,7 @@ from visualization_msgs.msg import Marker  # noqa: E402
 LIVE, RELIABLE = None, 'reliable'
 
 
-def told(order, body, sent, *markers, now=0.0, newer=None):
+def applied(order, body, sent, *markers, now=0.0, newer=None):
     """Return a body after an array that was sent at a time [ns]; newer: it comes after those."""
     edits = read_edits(array(*markers), now, 'torso')
     return order.apply(body, edits, (sent, 1), now, newer and (lambda other: other[0] in newer))
@@ -121,7 +121,7 @@ def test_the_newest_edit_of_each_publisher_stays_whatever_their_clocks_say(order
         arrival = copies.take(sent, 0, reader)
         newest[publisher] = max(newest.get(publisher, 0), sent[1])
         if arrival is not None:
-            # The number of the array tells which one is seen.
+            # The number of the array identifies it.
             edits = read_edits(array(box(f'part {publisher}', 0, (sent[1], 0, 0))), 0.0, 'torso')
             body = markers.apply(body, edits, sent, 0.0, arrival.is_newer)
             n_late += arrival.is_newer is not None
@@ -139,28 +139,28 @@ def test_the_last_message_is_the_last_that_counts_and_none_is_missed(case):
     # Live copies, some lost, and all reliable ones, each stream in its order, mixed at random.
     live = [(10 * k, k) for k in range(1, n + 1) if k not in lost]
     reliable = [(10 * k, k) for k in range(1, n + 1)]
-    copies, heard = Copies(takes_late=True), {'news': [], 'late': []}
+    copies, received = Copies(takes_late=True), {'news': [], 'late': []}
     while live or reliable:
         is_live = live and (not reliable or random.random() < 0.5)
         sent = (live if is_live else reliable).pop(0)
         found = take(copies, *sent, LIVE if is_live else RELIABLE)
         if found:
-            heard[found].append(sent[1])
-    assert heard['news'] == sorted(set(heard['news']))
-    assert heard['news'][-1] == n
-    assert sorted(heard['news'] + heard['late']) == list(range(1, n + 1))
+            received[found].append(sent[1])
+    assert received['news'] == sorted(set(received['news']))
+    assert received['news'][-1] == n
+    assert sorted(received['news'] + received['late']) == list(range(1, n + 1))
 
 
 @pytest.mark.usefixtures('ros_context')
 def test_a_late_latched_target_does_not_override_a_newer_one():
-    node, heard, late = Node('hearer'), [], []
+    node, received, late = Node('subscriber'), [], []
     subscriptions = [
-        OpenSubscription(node, PointStamped, 'target', lambda msg, _: heard.append(msg)),
+        OpenSubscription(node, PointStamped, 'target', lambda msg, _: received.append(msg)),
         OpenSubscription(
             node,
             PointStamped,
             'target',
-            lambda msg, _: heard.append(msg),
+            lambda msg, _: received.append(msg),
             lambda msg, arrival: late.append((msg.point.x, arrival.sent[0])),
         ),
     ]
@@ -172,30 +172,30 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
             subscription._on_copy(
                 old, {'source_timestamp': 100, 'publication_sequence_number': 1}, RELIABLE
             )
-    assert [msg.point.x for msg in heard] == [2.0, 2.0]
+    assert [msg.point.x for msg in received] == [2.0, 2.0]
     assert late == [(1.0, 100)]
     node.destroy_node()
 
 
 @pytest.mark.usefixtures('ros_context')
-def test_a_body_that_comes_late_is_no_younger_for_it_and_unsays_no_refusal():
-    heard = Input('body', WearerBody())
+def test_a_late_body_changes_neither_age_nor_rejection():
+    source = Input('body', WearerBody())
 
-    def refuse():
+    def reject():
         raise MessageError('no box')
 
-    assert heard.accept(WearerBody, 1.0)
-    assert not heard.accept(refuse, 2.0)
-    assert not heard.accept(WearerBody, 3.0, is_news=False)
-    assert heard.is_last_refused
-    assert heard.age(4.0) == 3.0
-    assert heard.accept(WearerBody, 4.0)
-    assert not heard.is_last_refused
+    assert source.accept(WearerBody, 1.0)
+    assert not source.accept(reject, 2.0)
+    assert not source.accept(WearerBody, 3.0, is_news=False)
+    assert source.is_last_rejected
+    assert source.age(4.0) == 3.0
+    assert source.accept(WearerBody, 4.0)
+    assert not source.is_last_rejected
 
 
 @pytest.mark.usefixtures('ros_context')
-def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
-    node = Node('hearer')
+def test_progress_is_that_of_the_reader_that_matches_all_publishers():
+    node = Node('subscriber')
     subscription = OpenSubscription(node, PointStamped, 'target', lambda *_: None)
     data = serialize_message(target())
     assert subscription.progress() == (0, 0)
@@ -204,7 +204,7 @@ def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
         (subscription._on_live, 500, 500),
         (partial(subscription._on_copy, reader=RELIABLE), 600, 500),
         (subscription._on_live, 700, 700),
-        # Of a middleware that does not say.
+        # Of a middleware without that.
         (subscription._on_live, 0, 0),
     ):
         n = subscription.progress()[0]
@@ -216,39 +216,39 @@ def test_how_far_it_has_read_is_told_by_the_reader_that_hears_everybody():
 
 def test_a_late_array_does_nothing_to_markers_that_newer_ones_have_edited():
     order = MarkerOrder()
-    body = told(order, WearerBody(), 100, box('torso'), box('hand'))
-    body = told(order, body, 200, command(Marker.DELETE, 'hand'), box('head'))
+    body = applied(order, WearerBody(), 100, box('torso'), box('hand'))
+    body = applied(order, body, 200, command(Marker.DELETE, 'hand'), box('head'))
     late = (command(Marker.DELETEALL), box('hand'), box('pack'))
-    body = told(order, body, 50, *late, newer={100, 200})
+    body = applied(order, body, 50, *late, newer={100, 200})
     assert names(body) == {'torso/0', 'head/0', 'pack/0'}
-    body = told(order, body, 150, box('head', size=(9.0, 9.0, 9.0)), newer={200})
+    body = applied(order, body, 150, box('head', size=(9.0, 9.0, 9.0)), newer={200})
     assert {b.name: b.size[0] for b in scene_of(body).boxes}['head/0'] == 0.3
     # Of another clock: what seems to be sent before was sent after it.
-    body = told(order, body, 30, box('head', size=(8.0, 8.0, 8.0)))
+    body = applied(order, body, 30, box('head', size=(8.0, 8.0, 8.0)))
     assert {b.name: b.size[0] for b in scene_of(body).boxes}['head/0'] == 8.0
 
 
 def test_a_late_array_adds_nothing_that_was_deleted_since_with_all_others():
     order = MarkerOrder()
-    body = told(order, WearerBody(), 100, box('torso'), box('hand'), box('hand', 1))
-    body = told(order, body, 200, command(Marker.DELETEALL, 'hand'))
+    body = applied(order, WearerBody(), 100, box('torso'), box('hand'), box('hand', 1))
+    body = applied(order, body, 200, command(Marker.DELETEALL, 'hand'))
     late = (box('hand', 1), box('hand', 2), box('torso', 1))
-    body = told(order, body, 150, *late, newer={200})
+    body = applied(order, body, 150, *late, newer={200})
     assert names(body) == {'torso/0', 'torso/1'}
     # A late one deletes what came before it, and that alone.
-    body = told(order, body, 120, command(Marker.DELETEALL), newer={150, 200})
+    body = applied(order, body, 120, command(Marker.DELETEALL), newer={150, 200})
     assert names(body) == {'torso/1'}
-    body = told(order, body, 300, command(Marker.DELETEALL))
+    body = applied(order, body, 300, command(Marker.DELETEALL))
     assert not body.parts
-    assert not told(order, body, 250, box('torso'), newer={300}).parts
+    assert not applied(order, body, 250, box('torso'), newer={300}).parts
 
 
 def test_what_an_order_remembers_is_bounded(monkeypatch):
     monkeypatch.setattr(marker_order, 'REMEMBERED', 20)
-    order, body = MarkerOrder(), told(MarkerOrder(), WearerBody(), 1, box('torso'))
+    order, body = MarkerOrder(), applied(MarkerOrder(), WearerBody(), 1, box('torso'))
     for k in range(100):
-        body = told(order, body, k, command(Marker.DELETE, 'hat', k), box('torso'))
-        body = told(order, body, k, command(Marker.DELETEALL, f'hats {k}'))
+        body = applied(order, body, k, command(Marker.DELETE, 'hat', k), box('torso'))
+        body = applied(order, body, k, command(Marker.DELETEALL, f'hats {k}'))
     assert len(order._markers) <= 22
     assert len(order._namespaces) == 20
     assert names(body) == {'torso/0'}
@@ -258,14 +258,14 @@ def test_what_has_expired_is_remembered_until_it_is_deleted_or_added_again():
     hat = box('hat')
     hat.lifetime.sec = 1
     order = MarkerOrder()
-    body = told(order, WearerBody(), 100, hat, box('torso'))
+    body = applied(order, WearerBody(), 100, hat, box('torso'))
     assert [key for key, _ in body.at(2.0).expired] == [('hat', 0)]
     assert not body.at(0.5).expired
-    later = told(order, body, 200, box('head'), now=2.0)
+    later = applied(order, body, 200, box('head'), now=2.0)
     assert [key for key, _ in later.expired] == [('hat', 0)]
-    assert not told(order, later, 300, box('hat'), now=3.0).expired
-    assert not told(order, later, 300, command(Marker.DELETE, 'hat'), now=3.0).expired
-    assert not told(order, later, 300, command(Marker.DELETEALL), now=3.0).expired
+    assert not applied(order, later, 300, box('hat'), now=3.0).expired
+    assert not applied(order, later, 300, command(Marker.DELETE, 'hat'), now=3.0).expired
+    assert not applied(order, later, 300, command(Marker.DELETEALL), now=3.0).expired
 
 
 def test_without_velocities_the_change_of_the_positions_counts():

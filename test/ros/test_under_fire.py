@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever comes over the wire, no callback fails, and what is refused changes nothing."""
+"""Whatever comes over the wire, no callback fails, and what is rejected changes nothing."""
 
 from itertools import count
 import math
@@ -152,20 +152,20 @@ class Wire:
 
     def __init__(self, planner):
         self.planner, self.sent = planner, count(1)
-        self.inputs = planner._listener._inputs
+        self.inputs = planner._scene_monitor._inputs
         self.subscriptions = dict(
-            zip(('body', 'target', 'joints'), planner._listener._subscriptions, strict=True)
+            zip(('body', 'target', 'joints'), planner._scene_monitor._subscriptions, strict=True)
         )
         self.published, self.complaints = [], Complaints()
         planner.get_logger = lambda: self.complaints
         publishers = planner._queue._publishers
-        publishers.tell = self.published.append
+        publishers.publish = self.published.append
         publishers.publish_view = lambda *a: None
 
     def say(self, name, msg, is_reliable=False):
         """Return whether a message was taken."""
-        heard = self.inputs.all[name]
-        before = (heard.n_refused, heard.value, heard.received)
+        source = self.inputs.all[name]
+        before = (source.n_rejected, source.value, source.received)
         data = msg if isinstance(msg, bytes) else serialize_message(msg)
         n = next(self.sent)
         subscription = self.subscriptions[name]
@@ -175,15 +175,15 @@ class Wire:
         else:
             subscription._on_live(data, info)
         assert not self.complaints.errors
-        if heard.n_refused > before[0]:
-            assert heard.n_refused == before[0] + 1
-            assert (heard.value, heard.received) == before[1:]
-            assert is_a_sentence(str(heard.refusal))
+        if source.n_rejected > before[0]:
+            assert source.n_rejected == before[0] + 1
+            assert (source.value, source.received) == before[1:]
+            assert is_a_sentence(str(source.rejection))
             return False
         return True
 
     def plan(self):
-        """Return the answer to a request, after looking at what was published."""
+        """Return the answer to a request, after checking what was published."""
         before = len(self.published)
         answer = finish(
             self.planner._on_plan(Trigger.Request(), Trigger.Response()), self.planner._queue
@@ -224,7 +224,7 @@ def _playback(ros_context):
 
 @MANY
 @given(msg=ARRAYS, is_reliable=st.booleans())
-def test_any_body_is_taken_or_refused_whole(wire, msg, is_reliable):
+def test_any_body_is_taken_or_rejected_whole(wire, msg, is_reliable):
     wire.say('body', msg, is_reliable)
     body = wire.inputs.body.value
     assert len({key for key, _ in body.parts}) == len(body.parts)
@@ -237,7 +237,7 @@ def test_any_body_is_taken_or_refused_whole(wire, msg, is_reliable):
 
 @MANY
 @given(msg=TARGETS)
-def test_any_target_is_taken_or_refused(wire, msg):
+def test_any_target_is_taken_or_rejected(wire, msg):
     is_taken = wire.say('target', msg)
     if is_taken:
         assert np.isfinite(wire.inputs.target.value.target).all()
@@ -245,7 +245,7 @@ def test_any_target_is_taken_or_refused(wire, msg):
 
 @MANY
 @given(msgs=st.lists(STATES, min_size=1, max_size=3))
-def test_any_joint_states_are_taken_refused_or_of_others(wire, msgs):
+def test_any_joint_states_are_taken_rejected_or_of_others(wire, msgs):
     for msg in msgs:
         wire.say('joints', msg)
         reading = wire.inputs.joints.value
@@ -259,7 +259,7 @@ def test_any_joint_states_are_taken_refused_or_of_others(wire, msgs):
     data=st.binary(max_size=60),
     header=st.sampled_from([b'', b'\0\1\0\0', b'\0\0\0\0', b'\0\3\0\0']),
 )
-def test_bytes_that_are_no_message_are_refused(wire, name, data, header):
+def test_bytes_that_are_no_message_are_rejected(wire, name, data, header):
     wire.say(name, header + data)
 
 
@@ -278,7 +278,7 @@ def test_every_request_is_answered_and_the_next_good_one_succeeds(wire, body, ai
     q=st.lists(st.one_of(st.floats(-0.3, 0.3), NUMBERS), min_size=4, max_size=4),
     v=st.lists(st.one_of(st.floats(-1.6, 1.6), NUMBERS), min_size=4, max_size=4),
 )
-def test_any_moving_arm_is_taken_over_or_refused(wire, q, v):
+def test_any_moving_arm_gets_a_handover_or_a_rejection(wire, q, v):
     assert wire.is_well()
     wire.say('joints', joints(np.add(FOLDED, q).tolist(), velocity=v))
     wire.say('body', wearer())
@@ -310,7 +310,7 @@ def test_get_plan_answers_whatever_is_asked(wire, start, goal, is_empty):
     name=st.sampled_from(['algorithm', 'margin', 'seed', 'max_velocity', 'time_limit', 'nothing']),
     value=st.one_of(NUMBERS, st.integers(-(2**63), 2**63 - 1), TEXTS, ROWS, st.booleans()),
 )
-def test_any_parameter_is_taken_or_refused_in_a_sentence(wire, name, value):
+def test_any_parameter_is_taken_or_rejected_in_a_sentence(wire, name, value):
     planner = wire.planner
     before = planner._reporter.parameters
     known = [p for p in ('algorithm', 'margin', 'seed', 'max_velocity', 'time_limit') if p == name]
@@ -361,7 +361,7 @@ def spoiled(spoils):
 
 @MANY
 @given(spoils=SPOILS, should_stop=st.booleans())
-def test_any_trajectory_is_followed_or_refused(playback, spoils, should_stop):
+def test_any_trajectory_is_executed_or_rejected(playback, spoils, should_stop):
     before = playback._playback
     playback._on_raw_trajectory(serialize_message(spoiled(spoils)))
     if should_stop:
@@ -378,14 +378,14 @@ def test_any_trajectory_is_followed_or_refused(playback, spoils, should_stop):
 
 @MANY
 @given(data=st.binary(max_size=80))
-def test_bytes_that_are_no_trajectory_are_refused(playback, data):
+def test_bytes_that_are_no_trajectory_are_rejected(playback, data):
     before = playback._playback
     playback._on_raw_trajectory(b'\0\1\0\0' + data)
     playback._on_raw_trajectory(data)
     assert playback._playback is before
 
 
-def test_a_motion_of_too_many_bytes_is_refused(playback):
+def test_a_motion_of_too_many_bytes_is_rejected(playback):
     before = playback._playback
     playback._on_raw_trajectory(serialize_message(good_motion()) + bytes(MOST_BYTES))
     assert playback._playback is before
@@ -397,7 +397,7 @@ def test_after_all_of_this_a_good_motion_is_followed(playback):
     assert playback._playback is not before
 
 
-def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_until):
+def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_until):
     planner = PlannerNode(InProcessPlanner(), namespace='/wire')
     playback = PlaybackNode(namespace='/wire')
     stranger, motions = Node('stranger', namespace='/wire'), []
@@ -437,9 +437,9 @@ def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, tell, wait_unt
         fire()
         for publisher, _, good in publishers.values():
             if good is not None:
-                tell(stranger, publisher, good)
-        n, inputs = len(motions), planner._listener._inputs
-        wait_until(lambda: not any(heard.is_last_refused for heard in inputs.all.values()))
+                send(stranger, publisher, good)
+        n, inputs = len(motions), planner._scene_monitor._inputs
+        wait_until(lambda: not any(source.is_last_rejected for source in inputs.all.values()))
         wait_until(lambda: ask().success)
         wait_until(lambda: len(motions) > n)
     planner.close()

@@ -74,13 +74,13 @@ def test_a_bad_parameter_is_one_sentence():
         following(None, None, ['--ros-args', '-p', 'margin:=-1.0']),
     ):
         pass
-    # Nothing is left behind that would be in the way of a good one.
+    # Nothing is left behind that would spoil a good one.
     with following(None, None, LEFT):
         pass
 
 
 class Planner(Node):
-    """Offers the planner's service, and says the same at once or never anything."""
+    """Offers the planner's service, and answers the same at once or never."""
 
     def __init__(self, does_answer):
         """Offer it."""
@@ -115,7 +115,7 @@ def test_a_planner_that_ends_while_it_is_asked_leaves_the_next_one_to_be_asked()
         second.destroy_node()
 
 
-def test_a_request_that_fails_is_said_and_the_next_one_is_made(ros_context):
+def test_a_failed_request_is_reported_and_the_next_one_is_made(ros_context):
     feed = ViewerFeed()
     feed._is_asking = True
     future = Future()

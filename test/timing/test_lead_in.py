@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import quintic_states
-from rrth_planner.execution.localization import sharp_phase_of, takeover
+from rrth_planner.execution.localization import predict_start_state, sharp_phase_of
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
@@ -133,7 +133,7 @@ def test_an_arm_that_follows_a_motion_is_foreseen_to_go_on(rate, seed):
     running = parameterize(Path(rng.standard_normal((2, 4))), (), limits())
     time, lead = rng.uniform(0.1, 0.7) * running.duration, 0.05
     q, v, _ = (values[0] for values in sample(running, [time]))
-    found = takeover(q, rate * v, running, lead).state
+    found = predict_start_state(q, rate * v, running, lead).state
     q, v, a = (values[0] for values in sample(running, [time + rate * lead]))
     assert np.abs(found.positions - q).max() < 1e-6
     # In the time of the motion: what comes next is followed at the same rate.
@@ -182,7 +182,7 @@ def test_an_arm_with_no_room_ahead_stops_along_its_motion_first(seed):
 def test_an_arm_on_another_way_goes_on_at_its_velocity():
     running = parameterize(Path([np.zeros(4), np.ones(4)]), (), limits())
     q, v = np.full(4, 0.5) + [0.1, 0.0, 0.0, 0.0], np.array([0.3, 0.0, 0.0, 0.0])
-    found = takeover(q, v, running, 0.1).state
+    found = predict_start_state(q, v, running, 0.1).state
     assert np.allclose(found.positions, q + 0.1 * v)
     assert np.array_equal(found.velocities, v)
     assert not found.accelerations.any()
@@ -240,4 +240,4 @@ def test_a_motion_that_would_break_the_limits_is_none(monkeypatch):
     plan = motion(wearer(), q, [1.5, 0.1, 0.3], 2, StartState(state=state))
     assert plan.status is PlanStatus.START_MOVES
     assert plan.trajectory is None
-    assert 'holds the limits of its joints' in plan.sentence
+    assert 'respects the limits of its joints' in plan.sentence

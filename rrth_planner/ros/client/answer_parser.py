@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner answers, read back: code, sentence and figures."""
+"""Parser of the answers of a planner: code, sentence and figures."""
 
 from dataclasses import dataclass
 import re
@@ -52,7 +52,7 @@ def answer_from_text(text: str) -> Answer:
         It is none.
 
     """
-    # Whoever answers may send anything; what is read of it may be printed.
+    # An answer may hold anything; what is read of it may be printed.
     text = one_line(text)
     found = ANSWER.fullmatch(text)
     if found is None or int(found[2]) not in set(ErrorCode):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The node of the demo: what a program that uses planner and playback has to do."""
+"""The node of the demo: a client of planner and playback."""
 
 from collections.abc import Callable
 import time
@@ -21,12 +21,12 @@ STILL = 1e-6
 
 
 class DemoError(RrthError):
-    """Something that ends the demo."""
+    """An error that ends the demo."""
 
 
 class DemoClient(PlannerClient):
     """
-    Tells the planner body and target, asks for motions, and follows the arm.
+    Publishes body and target, requests motions, and follows the arm.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class DemoClient(PlannerClient):
     timeout : float
         Longest wait for anything [s].
     check : callable
-        Raises when going on waiting makes no sense.
+        Raises where waiting is useless.
 
     """
 
@@ -44,10 +44,10 @@ class DemoClient(PlannerClient):
         self._joints_of_arm = arm.joint_names
 
     def wait_for_nodes(self) -> None:
-        """Wait until the planner can be asked, and the arm can be seen and listens."""
+        """Wait for the planner, for joint states, and for a subscriber of the motions."""
         self.wait_for_state(self._joints_of_arm)
         self.wait_for_planner()
-        self.wait_for(lambda: self.count_arms() > 0, 'an arm that listens to joint_trajectory')
+        self.wait_for(lambda: self.count_arms() > 0, 'a subscriber of joint_trajectory')
 
     def present(self) -> Array:
         """Return the latest joint positions, (dof,) [rad]."""
@@ -55,15 +55,15 @@ class DemoClient(PlannerClient):
 
     def ask_for_motion(self) -> tuple[Trajectory, float]:
         """Return the motion that the planner publishes, and its planning time [ms]."""
-        self.watch()
+        self.clear_history()
         response = self.ask(self.timeout)
         if not response.success:
-            raise DemoError(f'the planner refused: {response.message}')
-        self.wait_for(lambda: bool(self.told), 'joint_trajectory')
+            raise DemoError(f'the planner rejected the request: {response.message}')
+        self.wait_for(lambda: bool(self.commanded), 'joint_trajectory')
         figures = answer_from_text(response.message).figures
         if 'planning_time_ms' not in figures:
             raise DemoError(f'no planning time in the answer "{response.message}"')
-        trajectory = joint_trajectory_from_msg(self.told[-1], self._joints_of_arm)
+        trajectory = joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm)
         return trajectory, figures['planning_time_ms']
 
     def wait_for_arrival(self, trajectory: Trajectory) -> None:
@@ -77,24 +77,26 @@ class DemoClient(PlannerClient):
 
     def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
         """
-        Publish another body so long after the arm set off [s]; return where the arm was from then.
+        Publish another body so long after the arm set off [s]; return its states from then on.
 
-        Waits until the arm has left where it starts, (dof,) [rad], and then until it has been
-        stopped, has been told how to go on, and has arrived there.
+        Waits until the arm has left q_start, (dof,) [rad], and then until it was stopped, got a
+        new motion, and has arrived at its end.
         """
         self.wait_for(
-            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm on its way'
+            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm in motion'
         )
         end = time.monotonic() + after
         while time.monotonic() < end:
             self.take_messages(0.005)
-        n = len(self.told)
-        self.seen = []
-        self.tell_body(body)
+        n = len(self.commanded)
+        self.observed = []
+        self.publish_body(body)
         # The stop begins in motion, what comes after it at rest.
         self.wait_for(
-            lambda: len(self.told) > n + 1 and not any(self.told[-1].points[0].velocities),
-            'a stop and a way round',
+            lambda: (
+                len(self.commanded) > n + 1 and not any(self.commanded[-1].points[0].velocities)
+            ),
+            'a stop and a new motion',
         )
-        self.wait_for_arrival(joint_trajectory_from_msg(self.told[-1], self._joints_of_arm))
-        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.seen])
+        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm))
+        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.observed])

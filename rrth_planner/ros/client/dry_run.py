@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plan as the planner would, with its parameters and what it hears, and publish nothing."""
+"""Plan as the planner would, with its parameters and inputs, and publish nothing."""
 
 from geometry_msgs.msg import PointStamped
 from rrth_planner.model.arm import pointing_error
@@ -10,9 +10,9 @@ from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import PlannerClient
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
-from rrth_planner.ros.interface.scene_monitor import Listener
+from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.error_codes import answer, code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
 from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome
 from rrth_planner.ros.requests.revalidation import Revalidation
 from visualization_msgs.msg import MarkerArray
@@ -25,17 +25,17 @@ def plan_without_moving(
     body: MarkerArray | None,
 ) -> tuple[Answer, float | None]:
     """
-    Return what the planner would answer, and by how much the motion would aim past the target [m].
+    Return what the planner would answer, and by how much the motion would miss the target [m].
 
     Parameters
     ----------
     client : PlannerClient
-        Hears where the arm is.
+        Receives the joint states.
     parameters : PlannerParameters
         Of the planner.
     target : PointStamped
     body : MarkerArray or None
-        None: what is heard on `body_boxes`.
+        None: what is inputs on `body_boxes`.
 
     Raises
     ------
@@ -43,32 +43,32 @@ def plan_without_moving(
         No joint positions, or no body.
 
     """
-    heard = Inputs(
+    inputs = Inputs(
         *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
     )
-    listener = Listener(client, parameters, heard)
-    client.wait_for(lambda: heard.joints.received is not None, heard.joints.topic)
+    scene_monitor = SceneMonitor(client, parameters, inputs)
+    client.wait_for(lambda: inputs.joints.received is not None, inputs.joints.topic)
     if body is None:
         client.wait_for(
-            lambda: heard.body.received is not None or heard.body.refusal is not None,
-            f'a body on {heard.body.topic}, and none is given by --body',
+            lambda: inputs.body.received is not None or inputs.body.rejection is not None,
+            f'a body on {inputs.body.topic}, and none is given by --body',
         )
     planner = InProcessPlanner()
     planner.warm_up(parameters.arm, parameters.options)
     # Compiling or loading may have taken a while; the arm may have moved.
     client.wait_for_state(parameters.arm.joint_names)
     try:
-        goal = listener.goal(target)
+        goal = scene_monitor.goal(target)
     except MessageError as problem:
-        code = code_of_refusal(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+        code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
         return Answer(code, str(problem), {}), None
 
     def now() -> float:
         return client.get_clock().now().nanoseconds * 1e-9
 
     if body is not None:
-        heard.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
-    outcome = plan_request(heard, parameters, now, planner, lambda: False, _is_in_time, goal)
+        inputs.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
+    outcome = plan_request(inputs, parameters, now, planner, lambda: False, _is_in_time, goal)
     error = None
     if outcome.trajectory is not None:
         error = pointing_error(parameters.arm, outcome.trajectory.positions[-1], goal.target)

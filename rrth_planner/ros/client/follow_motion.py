@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Follow an arm to the end of what it was told, with a bar that shows how far it is."""
+"""Follow an arm to the end of its commanded motion, with a progress bar."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,8 +17,8 @@ from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from tqdm import tqdm  # type: ignore[import-untyped]
 from trajectory_msgs.msg import JointTrajectory
 
-# A motion that ends so far past its target was planned for another one [m].
-AIMS_ELSEWHERE = 1e-3
+# A motion that points so far past the target was planned for another one [m].
+OTHER_TARGET = 1e-3
 # Durations of a motion in an answer and in its message are as close as that [s].
 SAME_DURATION = 2e-3
 # An arm that has arrived stays there for so long [s].
@@ -29,16 +29,16 @@ SPACING = 0.01
 
 
 def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> Trajectory:
-    """Return the motion of an answer, which says its duration [s], once it has been heard."""
+    """Return the motion of an answer with this duration [s], once it was received."""
     found: list[Trajectory] = []
 
-    def is_heard() -> bool:
-        # What an earlier request left on the latched topic may come first.
-        motions = _motions_of(client.told, arm)
+    def is_received() -> bool:
+        # The motion of an earlier request, latched on the topic, may come first.
+        motions = _motions_of(client.commanded, arm)
         found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
         return bool(found)
 
-    client.wait_for(is_heard, f'{client.resolve_topic_name("joint_trajectory")}')
+    client.wait_for(is_received, f'{client.resolve_topic_name("joint_trajectory")}')
     return found[-1]
 
 
@@ -57,16 +57,16 @@ def follow(
     client : PlannerClient
     arm : ArmModel
     motion : Trajectory
-        What the arm was told.
+        The commanded one.
     target : ndarray, shape (3,), or None
-        A motion that aims elsewhere, as a stop, is not the last one [m].
+        A motion that does not point there, as a stop, is not the last one [m].
     tolerance : float
         Greatest distance of a joint from the end [rad].
 
     Raises
     ------
     NotInTimeError
-        Its end does not come within the duration of the motion and the client's timeout.
+        It does not end within the duration of the motion and the client's timeout.
 
     """
     with tqdm(
@@ -75,7 +75,7 @@ def follow(
         unit='s',
         bar_format='{desc}: {percentage:3.0f}% |{bar}| {n:.1f} of {total:.1f} s',
         leave=False,
-        # Only where somebody looks.
+        # Only on a terminal.
         disable=None,
     ) as bar:
         _follow(client, arm, motion, target, tolerance, bar)
@@ -89,15 +89,18 @@ def _follow(
     tolerance: float,
     bar: Any,
 ) -> None:
-    n_told = len(client.told)
+    n_commanded = len(client.commanded)
     begin = present = time.monotonic()
     arrived_at: float | None = None
     while present - begin <= motion.duration + client.timeout:
         client.take_messages(0.02)
         present = time.monotonic()
-        newer, n_told = _motions_of(client.told[n_told:], arm), len(client.told)
+        newer, n_commanded = (
+            _motions_of(client.commanded[n_commanded:], arm),
+            len(client.commanded),
+        )
         if newer:
-            # The wearer moved, and the planner stopped the arm or sent it another way.
+            # The wearer moved, and the planner stopped the arm or replanned.
             motion, begin, arrived_at = newer[-1], present, None
             bar.reset(total=round(motion.duration, 2))
         q = client.positions(arm.joint_names)
@@ -113,10 +116,10 @@ def _follow(
     raise NotInTimeError(_why(client, arm, motion, target, tolerance))
 
 
-def _motions_of(told: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
-    """Return the motions of this arm; the topic may carry another machine's, or nonsense."""
+def _motions_of(commanded: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
+    """Return the motions of this arm; the topic may carry those of others, or invalid ones."""
     motions = []
-    for msg in told:
+    for msg in commanded:
         with suppress(MessageError):
             motions.append(joint_trajectory_from_msg(msg, arm.joint_names))
     return motions
@@ -130,7 +133,7 @@ def _time_along(motion: Trajectory, q: Array) -> float:
 
 
 def _aims_at(arm: ArmModel, motion: Trajectory, target: Array | None) -> bool:
-    return target is None or pointing_error(arm, motion.positions[-1], target) <= AIMS_ELSEWHERE
+    return target is None or pointing_error(arm, motion.positions[-1], target) <= OTHER_TARGET
 
 
 def _why(
@@ -143,14 +146,14 @@ def _why(
     topic = client.resolve_topic_name('joint_trajectory')
     if not _aims_at(arm, motion, target):
         return (
-            'the arm was stopped on its way, and nothing that leads to the target came on '
+            'the arm was stopped, and no motion to the target was published on '
             f'{topic} within {client.timeout:g} s'
         )
     gaps = np.abs(client.positions(arm.joint_names) - motion.positions[-1])
     k = int(np.argmax(gaps))
-    listener = '' if client.count_arms() > 0 else f'; nobody else listens to {topic}'
+    hint = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
     return (
         f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
         f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
-        f'{client.timeout:g} s more{listener}'
+        f'{client.timeout:g} s more{hint}'
     )

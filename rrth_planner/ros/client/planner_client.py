@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node that tells a planner body and target, asks it, and sees how the arm moves."""
+"""A node that publishes body and target, requests motions, and follows the arm."""
 
 from collections.abc import Callable, Sequence
 import time
@@ -25,19 +25,19 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
-# Between two requests of a planner that has not heard everything yet [s].
+# Between two requests to a planner that still lacks an input [s].
 PAUSE = 0.3
 
 
 class NotInTimeError(RrthError):
-    """Something that was waited for did not come."""
+    """A timeout."""
 
 
 class PlannerClient(Node):
     """
-    What every program that has a planner move an arm needs.
+    The common part of the clients of a planner.
 
-    Messages are taken while something is waited for, and only then.
+    Messages are received only while it waits for something.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class PlannerClient(Node):
     timeout : float
         Longest wait for anything [s].
     check : callable
-        Raises when going on waiting makes no sense.
+        Raises where waiting is useless.
 
     """
 
@@ -55,12 +55,12 @@ class PlannerClient(Node):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__(name)
         self.timeout, self._check = timeout, check
-        # The joints that count; empty: those of whatever message comes.
+        # The joints required in a message; empty: any.
         self._joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
-        # All that the arm was told, and where it was, since `watch` was called.
-        self.told: list[JointTrajectory] = []
-        self.seen: list[JointState] = []
+        # The commanded motions and the joint states since `clear_history` was called.
+        self.commanded: list[JointTrajectory] = []
+        self.observed: list[JointState] = []
         self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
@@ -72,7 +72,7 @@ class PlannerClient(Node):
     def wait_for(
         self, condition: Callable[[], bool], what: str, timeout: float | None = None
     ) -> None:
-        """Take messages until a condition holds, or raise NotInTimeError after a time [s]."""
+        """Receive messages until a condition holds, or raise NotInTimeError after a time [s]."""
         timeout = self.timeout if timeout is None else timeout
         end = time.monotonic() + timeout
         while not condition():
@@ -81,22 +81,22 @@ class PlannerClient(Node):
                 raise NotInTimeError(f'{what}: nothing for {timeout:g} s')
 
     def take_messages(self, longest: float = 0.05) -> None:
-        """Take a message, if one comes within a time [s]."""
+        """Receive a message, if one comes within a time [s]."""
         try:
             self._spinner.spin_once(timeout_sec=longest)
         except KeyboardInterrupt:
-            # What is cut off in mid-step would warn of that when Python ends.
+            # Interrupted coroutines would warn when Python ends.
             warnings.simplefilter('ignore', RuntimeWarning)
             raise
         self._check()
 
     def wait_for_planner(self) -> None:
-        """Wait until the planner can be asked."""
+        """Wait for the service of the planner."""
         service = self.resolve_service_name('rrth_planner/plan')
         self.wait_for(self._plan.service_is_ready, f'service {service}')
 
     def wait_for_state(self, joint_names: Sequence[str] = ()) -> None:
-        """Wait until the arm has been seen; messages without all of these joints are none."""
+        """Wait for a joint state that has all of these joints."""
         self._joint_names, self.state = tuple(joint_names), None
         joints = f' of {", ".join(joint_names)}' if joint_names else ''
         self.wait_for(lambda: self.state is not None, f'{self._joints.topic_name}{joints}')
@@ -116,20 +116,20 @@ class PlannerClient(Node):
         assert self.state is not None
         names = list(self.state.name)
         if len(self.state.velocity) != len(names):
-            # Not every arm says how fast it is.
+            # Not every driver has velocities.
             return True
         return all(abs(self.state.velocity[names.index(n)]) <= speed for n in joint_names)
 
-    def tell_body(self, body: MarkerArray) -> None:
+    def publish_body(self, body: MarkerArray) -> None:
         """Publish the wearer's body; return once the planner has it."""
-        self._tell(self._body, body)
+        self._publish(self._body, body)
 
-    def tell_target(self, target: PointStamped) -> None:
+    def publish_target(self, target: PointStamped) -> None:
         """Publish a target; return once the planner has it."""
-        self._tell(self._target, target)
+        self._publish(self._target, target)
 
     def ask(self, patience: float) -> Trigger.Response:
-        """Return the planner's answer; ask it again while it has not heard everything [s]."""
+        """Return the planner's answer; ask again while it lacks an input, for a time [s]."""
         end = time.monotonic() + patience
         answer = self._call()
         while answer.message.startswith(NO_INPUT_YET) and time.monotonic() < end:
@@ -137,22 +137,22 @@ class PlannerClient(Node):
             answer = self._call()
         return answer
 
-    def watch(self) -> None:
-        """Begin to write down what the arm is told and where it is."""
-        self.told, self.seen = [], []
+    def clear_history(self) -> None:
+        """Forget the commanded motions and the joint states so far."""
+        self.commanded, self.observed = [], []
 
     def count_arms(self) -> int:
-        """Return how many others hear what an arm is told."""
+        """Return the number of other subscribers of the motions."""
         return self.count_subscribers('joint_trajectory') - 1
 
-    def _tell(self, publisher: Any, message: Any) -> None:
+    def _publish(self, publisher: Any, message: Any) -> None:
         self.wait_for(
-            lambda: is_heard(self, publisher), f'a reliable subscription of {publisher.topic}'
+            lambda: is_matched(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
         publisher.publish(message)
-        # The request that follows takes another way, and must not overtake the message.
+        # The request that follows must not overtake the message.
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
-            raise NotInTimeError(f'{publisher.topic}: not taken within {self.timeout:g} s')
+            raise NotInTimeError(f'{publisher.topic}: not acknowledged within {self.timeout:g} s')
 
     def _call(self) -> Trigger.Response:
         future = self._plan.call_async(Trigger.Request())
@@ -160,7 +160,7 @@ class PlannerClient(Node):
         return future.result()
 
     def _pause(self) -> None:
-        """Let a while pass, taking messages."""
+        """Receive messages for a while."""
         end = time.monotonic() + PAUSE
         while time.monotonic() < end:
             self.take_messages()
@@ -169,20 +169,20 @@ class PlannerClient(Node):
         try:
             configuration_from_msg(msg, self._joint_names)
         except MessageError:
-            # Of other joints, or nonsense: the arm is where it was seen last.
+            # Of other joints, or invalid: the last state counts.
             return
         self.state = msg
-        self.seen.append(msg)
+        self.observed.append(msg)
 
     def _on_motion(self, msg: JointTrajectory) -> None:
-        self.told.append(msg)
+        self.commanded.append(msg)
 
 
-def is_heard(node: Node, publisher: Publisher) -> bool:
+def is_matched(node: Node, publisher: Publisher) -> bool:
     """
-    Return whether all who listen are connected, one of them so that it acknowledges.
+    Return whether all subscribers are connected, a reliable one among them.
 
-    Before that, `wait_for_all_acked` may wait for nobody.
+    Before that, `wait_for_all_acked` may return too early.
 
     Parameters
     ----------

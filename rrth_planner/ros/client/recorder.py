@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Write what is said on topics to an MCAP file, byte for byte."""
+"""Write the messages of topics to an MCAP file, byte for byte."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -16,9 +16,9 @@ from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.messages.definitions import definition_of, type_name, type_of_name
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 
-# What has come is on the disk once it is so much; a recorder that is killed loses no more [bytes].
+# Size of the chunks written; a recorder that is killed loses no more [bytes].
 CHUNK = 128 * 1024
-# How often topics of unknown type are looked for [s].
+# How often topics of unknown type are searched for [s].
 PERIOD = 0.2
 
 
@@ -64,7 +64,7 @@ class RecordingFile:
         self._writer.start(profile='ros2', library='rrth_planner')
 
     def __enter__(self) -> 'RecordingFile':
-        """Go on."""
+        """Return the open file."""
         return self
 
     def __exit__(
@@ -87,7 +87,7 @@ class RecordingFile:
                 self._path.unlink(missing_ok=True)
 
     def add_topic(self, topic: str, msg_type: Any) -> None:
-        """Write how a topic's messages are to be read."""
+        """Write the schema of a topic's messages."""
         name = type_name(msg_type)
         try:
             if name not in self._schemas:
@@ -101,7 +101,7 @@ class RecordingFile:
         self.counts[topic] = 0
 
     def add(self, topic: str, data: bytes, sent: int, received: int) -> None:
-        """Write a message as it came from the wire, with when it was sent and when it came."""
+        """Write the bytes of a message, with the times of sending and reception [ns]."""
         try:
             self._writer.add_message(
                 self._channels[topic], log_time=received, data=data, publish_time=sent
@@ -115,17 +115,17 @@ class RecordingFile:
 
 
 class RawSubscription(OpenSubscription):
-    """Hears the same as its parent, and hands on the bytes."""
+    """An OpenSubscription whose callback takes the bytes."""
 
-    def _hand_on(
-        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
+    def _deliver(
+        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
-        hearer(data, arrival)
+        callback(data, arrival)
 
 
 class Recorder(Node):
     """
-    Hears topics from publishers of any quality of service, and writes down what comes.
+    Records topics from publishers of any quality of service.
 
     Parameters
     ----------
@@ -134,27 +134,27 @@ class Recorder(Node):
         Types by topic.
     topics : sequence of str
         What is recorded, relative to the node's namespace; the types of those that are not known
-        are looked up once somebody offers them.
+        are looked up once there is a publisher.
 
     """
 
     def __init__(
         self, file: RecordingFile, known: Mapping[str, Any], topics: Sequence[str]
     ) -> None:
-        """Begin to listen."""
+        """Subscribe."""
         super().__init__('rrth_recorder')
         self._file = file
-        # Why the recording cannot go on; raised by `check`, outside of callbacks.
+        # Why the recording must end; raised by `check`, outside of callbacks.
         self._problem: RrthError | None = None
-        self._heard: list[OpenSubscription] = []
+        self._topics: list[OpenSubscription] = []
         self._missing: list[str] = []
         for topic in topics:
             if topic in known:
-                self._listen(topic, known[topic])
+                self._add_topic(topic, known[topic])
             else:
                 self._missing.append(topic)
         self._timer = self.create_timer(
-            PERIOD, self._look_for_missing, clock=Clock(clock_type=ClockType.STEADY_TIME)
+            PERIOD, self._find_missing, clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
 
     def check(self) -> None:
@@ -162,7 +162,7 @@ class Recorder(Node):
         if self._problem is not None:
             raise self._problem
 
-    def _listen(self, topic: str, msg_type: Any) -> None:
+    def _add_topic(self, topic: str, msg_type: Any) -> None:
         name = self.resolve_topic_name(topic)
         if name in self._file.counts:
             return
@@ -175,10 +175,10 @@ class Recorder(Node):
                 except RrthError as problem:
                     self._problem = problem
 
-        # What was latched before is part of the recording too, whatever has come since.
-        self._heard.append(RawSubscription(self, msg_type, topic, write, on_late=write))
+        # Late latched messages are part of the recording, too.
+        self._topics.append(RawSubscription(self, msg_type, topic, write, on_late=write))
 
-    def _look_for_missing(self) -> None:
+    def _find_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}
         for topic in tuple(self._missing):
             types = offered.get(self.resolve_topic_name(topic))
@@ -186,7 +186,7 @@ class Recorder(Node):
                 continue
             self._missing.remove(topic)
             try:
-                self._listen(topic, type_of_name(types[0]))
+                self._add_topic(topic, type_of_name(types[0]))
             except RrthError as problem:
                 self._problem = problem
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read a recording of a run from an MCAP file, whichever recorder wrote it."""
+"""Read a recorded run from an MCAP file of any recorder."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +11,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
-from rrth_planner.execution.recording import Recording, Told
+from rrth_planner.execution.recording import CommandedMotion, Recording
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
@@ -35,8 +35,8 @@ TYPES = {
 SAME_CLOCK = 1.0
 
 
-class Heard(NamedTuple):
-    """A message of a file, when it was sent and when it came [ns]."""
+class RecordedMessage(NamedTuple):
+    """A message of a file, with the times of sending and reception [ns]."""
 
     msg: Any
     sent: int
@@ -45,22 +45,22 @@ class Heard(NamedTuple):
 
 class RecordingReader:
     """
-    The messages of a file, read as the nodes read them.
+    The messages of a file, checked as by the nodes.
 
     Parameters
     ----------
     path : Path
     arm : ArmModel
-        Whose joints are looked for.
+        The arm of the run.
     base_frame : str
-        Of the planner; messages in other frames are refused.
+        Of the planner; messages in other frames are rejected.
     namespace : str, optional
         Of the run; without, there must be one only.
 
     Attributes
     ----------
-    refused : dict
-        By topic, why its last bad message was refused; bad messages are left out.
+    rejected : dict
+        By topic, why its last bad message was rejected; bad messages are left out.
 
     Raises
     ------
@@ -74,10 +74,12 @@ class RecordingReader:
     ) -> None:
         """Read the file."""
         self._path, self._arm, self._base_frame = path, arm, base_frame
-        topics, self._begin, self.refused = _read(path)
+        topics, self._begin, self.rejected = _read(path)
         self._topics = {role: self._topic(topics, role, namespace) for role in TYPES}
-        self._heard = {
-            role: [] if topic is None else sorted(topics[topic], key=lambda heard: heard.received)
+        self._messages = {
+            role: []
+            if topic is None
+            else sorted(topics[topic], key=lambda recorded: recorded.received)
             for role, topic in self._topics.items()
         }
 
@@ -96,21 +98,21 @@ class RecordingReader:
         positions = np.array([readings[i].positions for i in order])
         velocities = np.array([readings[i].velocities for i in order])
         if not np.isfinite(velocities).all():
-            # What a driver does not know: then as the positions change.
+            # Where a driver has no velocities they are the differences of the positions.
             changes = np.gradient(positions, times, axis=0) if len(times) > 1 else 0.0 * positions
             velocities = np.where(np.isfinite(velocities), velocities, changes)
         return Recording(
             times=times,
             positions=positions,
             velocities=velocities,
-            told=tuple(sorted(self._told(), key=lambda told: told.begin)),
+            commanded=tuple(sorted(self._commanded(), key=lambda motion: motion.begin)),
             bodies=tuple(self._bodies()),
             targets=tuple(self._good('target', lambda h: (self._when(h), self._target_of(h.msg)))),
-            guard=tuple(self._guard()),
+            monitor_states=tuple(self._monitor_states()),
         )
 
     def _topic(
-        self, topics: dict[str, list[Heard]], role: str, namespace: str | None
+        self, topics: dict[str, list[RecordedMessage]], role: str, namespace: str | None
     ) -> str | None:
         # Diagnostics have one topic for all namespaces.
         if role == 'diagnostics' and '/diagnostics' in topics:
@@ -126,41 +128,45 @@ class RecordingReader:
             )
         return found[0] if found else None
 
-    def _good(self, role: str, read: Callable[[Heard], Any]) -> list[Any]:
-        """Return what is read of each message that the nodes would not refuse."""
+    def _good(self, role: str, read: Callable[[RecordedMessage], Any]) -> list[Any]:
+        """Return what is read from each message that the nodes would not reject."""
         result = []
-        for heard in self._heard[role]:
+        for recorded in self._messages[role]:
             try:
-                result.append(read(heard))
+                result.append(read(recorded))
             except MessageError as problem:
-                self.refused[str(self._topics[role])] = str(problem)
+                self.rejected[str(self._topics[role])] = str(problem)
         return result
 
-    def _when(self, heard: Heard) -> float:
+    def _when(self, recorded: RecordedMessage) -> float:
         """Return when a message was sent, on the clock of the recording [s]."""
-        return (heard.sent - self._begin) / NANOSECONDS
+        return (recorded.sent - self._begin) / NANOSECONDS
 
     def _readings(self) -> list[JointReading]:
         before: JointReading | None = None
 
-        def read(heard: Heard) -> JointReading:
+        def read(recorded: RecordedMessage) -> JointReading:
             nonlocal before
             names = self._arm.joint_names
-            before = joint_reading(heard.msg, names, heard.received / NANOSECONDS, before)
+            before = joint_reading(recorded.msg, names, recorded.received / NANOSECONDS, before)
             return before
 
         names = self._arm.joint_names
-        self._heard['joint_states'] = [
-            heard for heard in self._heard['joint_states'] if has_joint_of(heard.msg, names)
+        self._messages['joint_states'] = [
+            recorded
+            for recorded in self._messages['joint_states']
+            if has_joint_of(recorded.msg, names)
         ]
         return self._good('joint_states', read)
 
-    def _told(self) -> list[Told]:
-        def read(heard: Heard) -> Told:
-            trajectory = joint_trajectory_from_msg(heard.msg, self._arm.joint_names)
-            sent = self._when(heard)
-            stamped = seconds_of(heard.msg.header.stamp) - self._begin / NANOSECONDS
-            return Told(stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory)
+    def _commanded(self) -> list[CommandedMotion]:
+        def read(recorded: RecordedMessage) -> CommandedMotion:
+            trajectory = joint_trajectory_from_msg(recorded.msg, self._arm.joint_names)
+            sent = self._when(recorded)
+            stamped = seconds_of(recorded.msg.header.stamp) - self._begin / NANOSECONDS
+            return CommandedMotion(
+                stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory
+            )
 
         return self._good('joint_trajectory', read)
 
@@ -170,12 +176,12 @@ class RecordingReader:
     def _bodies(self) -> list[tuple[float, Scene]]:
         order, body = MarkerOrder(), WearerBody()
 
-        def read(heard: Heard) -> tuple[float, WearerBody]:
+        def read(recorded: RecordedMessage) -> tuple[float, WearerBody]:
             nonlocal body
-            now = self._when(heard)
-            edits = read_edits(heard.msg, now, self._base_frame)
+            now = self._when(recorded)
+            edits = read_edits(recorded.msg, now, self._base_frame)
             body = order.apply(
-                body, edits, (heard.sent, 0), now, lambda other: other[0] > heard.sent
+                body, edits, (recorded.sent, 0), now, lambda other: other[0] > recorded.sent
             )
             return now, body
 
@@ -188,14 +194,14 @@ class RecordingReader:
             result += [(t, scene_of(present.at(t))) for t in lifetimes if begin < t < end]
         return sorted(result, key=lambda item: item[0])
 
-    def _guard(self) -> list[tuple[float, str]]:
-        """Return what the guard of this run did, from when on."""
+    def _monitor_states(self) -> list[tuple[float, str]]:
+        """Return the states of the monitor of this run, and since when [s]."""
         said: dict[str, list[tuple[float, str]]] = {}
-        for heard in self._heard['diagnostics']:
-            for status in heard.msg.status:
+        for recorded in self._messages['diagnostics']:
+            for status in recorded.msg.status:
                 values = {item.key: item.value for item in status.values}
-                if status.hardware_id == 'rrth_planner' and 'guard' in values:
-                    item = (self._when(heard), values['guard'])
+                if status.hardware_id == 'rrth_planner' and 'monitor' in values:
+                    item = (self._when(recorded), values['monitor'])
                     said.setdefault(status.name.split(':')[0], []).append(item)
         # All planners of a network share the topic.
         topic = self._topics['joint_trajectory'] or self._topics['joint_states'] or ''
@@ -206,10 +212,10 @@ class RecordingReader:
         return sorted(said[ours[0]]) if ours else []
 
 
-def _read(path: Path) -> tuple[dict[str, list[Heard]], int, dict[str, str]]:
+def _read(path: Path) -> tuple[dict[str, list[RecordedMessage]], int, dict[str, str]]:
     """Return a run by topic, when its first message came [ns], and why messages are left out."""
-    topics: dict[str, list[Heard]] = {}
-    refused: dict[str, str] = {}
+    topics: dict[str, list[RecordedMessage]] = {}
+    rejected: dict[str, str] = {}
     factory, begin = DecoderFactory(), 0
     try:
         with path.open('rb') as file:
@@ -222,24 +228,24 @@ def _read(path: Path) -> tuple[dict[str, list[Heard]], int, dict[str, str]]:
                 decode = factory.decoder_for(channel.message_encoding, schema)
                 if schema is None or decode is None or TYPES.get(role) != schema.name:
                     continue
-                heard = topics.setdefault(channel.topic, [])
+                recorded = topics.setdefault(channel.topic, [])
                 try:
                     msg = decode(message.data)
                 except Exception as problem:
-                    # Whoever published it may have sent anything: those after it count.
-                    refused[channel.topic] = (
+                    # A publisher may have sent anything: the next messages count.
+                    rejected[channel.topic] = (
                         f'{len(message.data)} bytes ({problem or type(problem).__name__}), '
                         f'expected a {schema.name}'
                     )
                     continue
-                heard.append(Heard(msg, message.publish_time, message.log_time))
+                recorded.append(RecordedMessage(msg, message.publish_time, message.log_time))
     except OSError as problem:
         raise RecordError(f'{path}: {problem.strerror}, expected a recording') from problem
     except (EndOfFile, struct.error):
-        # Cut short: what is there counts.
+        # The file is cut off: what is there counts.
         pass
     except Exception as problem:
-        # Whoever made the file may have written anything.
+        # The file may hold anything.
         raise RecordError(
             f'{path}: {problem or type(problem).__name__}, expected an MCAP file of ROS 2 messages'
         ) from problem
@@ -247,4 +253,4 @@ def _read(path: Path) -> tuple[dict[str, list[Heard]], int, dict[str, str]]:
         raise RecordError(
             f'{path}: none of {", ".join(TYPES)} in it, expected an MCAP file of a run'
         )
-    return topics, begin, refused
+    return topics, begin, rejected

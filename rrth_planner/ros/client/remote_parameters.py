@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of a planner node that runs elsewhere."""
+"""The parameters of a running planner node."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,7 +22,7 @@ NODE = 'rrth_planner'
 
 def parameters_of_planner(client: PlannerClient) -> PlannerParameters:
     """
-    Return what the planner plans with at present.
+    Return the present parameters of the planner.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the viewer hears of the running nodes, and what it asks of the planner."""
+"""The node of the viewer: it shows the running nodes and requests plans."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -26,7 +26,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
-from rrth_planner.ros.interface.scene_monitor import Listener
+from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -35,29 +35,28 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
-# A target that is not taken after this time is not waited for [s].
+# Longest wait for the acknowledgement of a target [s].
 LONGEST_WAY = 1.0
-# From an answer to the next request, so that the arm is well under way; how often it is looked
-# whether a plan is wanted [s].
+# From an answer to the next request: by then the arm is in motion; period of the timer [s].
 PAUSE, PERIOD = 0.3, 0.02
 
 
 class ViewerFeed(Node):
     """
-    Hear body, target, joints and motions; publish targets and call the planner's service.
+    Subscribes to body, target, joints and motions; publishes targets and requests plans.
 
-    Its parameters are those of the planner: arm, base frame, margin and the length of the guarded
-    ray are taken from them.
+    Its parameters are those of the planner: arm, base frame, margin and `ray_guard_length` are
+    taken from them.
     """
 
     def __init__(self, **kwargs: Any) -> None:
         """
-        Begin to listen.
+        Subscribe.
 
         Raises
         ------
         RrthError, ParameterException
-            A parameter that is refused.
+            A rejected parameter.
 
         """
         super().__init__(NAME, **kwargs)
@@ -65,18 +64,18 @@ class ViewerFeed(Node):
         self.arm, self.margin = parameters.arm, parameters.margin
         self.ray_guard_length = parameters.ray_guard_length
         self._frame = parameters.base_frame
-        self._heard = Inputs(
+        self._inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        self._listener = Listener(self, parameters, self._heard)
+        self._scene_monitor = SceneMonitor(self, parameters, self._inputs)
         self._motions = OpenSubscription(
-            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._refuse
+            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._reject
         )
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
         self._motion: Trajectory | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
-        # Of what the page's threads ask for and the executor's takes: never half of it.
+        # Of requests: written by the page's threads, read by the executor's.
         self._lock = Lock()
         self._is_asking, self._is_wanted = False, False
         self._newest: Array | None = None
@@ -90,7 +89,7 @@ class ViewerFeed(Node):
     def scene(self) -> Scene:
         """The wearer in the base frame."""
         now = self.get_clock().now().nanoseconds * 1e-9
-        body = self._heard.body.value.at(now)
+        body = self._inputs.body.value.at(now)
         if body is not self._shown[0]:
             self._shown = (body, scene_of(body))
         return self._shown[1]
@@ -98,13 +97,13 @@ class ViewerFeed(Node):
     @property
     def target(self) -> Array | None:
         """In the base frame, (3,) [m]."""
-        goal = self._heard.target.value
+        goal = self._inputs.target.value
         return None if goal is None else goal.target
 
     @property
     def positions(self) -> Array | None:
         """Of the joints, (dof,) [rad]."""
-        reading = self._heard.joints.value
+        reading = self._inputs.joints.value
         return None if reading is None else reading.positions
 
     @property
@@ -115,9 +114,11 @@ class ViewerFeed(Node):
     @property
     def said(self) -> str:
         """The last answer of the planner, or what is still missing."""
-        heard = self._heard
+        inputs = self._inputs
         missing = [
-            topic.topic for topic in (heard.body, heard.target, heard.joints) if not topic.n_good
+            topic.topic
+            for topic in (inputs.body, inputs.target, inputs.joints)
+            if not topic.n_good
         ]
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
@@ -132,17 +133,17 @@ class ViewerFeed(Node):
 
     def ask(self, target: Array | None = None) -> None:
         """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
-        # Not published at once: a request would overtake a queue of targets.
+        # Not published at once: a request would overtake queued targets.
         newest = None if target is None else np.array(target, dtype=np.float64)
         with self._lock:
             self._newest = self._newest if newest is None else newest
             self._is_wanted = True
 
     def _on_timer(self) -> None:
-        """Ask for the plan that is wanted, one at a time, and none of an arm about to set off."""
+        """Request the wanted plan, one at a time, and not while the arm is about to set off."""
         is_ready = self._client.service_is_ready()
         if self._asked is not None and not is_ready:
-            # Of a planner that is gone no answer will come.
+            # No answer comes from a planner that has ended.
             self._client.remove_pending_request(self._asked)
             self._conclude('the planner has ended without an answer')
         is_soon = time.monotonic() < self._answered + PAUSE
@@ -153,7 +154,7 @@ class ViewerFeed(Node):
             target, self._newest = self._newest, None
         if target is not None:
             self._publish(target)
-        # The request takes another way than the target, and must not overtake it.
+        # The request must not overtake the target.
         self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
         self._asked = self._client.call_async(Trigger.Request())
         self._asked.add_done_callback(self._on_answer)
@@ -173,7 +174,7 @@ class ViewerFeed(Node):
             self._conclude(f'no answer of the planner: {one_line(str(problem))}')
 
     def _conclude(self, answer: str) -> None:
-        """Keep what came of a request; the next one may follow."""
+        """Keep the answer of a request; the next one may follow."""
         self._answer, self._answered, self._asked = answer, time.monotonic(), None
         with self._lock:
             self._is_asking = False
@@ -182,10 +183,10 @@ class ViewerFeed(Node):
         try:
             self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:
-            self._refuse(problem)
+            self._reject(problem)
 
-    def _refuse(self, problem: MessageError) -> None:
-        self.get_logger().warning(f'joint_trajectory refused: {problem}')
+    def _reject(self, problem: MessageError) -> None:
+        self.get_logger().warning(f'joint_trajectory rejected: {problem}')
 
 
 @contextmanager
@@ -193,7 +194,7 @@ def following(
     arm: Path | None, settings: Path | None, ros_args: Sequence[str] = ()
 ) -> Iterator[ViewerFeed]:
     """
-    Give a feed that listens in a thread of its own while the block runs.
+    Give a feed that spins in a thread of its own while the block runs.
 
     Parameters
     ----------
@@ -207,7 +208,7 @@ def following(
     Raises
     ------
     RrthError
-        An argument or a parameter that is refused.
+        A rejected argument or parameter.
 
     """
     own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the planner is doing, as diagnostics."""
+"""The diagnostics of the planner."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,12 +56,12 @@ class PlanReport:
 
 
 class Figures:
-    """How often something was done, and how long it took the last time, mostly and at most [s]."""
+    """A count, and statistics of a duration: the last, quantiles, the greatest [s]."""
 
     def __init__(self) -> None:
         """Begin with nothing done."""
         self.n, self.last, self.most = 0, 0.0, 0.0
-        # As many numbers after a year as after a minute.
+        # Of constant size, however long the node runs.
         self._counts = [0] * (BINS * DECADES)
 
     def add(self, elapsed: float) -> None:
@@ -94,10 +94,10 @@ def diagnostics_msg(
     node_name: str,
     stamp: Any,
     now: float,
-    heard: Inputs,
+    inputs: Inputs,
     parameters: PlannerParameters,
     report: PlanReport,
-    guard: tuple[str, str] = ('', ''),
+    monitor_state: tuple[str, str] = ('', ''),
     figures: Mapping[str, Figures | int | str] = MappingProxyType({}),
 ) -> DiagnosticArray:
     """
@@ -111,18 +111,18 @@ def diagnostics_msg(
         Of the message.
     now : float
         The same time, for the ages [s].
-    heard : Inputs
+    inputs : Inputs
     parameters : PlannerParameters
         For the timeouts.
     report : PlanReport
-    guard : tuple of str
-        What the guard of the running motion does, and why.
+    monitor_state : tuple of str
+        The state of the monitor, and its reason.
     figures : mapping
-        Of what it did, and of incidents, by name.
+        Further values by their keys.
 
     """
-    body = heard.body.value.at(now)
-    level, message = _summary(now, heard, parameters, report)
+    body = inputs.body.value.at(now)
+    level, message = _summary(now, inputs, parameters, report)
     values = {
         'last code': '' if report.code is None else f'{report.code.name} ({report.code.value})',
         'last sentence': report.sentence,
@@ -137,13 +137,13 @@ def diagnostics_msg(
         'boxes': str(body.n_boxes),
         'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
     }
-    values['guard'], values['last stop'] = guard
+    values['monitor'], values['last stop'] = monitor_state
     values.update({name: str(figure) for name, figure in figures.items()})
-    for name, topic in heard.all.items():
+    for name, topic in inputs.all.items():
         values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
         values[f'good messages, {name}'] = str(topic.n_good)
-        values[f'refused messages, {name}'] = str(topic.n_refused)
-        values[f'last refusal, {name}'] = str(topic.refusal or '')
+        values[f'rejected messages, {name}'] = str(topic.n_rejected)
+        values[f'last rejection, {name}'] = str(topic.rejection or '')
     status = DiagnosticStatus(
         level=level,
         name=f'{node_name.lstrip("/")}: planning',
@@ -157,18 +157,18 @@ def diagnostics_msg(
 
 
 def _summary(
-    now: float, heard: Inputs, parameters: PlannerParameters, report: PlanReport
+    now: float, inputs: Inputs, parameters: PlannerParameters, report: PlanReport
 ) -> tuple[bytes, str]:
     if report.code is ErrorCode.FAILURE:
         return DiagnosticStatus.ERROR, answer(report.code, report.sentence)
-    timeouts = ((heard.body, parameters.body_timeout), (heard.joints, parameters.joint_timeout))
+    timeouts = ((inputs.body, parameters.body_timeout), (inputs.joints, parameters.joint_timeout))
     for topic, timeout in timeouts:
         if timeout > 0.0 and topic.received is not None and topic.age(now) > timeout:
             return DiagnosticStatus.STALE, f'{topic.topic} is {topic.age(now):.3f} s old'
-    refused = [topic for topic in heard.all.values() if topic.is_last_refused]
-    if refused:
-        return DiagnosticStatus.WARN, f'{refused[0].topic} refused: {refused[0].refusal}'
-    missing = [topic.topic for topic in heard.all.values() if topic.received is None]
+    rejected = [topic for topic in inputs.all.values() if topic.is_last_rejected]
+    if rejected:
+        return DiagnosticStatus.WARN, f'{rejected[0].topic} rejected: {rejected[0].rejection}'
+    missing = [topic.topic for topic in inputs.all.values() if topic.received is None]
     if missing:
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
     if report.code not in (None, ErrorCode.SUCCESS):

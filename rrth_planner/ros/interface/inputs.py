@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner has heard: the last good body, target and joint positions, and refusals."""
+"""The latest good body, target and joint positions, and the last rejections."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.localization import sharp_phase_of, takeover
+from rrth_planner.execution.localization import predict_start_state, sharp_phase_of
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
@@ -18,11 +18,11 @@ from rrth_planner.model.start_state import StartState
 from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
-from rrth_planner.ros.messages.error_codes import code_of_refusal, ErrorCode
+from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
-# A message from further ahead was heard before the clock was set back: nobody knows when [s].
+# A message from further ahead came before the clock was set back, at an unknown time [s].
 CLOCK_STEP = 0.1
 
 
@@ -36,45 +36,45 @@ class RequestError(RrthError):
 
 
 class ArmHasMoved(RequestError):
-    """The arm is not where a motion needs it."""
+    """The arm is not at the start of the motion."""
 
 
 class Input(Generic[T]):
     """
-    The last good value of one topic; a refused message changes nothing but the counts.
+    The last good value of one topic; a rejected message changes nothing but the counts.
 
     Parameters
     ----------
     topic : str
-        Its resolved name, for sentences.
+        Its resolved name, for messages.
     empty : object
         The value before the first message.
 
     """
 
     def __init__(self, topic: str, empty: T) -> None:
-        """Begin with nothing heard."""
+        """Begin without a message."""
         self.topic = topic
         self.value = empty
         self.received: float | None = None
-        self.n_good, self.n_refused = 0, 0
-        self.refusal: MessageError | None = None
-        self.is_last_refused = False
+        self.n_good, self.n_rejected = 0, 0
+        self.rejection: MessageError | None = None
+        self.is_last_rejected = False
 
     def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
         """
-        Take what `read` returns, heard at a time [s]; return False when it refuses.
+        Take what `read` returns, received at a time [s]; return False where that raises.
 
-        is_news: False where something newer has come before; then it is no younger for this, and a
-        refusal of that newer one stands.
+        is_news: False where a newer message came before; then the age does not change, and a
+        rejection of the newer one stands.
         """
         try:
             self.value = read()
         except MessageError as problem:
-            self._refuse(problem)
+            self._reject(problem)
             return False
         except Exception as problem:
-            self._refuse(
+            self._reject(
                 MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
             )
             raise
@@ -82,12 +82,12 @@ class Input(Generic[T]):
         if is_news or self.received is None:
             self.received = now
         if is_news:
-            self.is_last_refused = False
-        return not self.is_last_refused
+            self.is_last_rejected = False
+        return not self.is_last_rejected
 
-    def _refuse(self, problem: MessageError) -> None:
-        self.n_refused += 1
-        self.refusal, self.is_last_refused = problem, True
+    def _reject(self, problem: MessageError) -> None:
+        self.n_rejected += 1
+        self.rejection, self.is_last_rejected = problem, True
 
     def age(self, now: float) -> float:
         """Return the time since the last good message; inf before it, or where unknown [s]."""
@@ -97,8 +97,8 @@ class Input(Generic[T]):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlanInputs:
-    """What one plan begins with: copies, which later messages do not change."""
+class InputSnapshot:
+    """The inputs of one plan: a copy, which later messages do not change."""
 
     scene: Scene
     goal: PointingGoal
@@ -106,7 +106,7 @@ class PlanInputs:
 
     @property
     def q_start(self) -> Array:
-        """Where the arm is, shape (dof,) [rad]."""
+        """Of the reading, shape (dof,) [rad]."""
         return self.joints.positions
 
     def is_moving(self, now: float) -> bool:
@@ -124,19 +124,21 @@ class PlanInputs:
                 f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
             )
 
-    def pauses(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
-        """Return whether the arm rests within its motion, to go on in less than a span [s]."""
+    def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
+        """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
         if running is None or self.is_moving(now):
             return False
-        followed = self._followed(running)
-        if followed is None:
+        located = self._localize(running)
+        if located is None:
             return False
-        phase, rate = followed
+        phase, rate = located
         then = running.start_time + phase + rate * (now - self.joints.taken)
         return running.will_move(then, rate * span)
 
-    def ahead(self, running: ExecutingMotion | None, time: float, arm: ArmModel) -> StartState:
-        """Return what an arm that moves will do at a time [s], or raise RequestError."""
+    def start_state_at(
+        self, running: ExecutingMotion | None, time: float, arm: ArmModel
+    ) -> StartState:
+        """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
             raise RequestError(
@@ -145,13 +147,13 @@ class PlanInputs:
             )
         known = None
         if running is not None and joints.taken < running.start_time <= time:
-            # The arm was not on it yet: a stop, for one, may just have been told.
+            # The arm was not on it yet: a stop, say, may just have been published.
             known = joints.taken - running.start_time, 1.0
         elif running is not None and not self.is_moving(joints.taken):
-            known = self._followed(running)
-        # Speeds that overflow belong to no motion.
+            known = self._localize(running)
+        # Velocities that overflow match no motion.
         with np.errstate(all='ignore'):
-            found = takeover(
+            found = predict_start_state(
                 joints.positions,
                 joints.velocities,
                 None if running is None else running.trajectory,
@@ -161,20 +163,20 @@ class PlanInputs:
         if not np.isfinite(found.state.positions).all():
             raise RequestError(
                 ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a speed at which it is somewhere '
+                f'{self._fastest(arm)}, expected a finite position '
                 f'{time - joints.taken:.3f} s later',
             )
         return found
 
-    def _followed(self, running: ExecutingMotion) -> tuple[float, float] | None:
-        """Return the time within a motion where an arm hardly moves [s], and its rate."""
+    def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
+        """Return the time within a motion of an arm that hardly moves [s], and its rate."""
         joints = self.joints
         q, v = joints.positions, joints.velocities
-        # An arm that follows its motion slowly hardly moves for long: it only seems on time.
+        # An arm that executes its motion slowly may seem on time while it hardly moves.
         with np.errstate(all='ignore'):
             found = sharp_phase_of(q, v, running.trajectory)
         if found is None and running.is_on_time(q, v, joints.taken):
-            # No velocity tells how far an arm has come that rests for a moment.
+            # An arm at rest for a moment has no velocity to locate it by.
             found = joints.taken - running.start_time, 1.0
         return found
 
@@ -189,23 +191,23 @@ class Inputs:
     """The three topics that a plan needs."""
 
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
-        """Begin with nothing heard."""
+        """Begin without a message."""
         self.body = Input(body_topic, WearerBody())
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
-        # Why the last message with all joints was refused; None: it was good.
-        self.joint_refusal: MessageError | None = None
+        # Why the last message with all joints was rejected; None: it was not.
+        self.joint_rejection: MessageError | None = None
 
     @property
     def all(self) -> dict[str, Input[Any]]:
-        """The topics by the names that diagnostics give them."""
+        """The inputs by their names in diagnostics."""
         return {'body': self.body, 'target': self.target, 'joints': self.joints}
 
     def at(
         self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
-    ) -> PlanInputs:
+    ) -> InputSnapshot:
         """
-        Return what a plan that begins now goes by.
+        Return the inputs of a plan that begins now.
 
         Parameters
         ----------
@@ -219,18 +221,18 @@ class Inputs:
         Raises
         ------
         RequestError
-            Something is missing, too old or, as the last target or joint positions, refused.
+            Something is missing, too old or, as the last target or joint positions, rejected.
 
         """
         scene = self._scene(now, parameters)
         if goal is None:
             goal = self._goal()
-        refusal = self.joint_refusal
-        if refusal is not None:
-            # Where the arm was before says nothing of where it is.
+        rejection = self.joint_rejection
+        if rejection is not None:
+            # Earlier positions say nothing about the present ones.
             raise RequestError(
                 ErrorCode.ROBOT_STATE_STALE,
-                f'the last message on {self.joints.topic} was refused: {refusal}',
+                f'the last message on {self.joints.topic} was rejected: {rejection}',
             )
         joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
@@ -242,28 +244,28 @@ class Inputs:
             'joint_timeout',
             ErrorCode.ROBOT_STATE_STALE,
         )
-        return PlanInputs(scene, goal, joints)
+        return InputSnapshot(scene, goal, joints)
 
     def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
         _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
-        if self.body.is_last_refused:
-            # Where the wearer was before says nothing of where he is.
+        if self.body.is_last_rejected:
+            # An earlier body says nothing about the present one.
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
-                f'the last message on {self.body.topic} was refused: {self.body.refusal}',
+                f'the last message on {self.body.topic} was rejected: {self.body.rejection}',
             )
         body = self.body.value.at(now)
         if body.expired:
             raise RequestError(
                 ErrorCode.SENSOR_INFO_STALE,
-                f'lost parts of the body on {self.body.topic}, whose lifetime has passed: '
-                f'{body.expired_names}; expected each of them again, or its DELETE',
+                f'the body on {self.body.topic} has expired parts: {body.expired_names}; expected '
+                'each of them again, or its DELETE',
             )
         if body.n_boxes == 0:
             raise RequestError(
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
                 f'the body on {self.body.topic} is empty: every box was deleted; expected at '
-                'least one box of the wearer, since no motion is planned blindly',
+                'least one box of the wearer',
             )
         _require_fresh(
             self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE
@@ -271,58 +273,58 @@ class Inputs:
         return scene_of(body)
 
     def _goal(self) -> PointingGoal:
-        refusal = self.target.refusal
-        if self.target.is_last_refused and refusal is not None:
-            # Pointing at the target before it is not what was asked for.
+        rejection = self.target.rejection
+        if self.target.is_last_rejected and rejection is not None:
+            # The target before it is not the requested one.
             raise RequestError(
-                code_of_refusal(refusal, ErrorCode.INVALID_GOAL_CONSTRAINTS),
-                f'the last message on {self.target.topic} was refused: {refusal}',
+                code_of_rejection(rejection, ErrorCode.INVALID_GOAL_CONSTRAINTS),
+                f'the last message on {self.target.topic} was rejected: {rejection}',
             )
         return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
 
 
-def _require(heard: Input[Any], what: str, expected: str) -> Any:
-    if heard.received is not None:
-        return heard.value
-    if heard.refusal is None:
+def _require(source: Input[Any], what: str, expected: str) -> Any:
+    if source.received is not None:
+        return source.value
+    if source.rejection is None:
         raise RequestError(
             ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-            f'no {what} yet on {heard.topic}, expected {expected}',
+            f'no {what} yet on {source.topic}, expected {expected}',
         )
     raise RequestError(
-        code_of_refusal(heard.refusal, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
-        f'no good {what} yet on {heard.topic}; the last of {heard.n_refused} refused messages: '
-        f'{heard.refusal}',
+        code_of_rejection(source.rejection, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA),
+        f'no good {what} yet on {source.topic}; the last of {source.n_rejected} rejected '
+        f'messages: {source.rejection}',
     )
 
 
 def _require_fresh(
-    heard: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
+    source: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
 ) -> None:
-    age = heard.age(now)
+    age = source.age(now)
     if timeout > 0.0 and age > timeout:
         raise RequestError(
             code,
-            f'the last good message on {heard.topic} is {age:.3f} s old, expected at most '
+            f'the last good message on {source.topic} is {age:.3f} s old, expected at most '
             f'{timeout:g} s ({name})',
         )
 
 
-def out_of_sight(heard: Inputs, parameters: PlannerParameters, now: float) -> str:
-    """Return why nobody knows any more how arm and wearer are; empty: it is known."""
-    if heard.body.is_last_refused:
-        return f'the last body was refused, {heard.body.refusal}'
-    if heard.joint_refusal is not None:
-        return f'the last joint positions were refused, {heard.joint_refusal}'
-    body = heard.body.value.at(now)
+def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
+    """Return why an input is stale or rejected; empty: none is."""
+    if source.body.is_last_rejected:
+        return f'the last body was rejected, {source.body.rejection}'
+    if source.joint_rejection is not None:
+        return f'the last joint positions were rejected, {source.joint_rejection}'
+    body = source.body.value.at(now)
     if body.expired:
-        return f'lost parts of the body, whose lifetime has passed: {body.expired_names}'
+        return f'the body has expired parts: {body.expired_names}'
     if not body.n_boxes:
         return 'the body is empty'
-    age, most = heard.body.age(now), parameters.body_timeout
+    age, most = source.body.age(now), parameters.body_timeout
     if 0.0 < most < age:
         return f'the body is {age:.3f} s old, expected at most {most:g} s (body_timeout)'
-    age, most = heard.joints.age(now), parameters.joint_timeout
+    age, most = source.joints.age(now), parameters.joint_timeout
     if 0.0 < most < age:
         return (
             f'the last joint positions are {age:.3f} s old, expected at most {most:g} s '

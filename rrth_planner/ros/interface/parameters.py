@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner may be told: fields of the core's options as ROS parameters, and back."""
+"""The parameters of the planner: fields of the core's options as ROS parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -15,7 +15,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
-from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, refuse_unknown, Setting
+from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
@@ -29,11 +29,16 @@ def declared(dof: int) -> tuple[Setting, ...]:
     timeout = (0.0, LONGEST_TIMEOUT, 's')
     return (
         Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the wearer', True),
-        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'how to search'),
-        Setting('seed', -1, -1, 2**31 - 1, '-', 'of the random draws; -1: fresh each time'),
+        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'planning algorithm'),
+        Setting('seed', -1, -1, 2**31 - 1, '-', 'random seed; -1: a new one each time'),
         Setting('margin', 0.02, 0.0, 1.0, 'm', 'clearance kept from every box'),
         Setting(
-            'ray_guard_length', 1.0, 0.0, 100.0, 'm', 'how much of the pointing ray stays clear'
+            'ray_guard_length',
+            1.0,
+            0.0,
+            100.0,
+            'm',
+            'length of the pointing ray kept clear in motion',
         ),
         Setting(
             'escape_depth',
@@ -41,24 +46,24 @@ def declared(dof: int) -> tuple[Setting, ...]:
             0.0,
             1.0,
             'm',
-            'an arm at rest less deep in the boxes with their margin first leaves them; 0: never',
+            'greatest penetration depth, margin included, to escape from; 0: none',
         ),
         Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
         Setting(
             'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
         ),
         Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
-        Setting('body_timeout', 0.0, *timeout, 'an older body is refused; 0: never'),
+        Setting('body_timeout', 0.0, *timeout, 'an older body is rejected; 0: never'),
         Setting(
             'incident_folder',
             '',
             None,
             None,
             'path',
-            'for files about what never should happen; empty: rrth_planner/ of the ROS logs',
+            'folder of incident files; empty: rrth_planner/ of the ROS logs',
         ),
-        Setting('replan', True, None, None, '-', 'plan again after a stop for the wearer'),
-        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are refused; 0: never'),
+        Setting('replan', True, None, None, '-', 'plan again after a fail-safe stop'),
+        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are rejected; 0: never'),
         *(
             Setting(
                 f.name,
@@ -118,7 +123,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     Raises
     ------
     OptionsError
-        The first value that is refused: its name, what was given, what is expected, the unit.
+        The first value that is rejected: its name, what was given, what is expected, the unit.
 
     """
     settings = settings_from_values(values, arm.dof)
@@ -137,20 +142,20 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
 
 def declare_parameters(node: Node) -> PlannerParameters:
     """
-    Declare all parameters on a node, and let it refuse bad values from now on.
+    Declare all parameters on a node, and let it reject bad values from now on.
 
     Raises
     ------
     RrthError
-        A value that the node was started with is refused, or describes no arm.
+        A value that the node was started with is rejected, or describes no arm.
 
     """
     declare(node, (ARM,))
     arm = load_arm(node.get_parameter(ARM.name).value)
-    refuse_unknown(node, (ARM, *declared(arm.dof)))
+    reject_unknown(node, (ARM, *declared(arm.dof)))
     declare(node, declared(arm.dof))
 
-    def refuse_bad(changes: Sequence[Parameter]) -> SetParametersResult:
+    def reject_bad(changes: Sequence[Parameter]) -> SetParametersResult:
         values = _values(node, arm) | {change.name: change.value for change in changes}
         try:
             parameters_from_values(values, arm)
@@ -158,7 +163,7 @@ def declare_parameters(node: Node) -> PlannerParameters:
             return SetParametersResult(successful=False, reason=str(problem))
         return SetParametersResult(successful=True)
 
-    node.add_on_set_parameters_callback(refuse_bad)
+    node.add_on_set_parameters_callback(reject_bad)
     return current_parameters(node, arm)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the playback may be told, as ROS parameters."""
+"""The parameters of the playback."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, refuse_unknown, Setting
+from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 FOLDED = [0.0, -0.35, np.pi / 2, np.pi / 2]
 EACH = 'a value for each joint, or one for all'
@@ -24,17 +24,19 @@ SETTINGS = (
     Setting(
         'initial_positions', FOLDED, -1e4, 1e4, 'rad', 'where each joint is at the start', True
     ),
-    Setting('max_velocity', [1.5], 1e-3, 1e6, 'rad/s', f'faster is refused; {EACH}', True),
+    Setting(
+        'max_velocity', [1.5], 1e-3, 1e6, 'rad/s', f'a faster motion is rejected; {EACH}', True
+    ),
     Setting(
         'max_acceleration',
         [4.0],
         1e-3,
         1e6,
         'rad/s^2',
-        f'more is refused, and brakes keep to it; {EACH}',
+        f'a motion with more is rejected, stops keep to it; {EACH}',
         True,
     ),
-    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'brakes keep to it; {EACH}', True),
+    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'stops keep to it; {EACH}', True),
     Setting(
         'time_scale',
         1.0,
@@ -61,10 +63,10 @@ def declare_playback_parameters(node: Node) -> ArmModel:
     Raises
     ------
     RrthError
-        A value that the node was started with is refused, or describes no arm.
+        A value that the node was started with is rejected, or describes no arm.
 
     """
-    refuse_unknown(node, SETTINGS)
+    reject_unknown(node, SETTINGS)
     declare(node, SETTINGS)
     arm = load_arm(node.get_parameter(ARM.name).value)
     playback_rules(node, arm)

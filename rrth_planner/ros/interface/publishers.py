@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner publishes: the motion first, then what shows it."""
+"""The publishers of the planner: motions, and what RViz shows of them."""
 
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
@@ -32,7 +32,7 @@ class PlanPublishers:
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
-        self.tell(self.motion(trajectory, parameters, begin))
+        self.publish(self.motion(trajectory, parameters, begin))
 
     def motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
@@ -42,16 +42,16 @@ class PlanPublishers:
             trajectory, parameters.arm.joint_names, parameters.base_frame, begin
         )
 
-    def tell(self, msg: JointTrajectory) -> None:
+    def publish(self, msg: JointTrajectory) -> None:
         """Publish the message of a motion."""
         self._trajectory.publish(msg)
 
     def assert_liveliness(self) -> None:
-        """Say that the motion that runs is watched."""
+        """Assert that the running motion is monitored."""
         self._trajectory.assert_liveliness()
 
     def flush(self) -> None:
-        """Wait, but not for long, until everybody has the last motion."""
+        """Wait briefly until all subscribers have the last motion."""
         self._trajectory.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
 
     def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
@@ -59,7 +59,7 @@ class PlanPublishers:
         return tool_path_to_msg(parameters.arm, trajectory, parameters.base_frame, TOOL_PATH_POSES)
 
     def is_view_subscribed(self) -> bool:
-        """Return whether somebody hears what `publish_view` publishes."""
+        """Return whether `publish_view` has any subscriber."""
         views = self._tool_path, self._markers
         return any(publisher.get_subscription_count() > 0 for publisher in views)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Tell how requests ended: to the log, and to diagnostics."""
+"""Report the outcomes of requests and the state of the monitor: log and diagnostics."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
 PERIOD = 1.0
-# So many boxes are remembered as named.
+# So many boxes are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
@@ -31,23 +31,23 @@ class Reporter:
     Parameters
     ----------
     node : Node
-    heard : Inputs
+    inputs : Inputs
     parameters : PlannerParameters
         Those of the start; `parameters` is to be kept up to date.
 
     """
 
-    def __init__(self, node: Node, heard: Inputs, parameters: PlannerParameters) -> None:
+    def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
         """Advertise `/diagnostics`."""
         self.parameters = parameters
         self.report = PlanReport()
-        self._node, self._heard = node, heard
+        self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # What the guard of the running motion does, and why.
-        self.guard = ('no motion', '')
-        self._recertified, self._braked = Figures(), Figures()
+        # The state of the monitor, and its reason.
+        self.monitor_state = ('no motion', '')
+        self._remaining_motion_checks, self._stops_published = Figures(), Figures()
         self._n_incidents, self._last_incident = 0, ''
-        # Of what is counted and published: by the executor's thread, and by the worker's.
+        # Of what the threads of executor and worker count and publish.
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -59,15 +59,15 @@ class Reporter:
             node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
         ]
 
-    def recertified(self, elapsed: float) -> None:
-        """Count that a running motion was held against a new body, and how long it took [s]."""
+    def remaining_motion_checked(self, elapsed: float) -> None:
+        """Count a check of the remaining motion against a new body, and its time [s]."""
         with self._lock:
-            self._recertified.add(elapsed)
+            self._remaining_motion_checks.add(elapsed)
 
-    def braked(self, elapsed: float) -> None:
-        """Count a brake, and how long after the body's arrival it was published [s]."""
+    def stop_published(self, elapsed: float) -> None:
+        """Count a fail-safe stop, and how long after the body's arrival it was published [s]."""
         with self._lock:
-            self._braked.add(elapsed)
+            self._stops_published.add(elapsed)
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -99,13 +99,13 @@ class Reporter:
                     self._node.get_fully_qualified_name(),
                     now.to_msg(),
                     seconds,
-                    self._heard,
+                    self._inputs,
                     self.parameters,
                     self.report,
-                    self.guard,
+                    self.monitor_state,
                     {
-                        'motions held against a new body': self._recertified,
-                        'brakes': self._braked,
+                        'remaining motion checks': self._remaining_motion_checks,
+                        'fail-safe stops': self._stops_published,
                         'incidents': self._n_incidents,
                         'last incident': self._last_incident,
                     },
@@ -113,8 +113,8 @@ class Reporter:
             )
 
     def _warn_of_expired(self, now: float) -> None:
-        """Name in the log, once, the boxes whose lifetime has passed."""
-        expired = self._heard.body.value.at(now).expired
+        """Log each expired box once."""
+        expired = self._inputs.body.value.at(now).expired
         new = [(key, part) for key, part in expired if key not in self._named]
         if new:
             if len(self._named) > MOST_NAMED:
@@ -122,12 +122,12 @@ class Reporter:
             self._named.update(key for key, _ in new)
             names = WearerBody(expired=tuple(new)).expired_names
             self._node.get_logger().warning(
-                f'{self._heard.body.topic}: the lifetime of {names} has passed: no motion until '
-                'they come again or are deleted'
+                f'{self._inputs.body.topic}: lifetime of {names} expired: no motion until '
+                'published again or deleted'
             )
 
-    def refuse(self, code: ErrorCode, sentence: str) -> None:
-        """Log and publish how a request ended that nothing was planned for."""
+    def reject(self, code: ErrorCode, sentence: str) -> None:
+        """Log and publish the rejection of a request."""
         self.conclude(code, sentence, PlanReport())
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Keep the planner's inputs up to date with the three topics that it hears."""
+"""Subscriptions that keep the inputs of the planner up to date."""
 
 from collections.abc import Callable
 import time
@@ -13,7 +13,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.fast_decoding import quick_decoder
+from rrth_planner.ros.messages.fast_decoding import fast_decoder
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
@@ -23,27 +23,27 @@ from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscript
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
-# Refusals of one topic are warned about at most this often [s].
+# Rejections of one topic are warned about at most this often [s].
 WARNING_PERIOD = 5.0
 
 
-class Listener:
+class SceneMonitor:
     """
-    Read messages into the inputs; a refused one changes nothing, and is warned about.
+    Reads messages into the inputs; a rejected one changes no value, and is logged.
 
     Parameters
     ----------
     node : Node
     parameters : PlannerParameters
-        For what never changes: the arm and the base frame.
+        For the constant ones: the arm and the base frame.
     inputs : Inputs
         Kept up to date.
     on_change : callable, optional
-        Called when a topic is heard for the first time, is refused, or is good again.
+        Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
-        Called after each body, with what is known since then of the wearer, and when it came [ns].
+        Called after each body, with the wearer since then, and its time of arrival [ns].
     on_error : callable, optional
-        Called after an error that nobody expected, with what it is.
+        Called after an unexpected error, with its name and message.
 
     """
 
@@ -56,11 +56,11 @@ class Listener:
         on_body: Callable[[WearerBody, int], None] = lambda body, arrived: None,
         on_error: Callable[[str], None] = lambda what: None,
     ) -> None:
-        """Begin to listen."""
+        """Subscribe."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame = parameters.base_frame
-        self._on_change, self._tell_of_body, self._on_error = on_change, on_body, on_error
+        self._on_change, self._notify_body, self._on_error = on_change, on_body, on_error
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[str, float] = {}
         self._has_warned_of_empty_frame: set[str] = set()
@@ -73,8 +73,8 @@ class Listener:
                 inputs.body,
                 self._on_body,
                 on_late=self._on_body,
-                # A person waits for it.
-                decode=quick_decoder(MarkerArray),
+                # The monitor waits for it.
+                decode=fast_decoder(MarkerArray),
             ),
             self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
             self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
@@ -84,7 +84,7 @@ class Listener:
         self,
         kind: type,
         topic: str,
-        heard: Input[Any],
+        source: Input[Any],
         on_message: Callable[[Any, Arrival], None],
         on_late: Callable[[Any, Arrival], None] | None = None,
         decode: Callable[[bytes], Any] | None = None,
@@ -99,13 +99,13 @@ class Listener:
 
             return supervise
 
-        def refuse(problem: MessageError) -> None:
+        def reject(problem: MessageError) -> None:
             def read() -> Any:
                 raise problem
 
-            self._take(heard, read, self._now())
-            if heard is self._inputs.body:
-                self._tell_of_body(heard.value, time.time_ns())
+            self._take(source, read, self._now())
+            if source is self._inputs.body:
+                self._notify_body(source.value, time.time_ns())
 
         return OpenSubscription(
             self._node,
@@ -113,12 +113,12 @@ class Listener:
             topic,
             supervised(on_message),
             None if on_late is None else supervised(on_late),
-            supervised(refuse),
+            supervised(reject),
             decode,
         )
 
     def body_progress(self) -> tuple[int, int]:
-        """Return what `OpenSubscription.progress` says of the bodies."""
+        """Return `OpenSubscription.progress` of the bodies."""
         return self._subscriptions[0].progress()
 
     def goal(self, msg: PointStamped) -> PointingGoal:
@@ -135,7 +135,7 @@ class Listener:
             return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
 
         self._take(body, read, now, is_news=arrival.is_newer is None)
-        self._tell_of_body(body.value, arrival.received)
+        self._notify_body(body.value, arrival.received)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:
@@ -143,36 +143,36 @@ class Listener:
         self._take(self._inputs.target, lambda: self.goal(msg), self._now())
 
     def _on_joints(self, msg: JointState, _: Arrival) -> None:
-        # Other machines share this topic; a message without any joint of ours is none of ours.
+        # Other machines share this topic: messages without any joint of the arm are ignored.
         if not has_joint_of(msg, self._joint_names):
             return
-        now, heard = self._now(), self._inputs.joints
-        self._take(heard, lambda: joint_reading(msg, self._joint_names, now, heard.value), now)
+        now, source = self._now(), self._inputs.joints
+        self._take(source, lambda: joint_reading(msg, self._joint_names, now, source.value), now)
         if set(self._joint_names) <= set(msg.name):
-            self._inputs.joint_refusal = heard.refusal if heard.is_last_refused else None
+            self._inputs.joint_rejection = source.rejection if source.is_last_rejected else None
 
     def _take(
-        self, heard: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
+        self, source: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
     ) -> bool:
-        was_good = heard.received is not None and not heard.is_last_refused
-        is_good = heard.accept(read, now, is_news)
+        was_good = source.received is not None and not source.is_last_rejected
+        is_good = source.accept(read, now, is_news)
         if not is_good:
-            self._warn(heard)
+            self._warn(source)
         if is_good != was_good:
             self._on_change()
         return is_good
 
-    def _warn(self, heard: Input[Any]) -> None:
+    def _warn(self, source: Input[Any]) -> None:
         present = time.monotonic()
-        if present - self._warned.get(heard.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
-            self._warned[heard.topic] = present
-            self._node.get_logger().warning(f'{heard.topic} refused: {heard.refusal}')
+        if present - self._warned.get(source.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
+            self._warned[source.topic] = present
+            self._node.get_logger().warning(f'{source.topic} rejected: {source.rejection}')
 
-    def _warn_of_empty_frame(self, heard: Input[Any]) -> None:
-        if heard.topic not in self._has_warned_of_empty_frame:
-            self._has_warned_of_empty_frame.add(heard.topic)
+    def _warn_of_empty_frame(self, source: Input[Any]) -> None:
+        if source.topic not in self._has_warned_of_empty_frame:
+            self._has_warned_of_empty_frame.add(source.topic)
             self._node.get_logger().warning(
-                f'{heard.topic}: empty frame, taken as "{self._base_frame}"'
+                f'{source.topic}: empty frame, taken as "{self._base_frame}"'
             )
 
     def _now(self) -> float:

@@ -1,3 +1,3 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages and values of the core, in both directions."""
+"""Conversion between messages and values of the core."""

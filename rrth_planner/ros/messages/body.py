@@ -11,7 +11,7 @@ from rrth_planner.ros.messages.frames import Lookup
 from rrth_planner.ros.messages.marker_edits import BodyPart, Edit, Key, MOST_BOXES, read_edits
 from visualization_msgs.msg import Marker, MarkerArray
 
-# So many markers whose lifetime has passed are remembered, to be named.
+# So many expired markers are remembered, for messages.
 MOST_EXPIRED = 100
 
 
@@ -25,8 +25,8 @@ class WearerBody:
     parts : tuple of ((str, int), BodyPart)
         Keys (ns, id), each once.
     expired : tuple of ((str, int), BodyPart)
-        Those that were neither deleted nor added again since their lifetime passed: nobody knows
-        where they are. At most 100.
+        Those whose lifetime has passed, and that were neither deleted nor added again since: their
+        place is unknown. At most 100.
 
     """
 
@@ -40,14 +40,14 @@ class WearerBody:
 
     @property
     def expired_names(self) -> str:
-        """What sentences call the parts whose lifetime has passed."""
+        """The names of the expired parts, for messages."""
         return one_line(', '.join(f'"{box.name}"' for _, p in self.expired for box in p.boxes))
 
     def at(self, now: float) -> 'WearerBody':
-        """Return the body without the parts whose lifetime has passed at a time [s]."""
+        """Return the body at a time [s]: parts whose lifetime has passed are expired."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        # Their first box is enough to name them.
+        # Their first box suffices for the name.
         gone = dict(self.expired) | {
             k: BodyPart(part.boxes[:1], part.expires)
             for k, part in self.parts
@@ -87,7 +87,7 @@ class WearerBody:
         return self.edited(read_edits(msg, now, base_frame, lookup), now)
 
     def edited(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
-        """Return the body after the edits of one array, heard at a time [s], or raise."""
+        """Return the body after the edits of one array, received at a time [s], or raise."""
         present = self.at(now)
         parts, expired = dict(present.parts), dict(present.expired)
         for edit in edits:
@@ -108,9 +108,9 @@ class WearerBody:
 
     def with_older(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
         """
-        Return the body with what an array adds where nothing is, heard at a time [s].
+        Return the body with the missing parts that an array adds, received at a time [s].
 
-        For an array that is older than the body: it takes nothing away and changes nothing.
+        For an array that is older than the body: it deletes and changes nothing.
         """
         older = {e.key: e.part for e in edits if e.part is not None and e.part.expires > now}
         present = dict(self.parts)

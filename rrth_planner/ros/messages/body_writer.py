@@ -41,7 +41,7 @@ def body_from_file(path: str | Path, frame: str) -> MarkerArray:
     path : str or Path
         Boxes as in `config/body.yaml`, or a MarkerArray as in `msg_examples/body.yaml`.
     frame : str
-        Of boxes; markers say it themselves.
+        Of boxes; markers have their own.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The text that defines a message and all that it contains, for files that others read."""
+"""The definition of a message type and of all types that it contains, for MCAP files."""
 
 from importlib import import_module
 from pathlib import Path
@@ -18,13 +18,13 @@ SEPARATOR = '=' * 80
 
 
 def type_name(msg_type: Any) -> str:
-    """Return what a type is called in files, as `sensor_msgs/msg/JointState`."""
+    """Return the name of a type in files, as `sensor_msgs/msg/JointState`."""
     return f'{_package(msg_type)}/msg/{msg_type.__name__}'
 
 
 def type_of_name(name: str) -> Any:
     """
-    Return the type that is called so.
+    Return the type of a name.
 
     Raises
     ------

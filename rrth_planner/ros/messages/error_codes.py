@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a request may end with: names and numbers of moveit_msgs/MoveItErrorCodes."""
+"""Error codes of answers: names and numbers of moveit_msgs/MoveItErrorCodes."""
 
 from enum import IntEnum
 
@@ -43,11 +43,11 @@ CODE_OF_STATUS = {
 }
 
 
-def code_of_refusal(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
-    """Return what a refused message comes to: its frame is at fault, or else something other."""
+def code_of_rejection(problem: MessageError, otherwise: ErrorCode) -> ErrorCode:
+    """Return the code of a rejected message: the one of a bad frame, or another one."""
     return ErrorCode.FRAME_TRANSFORM_FAILURE if isinstance(problem, FrameError) else otherwise
 
 
 def answer(code: ErrorCode, sentence: str) -> str:
-    """Return what a service answers, in one line: `NAME (number): sentence`."""
+    """Return the answer of a service, in one line: `NAME (number): sentence`."""
     return one_line(f'{code.name} ({code.value}): {sentence}')

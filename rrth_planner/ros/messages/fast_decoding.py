@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of many parts from their bytes, in half the time that rclpy takes."""
+"""Decoding of messages of many parts in half the time of rclpy."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,18 +9,18 @@ from rclpy.serialization import deserialize_message
 from rrth_planner.ros.messages.definitions import definition_of, type_name
 
 
-def quick_decoder(msg_type: type) -> Callable[[bytes], Any]:
+def fast_decoder(msg_type: type) -> Callable[[bytes], Any]:
     """
-    Return what turns the bytes of a message into one with the same fields.
+    Return a function that decodes the bytes of a message to an object with the same fields.
 
-    rosbags makes its code from the definition of the type that is installed here; its messages
-    are of its own types. What it does not take, rclpy is asked for, which raises where it does
-    not either; it does all where rosbags or the definition is not installed.
+    rosbags generates its code from the installed definition of the type; its messages are of its
+    own types. Where it fails, rclpy decodes the message, or raises; it decodes all messages where
+    rosbags or the definition is not installed.
     """
     try:
         return _decoder_of(msg_type)
     except Exception:
-        # It is quicker, that is all: no node stays away for it.
+        # It is only faster: a node works without.
         return lambda data: deserialize_message(data, msg_type)
 
 
@@ -29,17 +29,17 @@ def _decoder_of(msg_type: type) -> Callable[[bytes], Any]:
 
     store, name = get_typestore(Stores.EMPTY), type_name(msg_type)
     types = get_types_from_msg(definition_of(msg_type), name)
-    # Constants would be set anew in each message.
+    # Constants would be set again in each message.
     store.register({kind: ([], fields) for kind, (_, fields) in types.items()})
     for kind in types:
-        # Made now, not when the first message waits for it.
+        # Generated now, not when the first message comes.
         _ = store.get_msgdef(kind).deserialize_cdr_le
 
     def decode(data: bytes) -> Any:
         try:
             return store.deserialize_cdr(data, name)
         except Exception:
-            # Strings without an end, say, or bytes after the last: rclpy is less strict.
+            # Unterminated strings, say, or trailing bytes: rclpy is less strict.
             return deserialize_message(data, msg_type)
 
     return decode

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of messages: the base frame, and whatever TF knows where tf2_ros is installed."""
+"""Frames of messages: the base frame, and those of TF where tf2_ros is installed."""
 
 from collections.abc import Callable
 
@@ -50,15 +50,15 @@ def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
 
 
 class Frames:
-    """The frames that TF knows, seen from the base frame."""
+    """The frames of TF, relative to the base frame."""
 
     def __init__(self, node: Node, base_frame: str) -> None:
-        """Listen to TF where tf2_ros is installed."""
+        """Subscribe to TF where tf2_ros is installed."""
         self._base_frame = base_frame
         self._buffer = None
         if tf2_ros is not None:
             self._buffer = tf2_ros.Buffer(node=node)
-            self._listener = tf2_ros.TransformListener(self._buffer, node)
+            self._scene_monitor = tf2_ros.TransformListener(self._buffer, node)
 
     def lookup(self, frame: str) -> Array:
         """

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Targets as messages, in whatever frame is known."""
+"""Targets from messages, in any known frame."""
 
 from geometry_msgs.msg import PointStamped
 import numpy as np
@@ -33,7 +33,7 @@ def goal_from_msg(
     point = position_of(msg.point, 'point')
     T = pose_in_base(msg.header.frame_id, base_frame, lookup)
     try:
-        # What overflows is infinite, which a goal refuses.
+        # What overflows is infinite, which a goal rejects.
         with np.errstate(over='ignore', invalid='ignore'):
             return PointingGoal(T[:3, :3] @ point + T[:3, 3])
     except SceneError as problem:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an arm is and how fast it moves, from messages that may speak of other machines too."""
+"""Positions and velocities of an arm from joint states that may have other joints, too."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from rrth_planner.model.errors import MessageError
 from rrth_planner.ros.messages.fields import seconds_of
 from sensor_msgs.msg import JointState
 
-# A message may be so long on its way; its stamp is of another clock if it seems longer [s].
+# Greatest latency of a message; with a greater one its stamp is of another clock [s].
 LONGEST_WAY = 1.0
 # Positions that are older than this say nothing about the present velocity [s].
 DIFFERENCE_AGE = 0.5
 
 
 def has_joint_of(msg: JointState, joint_names: Sequence[str]) -> bool:
-    """Return whether a message speaks of any of these joints."""
+    """Return whether a message has any of these joints."""
     return not set(joint_names).isdisjoint(msg.name)
 
 
@@ -53,17 +53,17 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
 @dataclass(frozen=True, slots=True, eq=False)
 class JointReading:
     """
-    What one message says of the arm.
+    The state of the arm in one message.
 
     Parameters
     ----------
     positions : ndarray, shape (dof,)
         [rad].
     velocities : ndarray, shape (dof,)
-        As they were given, NaN included, or how the positions changed [rad/s].
+        As given, NaN included, or differences of the positions [rad/s].
     taken : float
-        When the arm was there: the stamp of the message if it is a little older than its
-        reception, else that [s].
+        Time of the measurement: the stamp if it is a little older than the reception, else the
+        reception [s].
     received : float
         [s].
     velocities_expire : float
@@ -111,7 +111,7 @@ def joint_reading(
         v = np.array([msg.velocity[names.index(name)] for name in joint_names], dtype=np.float64)
         return JointReading(q, v, taken, received, float('inf'))
     if before is None or received < before.received:
-        # A clock that was set back tells no time that passed.
+        # After a step back of the clock the elapsed time is unknown.
         return JointReading(q, np.zeros_like(q), taken, received, received)
     step = max(received - before.received, 1e-9)
     # What overflows is infinite, and never at rest.

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the markers of one array do to the wearer, read in one go: bodies come often."""
+"""The edits of the wearer by the markers of one array, read in one pass: bodies come often."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rrth_planner.ros.messages.fields import seconds_of, triple_of, unit_quatern
 from rrth_planner.ros.messages.frames import FrameError, Lookup, pose_in_base
 from visualization_msgs.msg import Marker, MarkerArray
 
-# More boxes than any wearer has; a longer array is a mistake, and would hold up everything else.
+# More boxes than any wearer has; a longer array is a mistake, and would block the node.
 MOST_BOXES = 10000
 # A body is kept, and so are its names [characters].
 LONGEST_NAMESPACE = 256
@@ -29,7 +29,7 @@ Key = tuple[str, int]
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPart:
     """
-    What one marker put into the world.
+    The boxes of one marker.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class BodyPart:
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
     """
-    What one marker does to the wearer.
+    The edit by one marker.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def read_edits(
     msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
 ) -> tuple[Edit, ...]:
     """
-    Return what an array does, in its order.
+    Return the edits of an array, in its order.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def read_edits(
 
 
 def marker_name(marker: Any) -> str:
-    """Return what sentences call a marker: its text, or `ns/id` where it has none."""
+    """Return the name of a marker: its text, or `ns/id` where it has none."""
     name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
     return one_line(name, LONGEST_TEXT)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which edit of each marker was sent last, so that an array that comes late undoes nothing."""
+"""Order of the edits of each marker, so that a late array undoes nothing."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -50,7 +50,7 @@ class MarkerOrder:
         received : float
             When it came [s].
         is_newer : callable, optional
-            Of an array that comes late: whether what was sent then was sent after it.
+            Of a late array: whether another one was sent after it.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class MarkerOrder:
     def _kept(
         self, body: WearerBody, edits: Sequence[Edit], is_newer: Callable[[Stamp], bool]
     ) -> Iterator[Edit]:
-        """Yield what a late array does to markers to which nothing newer has been done."""
+        """Yield the edits of a late array to markers that have no newer edit."""
         keys = [key for key, _ in (*body.parts, *body.expired)]
         for edit in edits:
             if edit.action == Marker.DELETEALL:
@@ -82,7 +82,7 @@ class MarkerOrder:
             yield from (one for one in changes if not self._is_overtaken(one.key, is_newer))
 
     def _is_overtaken(self, key: Key, is_newer: Callable[[Stamp], bool] | None) -> bool:
-        """Return whether something newer has been done to a marker."""
+        """Return whether a marker has a newer edit."""
         if is_newer is None:
             return False
         done = (self._markers.get(key), *map(self._namespaces.get, ('', key[0])))

@@ -80,7 +80,7 @@ def _value(kind: Any, value: Any, name: str) -> Any:
             raise MessageError(f'{name}: {shown(value)}, expected true or false')
         return value
     if kind.typename in ('float', 'double'):
-        # What is no number at all may be sent too, to see it refused.
+        # NaN and inf may be sent, too, to see them rejected.
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise MessageError(f'{name}: {shown(value)}, expected a number')
         return float(value)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What RViz shows of a plan: the body with its margin, the arm, its ray and the tool's path."""
+"""Markers of a plan for RViz: body with margin, arm, pointing ray and path of the tool."""
 
 from collections.abc import Iterable
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories as messages: what controllers ask of them, in both directions."""
+"""Conversion between trajectories and messages, with the checks of controllers."""
 
 from array import array
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-# joint_trajectory_controller refuses a last point that is faster (float epsilon) [rad/s].
+# joint_trajectory_controller rejects a last point that is faster (float epsilon) [rad/s].
 REST_VELOCITY = float(np.finfo(np.float32).eps)
-# More is refused: looking through them holds up the node.
+# More are rejected: reading them would block the node.
 MOST_POINTS = 10_000
 UNITS = {'positions': 'rad', 'velocities': 'rad/s', 'accelerations': 'rad/s^2'}
 
@@ -67,7 +67,7 @@ def joint_trajectory_from_msg(
     """
     Return a message's trajectory, its columns in the order of `joint_names`.
 
-    Refuses what joint_trajectory_controller refuses, and besides numbers that are not finite,
+    Rejects what joint_trajectory_controller rejects, and besides numbers that are not finite,
     joints named twice, a first point that is not at time 0, and points without velocities or
     accelerations: between two points a quintic fits all three.
 
@@ -77,7 +77,7 @@ def joint_trajectory_from_msg(
     joint_names : sequence of str
         All joints of the arm, each of them expected once, in any order.
     now : float, optional
-        Time of reception [s]; with it a stamped message that has already ended is refused.
+        Time of reception [s]; with it a stamped message that has already ended is rejected.
 
     Raises
     ------

@@ -1,3 +1,3 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What ROS 2 is used through: subscriptions, quality of service, processes."""
+"""Subscriptions, quality of service, parameters and processes of ROS 2."""

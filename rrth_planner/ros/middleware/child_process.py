@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node as a process of its own, which ends when its owner does."""
+"""A node as a child process, which ends with its owner."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -15,19 +15,19 @@ from types import TracebackType
 from rrth_planner.model.errors import RrthError
 
 # A node that has not ended by itself after this time is killed [s].
-PATIENCE = 10.0
-LAST_WORDS = 3
-# What rclpy writes before the sentences of its log, here without the time and the name.
+LONGEST_END = 10.0
+LAST_LINES = 3
+# The prefix of rclpy's log lines; the severity is kept.
 PREFIX = re.compile(r'^\[(\w+)\] \[[0-9.]+\] \[[^\]]*\]: ')
 
 
 class ChildDiedError(RrthError):
-    """A process that should still be running has ended."""
+    """A child process ended unexpectedly."""
 
 
 class ChildProcess:
     """
-    A Python module that runs as a process, between entering and leaving a `with` block.
+    A Python module that runs as a process during a `with` block.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class ChildProcess:
         """Remember what to run."""
         self._module, self._on_line = module, on_line
         self._command = [sys.executable, '-m', module, *arguments]
-        self._lines: deque[str] = deque(maxlen=LAST_WORDS)
+        self._lines: deque[str] = deque(maxlen=LAST_LINES)
 
     def __enter__(self) -> 'ChildProcess':
         """Start it."""
@@ -67,11 +67,11 @@ class ChildProcess:
         problem: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """End it: politely, then not."""
+        """End it by SIGINT, later by SIGKILL."""
         try:
             self._process.send_signal(signal.SIGINT)
             with suppress(subprocess.TimeoutExpired):
-                self._process.wait(PATIENCE)
+                self._process.wait(LONGEST_END)
         finally:
             self._process.kill()
             self._process.wait()
@@ -82,11 +82,11 @@ class ChildProcess:
         return self._process.pid
 
     def check(self) -> None:
-        """Raise ChildDiedError, with its last words, when it has ended."""
+        """Raise ChildDiedError, with its last lines, when it has ended."""
         code = self._process.poll()
         if code is not None:
-            self._reader.join(PATIENCE)
-            words = ' / '.join(self._lines) or 'it said nothing'
+            self._reader.join(LONGEST_END)
+            words = ' / '.join(self._lines) or 'no output'
             raise ChildDiedError(f'{self._module} ended with code {code}: {words}')
 
     def _read(self) -> None:

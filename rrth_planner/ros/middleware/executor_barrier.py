@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Do something in a node's own thread once it has read what came."""
+"""Run something in a node's own thread once it has processed the messages received before."""
 
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, TimeoutError as NotYet
@@ -10,36 +10,36 @@ from typing import Any, Generic, TypeVar
 from rclpy.node import Node
 
 T = TypeVar('T')
-# Longer than this a node is not waited for [s].
+# Longest wait for a node [s].
 LONGEST = 1.0
-# After so long without a round it is asked for again [s].
+# After so long without a round it is triggered again [s].
 AGAIN = 0.02
 
 
 class NodeIsBusyError(Exception):
-    """A node did not come to read what was sent to it."""
+    """A node did not process its messages in time."""
 
 
 class ExecutorBarrier:
     """
-    Has the thread that spins a node do something after the messages that came before.
+    Runs work in the thread that spins a node, after the messages received before.
 
     In one round an executor handles one message of each subscription, and a guard condition after
-    them. It is through once it has handled a message that came later, or none for a round.
+    them. It has caught up once it has handled a message that came later, or none for a round.
 
     Parameters
     ----------
     node : Node
-        Spun by a single-threaded executor in another thread; by several threads it may be through
-        a little early.
+        Spun by a single-threaded executor in another thread; by several threads the work
+        may run a little early.
     handled : callable
-        Returns how many messages were handled, and when the last of them came that leaves none
-        before it [ns].
+        Returns the number of handled messages, and the time of arrival of the last one that
+        leaves none before it [ns].
 
     """
 
     def __init__(self, node: Node, handled: Callable[[], tuple[int, int]]) -> None:
-        """Begin with nothing to do."""
+        """Begin without work."""
         self._node, self._handled = node, handled
         self._task: _Task[Any] | None = None
         self._round = node.create_guard_condition(self._on_round)
@@ -51,11 +51,11 @@ class ExecutorBarrier:
         Raises
         ------
         NodeIsBusyError
-            Its turn did not come; it is not done any more.
+            The work did not run in time, and will not run any more.
 
         """
         if self._node.executor is None:
-            # Whoever calls the node's callbacks by hand has handed over what there is.
+            # Callbacks that are called by hand have processed all messages.
             return work()
         task = _Task(work)
         self._task = task
@@ -65,7 +65,7 @@ class ExecutorBarrier:
             try:
                 return task.future.result(AGAIN)
             except NotYet:
-                # Should a wake-up have been lost, nothing but this asks for a round.
+                # In case a wake-up was lost.
                 if time.monotonic() > end and task.future.cancel():
                     raise NodeIsBusyError from None
             except CancelledError:
@@ -84,14 +84,14 @@ class ExecutorBarrier:
 
 
 class _Task(Generic[T]):
-    """Work to be done once the node is through, which is not known before a first round."""
+    """Work to run once the node has caught up, which takes one round at least to know."""
 
     def __init__(self, work: Callable[[], T]) -> None:
         self._work, self.begin, self.n_handled = work, time.time_ns(), -1
         self.future: Future[T] = Future()
 
     def run(self) -> None:
-        """Do the work, if somebody still waits for it."""
+        """Run the work unless it was cancelled."""
         if not self.future.set_running_or_notify_cancel():
             return
         try:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A subscription that hears every publisher: best effort, reliable, or latched before it began."""
+"""A subscription that matches every publisher: best effort, reliable, or latched."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from rrth_planner.model.errors import MessageError
 from rrth_planner.ros.messages.fields import Stamp
 
 DEPTH = 50
-# Longer messages are not decoded, which would hold up everything else: half a second for a
-# megabyte of markers.
+# Longer messages are not decoded, which would block the node: half a second for a megabyte of
+# markers.
 MOST_BYTES = 512 * 1024
 # Copies of a message arrive within milliseconds of each other; so many are remembered.
 REMEMBERED = 1024
-# How often publishers are looked at where the middleware does not announce them [s].
+# Period of the search for publishers where the middleware does not announce them [s].
 POLL_PERIOD = 0.2
 
 
@@ -34,21 +34,21 @@ def decoded(
     most_bytes: int = MOST_BYTES,
     decode: Callable[[bytes], Any] | None = None,
 ) -> Any:
-    """Return a message as it came from the wire, or raise MessageError."""
+    """Return a message from its serialized bytes, or raise MessageError."""
     name = msg_type.__name__
     if len(data) > most_bytes:
         raise MessageError(f'{len(data)} bytes, expected a {name} of at most {most_bytes}')
     try:
         return deserialize_message(data, msg_type) if decode is None else decode(data)
     except Exception as problem:
-        # Whoever may write to a topic may write anything.
+        # A publisher may send anything.
         raise MessageError(f'{len(data)} bytes that are no {name}: {problem}') from problem
 
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """
-    When a message was sent and came, and what had come before it.
+    When a message was sent and received, and whether it is late.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ class Arrival:
     received : int
         [ns].
     is_newer : callable or None
-        Of a message that comes late, after one that was sent later: whether what was sent then was
-        sent after it. None: nothing was, as far as is known.
+        Of a late message, which came after one that was sent later: whether another message was
+        sent after it. None: the message is not late, as far as is known.
 
     """
 
@@ -69,24 +69,24 @@ class Arrival:
 
 class Copies:
     """
-    Which of the copies of messages count, and which of those come late.
+    Which of the copies of messages count, and which of those are late.
 
-    No single quality of service hears everybody, so a message may come by several readers. The
-    first copy counts. It is late when another message came before it that was sent after it. By
-    what clock, if publishers have several? A reader hands over what one publisher sends in the
-    order in which it was sent, though it may lose some: so what this reader has handed over before
-    was not sent later by the same publisher, whatever the clocks say. Of what it has not handed
-    over before the stamps decide: those of one publisher are of one clock.
+    No single quality of service matches all publishers, so a message may come by several readers.
+    The first copy counts. It is late when a message that was sent after it came before it. The
+    clocks of publishers may differ, but a reader delivers the messages of one publisher in the
+    order in which they were sent, though it may lose some: what this reader delivered before was
+    not sent later by the same publisher, whatever the stamps are. For all other messages the
+    stamps decide: those of one publisher are of one clock.
 
     Parameters
     ----------
     takes_late : bool
-        Whether a copy that comes late counts; without, the next copy may.
+        Whether a late copy counts; without, the next copy may.
 
     """
 
     def __init__(self, takes_late: bool) -> None:
-        """Start with nothing seen."""
+        """Start without messages."""
         self._takes_late = takes_late
         # By which readers each message has come, and whether it has counted.
         self._readers: dict[Stamp, set[Any]] = {}
@@ -115,10 +115,10 @@ class Copies:
         return Arrival(sent, received, is_newer)
 
     def _newer_than(self, sent: Stamp, reader: Any) -> Callable[[Stamp], bool] | None:
-        """Return what tells what was sent after a message that came by a reader; None: nothing."""
+        """Return whether other messages were sent after one that came by a reader; None: none."""
 
         def is_newer(other: Stamp) -> bool:
-            # What is forgotten has come long ago: stamps are all there is to go by.
+            # Of forgotten messages, which came long ago, only the stamps are known.
             return other[0] > sent[0] and reader not in self._readers.get(other, ())
 
         # Nearly always it is the newest of all.
@@ -129,10 +129,10 @@ class Copies:
 
 class OpenSubscription:
     """
-    Hear a topic from publishers of any quality of service, each message once.
+    Receives a topic from publishers of any quality of service, each message once.
 
-    A best-effort, volatile reader matches everybody and is always there. For publishers that are
-    reliable another reader asks for reliability, and for what was latched before it began.
+    A best-effort, volatile reader matches all publishers and always exists. For reliable
+    publishers another reader requests reliability, and latched messages.
 
     Parameters
     ----------
@@ -140,12 +140,12 @@ class OpenSubscription:
     msg_type : type
     topic : str
     on_message : callable
-        Gets each message and its Arrival.
+        Takes each message and its Arrival.
     on_late : callable, optional
-        Gets each message that comes late, and its Arrival; without, these are dropped, since the
-        last one wins.
-    on_refusal : callable, optional
-        Gets the MessageError of each message that is too long, or is none of this type.
+        Takes each late message and its Arrival; without, these are dropped, since the last one
+        wins.
+    on_rejection : callable, optional
+        Takes the MessageError of each message that is too long, or not of this type.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
 
@@ -158,11 +158,11 @@ class OpenSubscription:
         topic: str,
         on_message: Callable[[Any, Arrival], None],
         on_late: Callable[[Any, Arrival], None] | None = None,
-        on_refusal: Callable[[MessageError], None] = lambda problem: None,
+        on_rejection: Callable[[MessageError], None] = lambda problem: None,
         decode: Callable[[bytes], Any] | None = None,
     ) -> None:
-        """Begin to listen."""
-        self._on_refusal, self._decode = on_refusal, decode
+        """Subscribe."""
+        self._on_rejection, self._decode = on_rejection, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_late = on_message, on_late
         self._copies = Copies(on_late is not None)
@@ -174,25 +174,25 @@ class OpenSubscription:
                 profile,
                 self._on_live,
                 SubscriptionEventCallbacks(
-                    matched=lambda _: self.look_at_publishers(), use_default_callbacks=False
+                    matched=lambda _: self.match_publishers(), use_default_callbacks=False
                 ),
             )
         except UnsupportedEventTypeError:
             self._live = self._subscribe(profile, self._on_live, None)
             self._timer = node.create_timer(
-                POLL_PERIOD, self.look_at_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
+                POLL_PERIOD, self.match_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
             )
         self.topic_name = self._live.topic_name
 
     def progress(self) -> tuple[int, int]:
         """
-        Return how many copies were read, and when the one came that was read last [ns].
+        Return the number of copies read, and the arrival of the last one [ns].
 
-        Of the reader that hears everybody; 0 where its middleware does not say.
+        Of the reader that matches all publishers; 0 where its middleware does not say.
         """
         return self._n_read, self._live_came
 
-    def look_at_publishers(self) -> None:
+    def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
         for info in self._node.get_publishers_info_by_topic(self.topic_name):
             durability = info.qos_profile.durability
@@ -223,29 +223,29 @@ class OpenSubscription:
         self._on_copy(data, info, None)
 
     def _on_copy(self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None) -> None:
-        """Hand on a message that came by a reader; None: by the one that hears everybody."""
+        """Take a copy of a message from a reader; None: the one that matches all publishers."""
         self._n_read += 1
         sent = info['source_timestamp'], info['publication_sequence_number']
-        # Not every middleware says when it came.
+        # Not every middleware has the time of reception.
         received = info.get('received_timestamp') or time.time_ns()
         arrival = self._copies.take(sent, received, reader)
         if arrival is not None:
-            hearer = self._on_message if arrival.is_newer is None else self._on_late
-            assert hearer is not None
-            self._hand_on(data, hearer, arrival)
+            callback = self._on_message if arrival.is_newer is None else self._on_late
+            assert callback is not None
+            self._deliver(data, callback, arrival)
 
-    def _hand_on(
-        self, data: bytes, hearer: Callable[[Any, Arrival], None], arrival: Arrival
+    def _deliver(
+        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
     ) -> None:
-        """Decode a message for who hears it; whatever is wrong with it, the node goes on."""
+        """Decode a message and call the callback; an error in either does not end the node."""
         try:
             msg = decoded(data, self._msg_type, decode=self._decode)
         except MessageError as problem:
-            self._on_refusal(problem)
+            self._on_rejection(problem)
             return
         try:
-            hearer(msg, arrival)
+            callback(msg, arrival)
         except Exception:
             self._node.get_logger().error(
-                f'{self.topic_name}: a message was not dealt with\n{traceback.format_exc()}'
+                f'{self.topic_name}: the callback failed on a message\n{traceback.format_exc()}'
             )

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A parameter of a node: what it may be, how it is declared, and what is said of a bad value."""
+"""Declaration and validation of a node's parameters."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.model.errors import OptionsError
 
-# What a value is to be, and the values of an array.
+# The expected type in words, of a value and of the values of an array.
 KINDS = {
     float: ('a number', 'numbers'),
     int: ('a whole number', 'whole numbers'),
@@ -37,7 +37,7 @@ class Setting:
 
     @property
     def descriptor(self) -> ParameterDescriptor:
-        """What `ros2 param describe` shows; a step other than 0 would refuse values."""
+        """For `ros2 param describe`; a step other than 0 would reject values."""
         msg = ParameterDescriptor(
             description=f'{self.description} [{self.unit}]', read_only=self.is_read_only
         )
@@ -68,7 +68,7 @@ class Setting:
             expected += f' from {self.low:.10g} to {self.high:.10g}'
         hint = ''
         if kind is float and is_given_array is is_array and any(type(v) is int for v in given):
-            # ROS takes no integer for a number with a point.
+            # ROS does not convert an integer to a double.
             numbers = [float(v) if type(v) is int else v for v in given]
             hint = f': write {numbers if is_array else numbers[0]}'
         shown = given if is_given_array else f'"{value}"' if isinstance(value, str) else value
@@ -86,7 +86,7 @@ ARM = Setting(
 )
 
 
-def refuse_unknown(node: Node, known: Sequence[Setting]) -> None:
+def reject_unknown(node: Node, known: Sequence[Setting]) -> None:
     """Raise OptionsError when a node was started with a parameter that it does not have."""
     names = [*(setting.name for setting in known), *OF_ROS]
     for name in _overrides(node):
@@ -105,5 +105,5 @@ def declare(node: Node, known: Sequence[Setting]) -> None:
 
 
 def _overrides(node: Node) -> Mapping[str, Parameter]:
-    """Return what a node was started with; rclpy has no other way to ask for all of it."""
+    """Return the overrides of a node; rclpy has no public way to get all of them."""
     return node._parameter_overrides

@@ -5,27 +5,27 @@
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-# The last message counts, and whoever comes later gets it too.
+# The last message counts, for late subscribers too.
 LATCHED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )
 
-# Of a planner that has not said for so long that it watches over its motion, nothing is known [s].
+# A planner that has not asserted its liveliness for so long is lost [s].
 LEASE = 0.3
 _LIVELINESS = {
     'liveliness': LivelinessPolicy.MANUAL_BY_TOPIC,
     'liveliness_lease_duration': Duration(seconds=LEASE),
 }
-# Motions, by a planner that says again and again that it watches over them; everybody may listen.
+# Motions, whose planner asserts its liveliness while it monitors them; any subscriber matches.
 COMMANDED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
     **_LIVELINESS,
 )
-# For who wants to know when such a planner is lost. Only a reliable reader hears that one lives.
+# For subscribers that supervise the planner: liveliness needs a reliable reader.
 SUPERVISED = QoSProfile(
     depth=1,
     reliability=ReliabilityPolicy.RELIABLE,
@@ -33,6 +33,5 @@ SUPERVISED = QoSProfile(
     **_LIVELINESS,
 )
 
-# Requests that wait for their turn, and answers that wait for who asked: the default drops those
-# beyond ten.
+# Requests may queue, and their responses: the default drops those beyond ten.
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

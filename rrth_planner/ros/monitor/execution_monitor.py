@@ -1,9 +1,9 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-While the arm moves the wearer may move too: each new body is held against what is left.
+Check the remaining motion against each new body, since the wearer moves too.
 
-It fails closed: whatever goes wrong while a body is judged ends in a stop.
+It fails closed: any error during a check ends in a fail-safe stop.
 """
 
 from collections import deque
@@ -20,13 +20,13 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import is_still_free, leads_away
+from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
+from rrth_planner.execution.remaining_motion import escapes_by_continuing, is_remaining_free
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.inputs import Inputs, out_of_sight, RequestError
+from rrth_planner.ros.interface.inputs import Inputs, RequestError, stale_input
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
@@ -35,45 +35,47 @@ from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 from rrth_planner.timing.fast_stop import fast_stop
 
-# How often the age of the body is looked at [s].
+# Period of the checks of the inputs and of the commanded motion [s].
 PERIOD = 0.02
-# A body that is judged later than this after it came ends in a stop [s].
+# A body that is checked later than this after its arrival causes a stop [s].
 LONGEST_WAIT = 0.05
-ELSEWHERE = 'the arm is nowhere near the motion that it was told: nothing is guarded'
-# By whether the arm was told last what it is seen to follow.
-TURNED = {
-    False: 'the arm did not take its new motion and goes on with the one before, which is watched',
-    True: 'the arm is seen to follow what it was told last, which is watched again',
+OFF_TRAJECTORY = (
+    f'arm is > {MAX_DEVIATION:g} rad from the commanded trajectory: monitoring suspended'
+)
+# By whether the arm follows the last commanded motion.
+SWITCHED = {
+    False: 'arm ignored the last commanded motion: monitoring the previous one, which it follows',
+    True: 'arm follows the last commanded motion again: monitoring it',
 }
 
 
-class Watch(Enum):
-    """What the guard is doing."""
+class MonitorState(Enum):
+    """What the monitor is doing; the values appear in diagnostics."""
 
     IDLE = 'no motion'
-    WATCHING = 'watches the motion'
-    BRAKING = 'brakes'
-    HOLDING = 'holds'
+    MONITORING = 'monitoring'
+    STOPPING = 'stopping'
+    HOLDING = 'holding'
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stop:
     """
-    A stop that was published, for whoever follows it up.
+    A published fail-safe stop, for its second check and for replanning.
 
     Parameters
     ----------
     trajectory : Trajectory
     goal : PointingGoal or None
-        Of the motion that it ends.
+        Of the stopped motion.
     parameters : PlannerParameters
-        Of that motion.
+        Of the stopped motion.
     scene : Scene or None
-        The wearer that the stop was proven free of.
-    is_again : bool
-        Whether to plan for the goal again once the arm rests.
-    n_begun : int
-        How many motions had begun until then.
+        The wearer that the stop is proven free of; None: it is not.
+    is_replanned : bool
+        Whether to plan for the goal again once the arm is at rest.
+    n_motions : int
+        Number of motions commanded until then.
 
     """
 
@@ -81,46 +83,45 @@ class Stop:
     goal: PointingGoal | None
     parameters: PlannerParameters
     scene: Scene | None
-    is_again: bool
-    n_begun: int
+    is_replanned: bool
+    n_motions: int
 
 
 class ExecutionMonitor:
     """
-    Stops the arm when what is left of its motion is no longer proven free of the wearer.
+    Stops the arm when its remaining motion is no longer proven free of the wearer.
 
-    So does any error on the way to that proof, a body that is refused, and one that is judged too
-    late. While a stop that is due could not be published it is tried again, and the planner no
-    longer counts as alive: an arm that watches over its planner's liveliness then stops by itself.
+    So does any error during that check, a rejected or stale input, and a body that is checked too
+    late. A stop that could not be published is tried again; meanwhile liveliness is not asserted,
+    so that an arm that supervises it stops by itself.
 
     Parameters
     ----------
     node : Node
-    heard : Inputs
+    inputs : Inputs
     reporter : Reporter
     publishers : PlanPublishers
 
     """
 
     def __init__(
-        self, node: Node, heard: Inputs, reporter: Reporter, publishers: PlanPublishers
+        self, node: Node, inputs: Inputs, reporter: Reporter, publishers: PlanPublishers
     ) -> None:
         """Begin with no motion."""
-        self._node, self._heard, self._reporter = node, heard, reporter
+        self._node, self._inputs, self._reporter = node, inputs, reporter
         self._publishers = publishers
-        # The node's own thread does everything but the end, which may come from another one.
+        # All calls come from the node's own thread, but `close` may come from another one.
         self._lock, self._is_closed = RLock(), False
-        self._followed = ExecutionTracker(heard.joints)
+        self._tracker = ExecutionTracker(inputs.joints)
         self._goal: PointingGoal | None = None
-        self._state = Watch.IDLE
-        # Motions that were planned before a brake are of no use after it, nor is a plan for what
-        # was stopped once another motion has begun.
-        self.n_brakes, self.n_begun = 0, 0
-        # Why the arm was stopped last, and why it is to be stopped while no stop is published;
-        # since when [s], and whether it may plan again then.
-        self.cause = self.due = ''
-        self._since, self._is_again = 0.0, True
-        # Those of the plan: another margin since then says nothing against its motion.
+        self._state = MonitorState.IDLE
+        # A motion planned before a stop must not follow it, nor a replanned motion another one.
+        self.n_stops, self.n_motions = 0, 0
+        # The reason of the last published stop, and of one that is still to be published; since
+        # when [s], and whether to plan again after it.
+        self.stop_reason = self.pending_stop = ''
+        self._pending_since, self._is_replanned = 0.0, True
+        # Of the plan: a margin that is changed later does not apply to its motion.
         self._parameters = reporter.parameters
         self._stops: deque[Stop] = deque(maxlen=10)
         # Not the node's clock: simulated time may stand still.
@@ -129,118 +130,118 @@ class ExecutionMonitor:
 
     @property
     def running(self) -> ExecutingMotion | None:
-        """The motion that the arm follows, as far as that is known."""
-        return self._followed.motion
+        """The motion that the arm executes, as far as known."""
+        return self._tracker.motion
 
     def begin(
         self,
         running: ExecutingMotion,
         goal: PointingGoal,
         parameters: PlannerParameters,
-        tell: Callable[[], None],
+        publish: Callable[[], None],
     ) -> None:
-        """Have a motion told, and watch it by the parameters of its plan."""
+        """Publish a motion, and monitor it with the parameters of its plan."""
         with self._lock:
-            self._begin(running, goal, parameters, tell)
+            self._begin(running, goal, parameters, publish)
 
     def _begin(
         self,
         running: ExecutingMotion,
         goal: PointingGoal,
         parameters: PlannerParameters,
-        tell: Callable[[], None],
+        publish: Callable[[], None],
     ) -> None:
         if self._is_closed:
-            raise RequestError(ErrorCode.PREEMPTED, 'the planner ends')
-        before = copy(self._followed), self._parameters, self._goal, self._state
-        self._followed.begin(running, self._now())
-        self._parameters, self._goal, self._state = parameters, goal, Watch.WATCHING
+            raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
+        before = copy(self._tracker), self._parameters, self._goal, self._state
+        self._tracker.begin(running, self._now())
+        self._parameters, self._goal, self._state = parameters, goal, MonitorState.MONITORING
         try:
-            tell()
+            publish()
         except Exception:
-            self._followed, self._parameters, self._goal, self._state = before
+            self._tracker, self._parameters, self._goal, self._state = before
             raise
-        self.n_begun += 1
+        self.n_motions += 1
 
-        def look() -> None:
-            self._say(Watch.WATCHING, '')
-            # The body may have changed since the motion was last looked at.
-            self._judge(self._heard.body.value, time.time_ns())
+        def check() -> None:
+            self._set_state(MonitorState.MONITORING, '')
+            # The body may have changed since the revalidation.
+            self._check_remaining_motion(self._inputs.body.value, time.time_ns())
 
-        # From here on the arm moves, whatever is wrong.
-        self._supervise(look)
+        # From here on the arm moves: an error must stop it.
+        self._run_fail_safe(check)
 
     def close(self) -> None:
-        """Stop the arm, since nobody is going to watch it, and watch nothing any more."""
+        """Stop the arm, which is no longer monitored, and end monitoring."""
         with self._lock:
             self._is_closed = True
             if self._node.context.ok():
-                self.fail('the planner ends', is_again=False)
-                if self._state is Watch.BRAKING:
+                self.fail('the planner is shutting down', is_replanned=False)
+                if self._state is MonitorState.STOPPING:
                     self._publishers.flush()
-            self._followed.forget()
-            self._state = Watch.IDLE
+            self._tracker.forget()
+            self._state = MonitorState.IDLE
 
     def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
-        """Return the soonest stop that is found at once, from where the arm is."""
-        # Of a motion that takes over a little later the stop begins then.
+        """Return the fail-safe stop from where the arm is."""
+        # Before a handover the stop begins with the new motion.
         start = running.start_time if phase < 0.0 else now
         stop = fast_stop(running.trajectory, phase, self._parameters.limits)
         return ExecutingMotion(trajectory=stop, start_time=start)
 
     def on_body(self, body: WearerBody, arrived: int) -> None:
-        """Hold a body, which came at a time [ns], against what is left of the motion."""
-        self._supervise(lambda: self._judge(body, arrived))
+        """Check the remaining motion against a body that arrived at a time [ns]."""
+        self._run_fail_safe(lambda: self._check_remaining_motion(body, arrived))
 
     def take_stops(self) -> list[Stop]:
-        """Return the stops that were published since this was asked last."""
+        """Return the stops published since the last call."""
         with self._lock:
             stops = list(self._stops)
             self._stops.clear()
         return stops
 
-    def fail(self, why: str, is_again: bool = True) -> None:
+    def fail(self, why: str, is_replanned: bool = True) -> None:
         """
-        Stop the arm, if it moves, for something that went wrong.
+        Stop the arm, if it moves, because of a failure.
 
         Parameters
         ----------
         why : str
-        is_again : bool
-            Whether it may plan again once the arm rests: not after an error, which would come
-            again.
+        is_replanned : bool
+            Whether to plan again once the arm is at rest: not after an error, which would recur.
 
         """
         with self._lock:
-            if self.running is not None and self._state is Watch.WATCHING:
-                self.due, self._is_again, self._since = why, is_again, time.perf_counter()
+            if self.running is not None and self._state is MonitorState.MONITORING:
+                self.pending_stop, self._is_replanned = why, is_replanned
+                self._pending_since = time.perf_counter()
                 self._stop_for_failure()
 
-    def _supervise(self, look: Callable[[], None]) -> None:
-        """Have the monitor look; an error of it ends in a stop."""
+    def _run_fail_safe(self, check: Callable[[], None]) -> None:
+        """Run a check; an error in it ends in a stop."""
         try:
             with self._lock:
-                look()
+                check()
         except Exception as problem:
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
-            self.fail(f'the monitor failed, {_named(problem)}', is_again=False)
+            self.fail(f'the monitor failed, {_named(problem)}', is_replanned=False)
 
-    def _judge(self, body: WearerBody, arrived: int) -> None:
-        """Stop the arm where the rest of its motion is not proven free; the lock is held."""
+    def _check_remaining_motion(self, body: WearerBody, arrived: int) -> None:
+        """Stop the arm unless its remaining motion is proven free; the lock is held."""
         begin = time.perf_counter()
         if self.running is None:
             return
         now, parameters = self._now(), self._parameters
         phase = self._phase(now)
-        if phase is None or self._state is not Watch.WATCHING:
+        if phase is None or self._state is not MonitorState.MONITORING:
             return
-        why = out_of_sight(self._heard, self._reporter.parameters, now)
+        why = stale_input(self._inputs, self._reporter.parameters, now)
         if why:
             self.fail(why)
             return
         scene = scene_of(body.at(now))
-        if is_still_free(
+        if is_remaining_free(
             self.running,
             phase,
             parameters.arm,
@@ -248,86 +249,91 @@ class ExecutionMonitor:
             margin=parameters.margin,
             ray_guard_length=parameters.ray_guard_length,
         ):
-            self._reporter.recertified(time.perf_counter() - begin)
+            self._reporter.remaining_motion_checked(time.perf_counter() - begin)
         else:
             self._stop(phase, now, scene, arrived)
-        waited = self._waited(arrived)
+        waited = self._elapsed(arrived)
         if waited > LONGEST_WAIT:
             self.fail(
-                f'a body was judged {waited:.3f} s after it came, expected at most '
+                f'a body was checked {waited:.3f} s after its arrival, expected at most '
                 f'{LONGEST_WAIT:g} s'
             )
 
     def _on_timer(self) -> None:
-        """Look after a motion, and say that somebody does."""
-        self._supervise(self._look_after)
+        """Run the periodic checks, and assert liveliness."""
+        self._run_fail_safe(self._check_periodically)
 
-    def _look_after(self) -> None:
-        if self._state is not Watch.IDLE:
-            self._look_round()
-        if self.due:
+    def _check_periodically(self) -> None:
+        if self._state is not MonitorState.IDLE:
+            self._check_inputs()
+        if self.pending_stop:
             self._stop_for_failure()
-        if not self.due:
+        if not self.pending_stop:
             self._publishers.assert_liveliness()
 
-    def _look_round(self) -> None:
-        """Stop an arm that nobody sees any more, or whose wearer, or that goes on for all that."""
+    def _check_inputs(self) -> None:
+        """Stop the arm where an input is stale or the last stop is not executed."""
         now = self._now()
-        self._insist(now)
-        self._look_back()
+        self._repeat_stop(now)
+        self._check_previous_motion()
         phase = self._phase(now)
-        if phase is None or self._state is not Watch.WATCHING:
+        if phase is None or self._state is not MonitorState.MONITORING:
             return
-        why = out_of_sight(self._heard, self._reporter.parameters, now)
+        why = stale_input(self._inputs, self._reporter.parameters, now)
         if why:
             self.fail(why)
 
-    def _insist(self, now: float) -> None:
-        """Stop the arm again where it goes on along the motion that it was to stop."""
-        found = self._followed.unstopped(now)
+    def _repeat_stop(self, now: float) -> None:
+        """Publish the stop again where the arm does not execute it."""
+        found = self._tracker.missed_stop(now)
         if found is None:
             return
         before, phase = found
         stop = replace(self._stop_of(before, phase, now), start_time=now)
-        self._followed.motion = stop
+        self._tracker.motion = stop
         self._publishers.publish_motion(stop.trajectory, self._parameters, now)
-        self._node.get_logger().error('the arm did not stop as it was told: it is told again')
+        self._node.get_logger().error(
+            'arm did not follow the commanded stop: stop published again'
+        )
 
-    def _look_back(self) -> None:
-        """Watch the motion before where the arm goes on with that: its controller refused one."""
-        if self._state in (Watch.WATCHING, Watch.BRAKING) and self._followed.look_back():
-            self._node.get_logger().error(TURNED[self._followed.is_told])
-            self._say(Watch.WATCHING, TURNED[self._followed.is_told])
-            self._judge(self._heard.body.value, time.time_ns())
+    def _check_previous_motion(self) -> None:
+        """Monitor the previous motion where the arm follows that: its controller rejected one."""
+        if (
+            self._state in (MonitorState.MONITORING, MonitorState.STOPPING)
+            and self._tracker.follow_previous()
+        ):
+            self._node.get_logger().error(SWITCHED[self._tracker.is_latest])
+            self._set_state(MonitorState.MONITORING, SWITCHED[self._tracker.is_latest])
+            self._check_remaining_motion(self._inputs.body.value, time.time_ns())
 
     def _phase(self, now: float) -> float | None:
-        """Return the time within the running motion; None where there is none any more."""
-        if self._followed.is_over(now):
-            self._followed.forget()
-            self.due = ''
-            if self._state is Watch.BRAKING and not self._reporter.parameters.replan:
-                self._say(Watch.HOLDING, self._reporter.guard[1])
-            elif self._state is not Watch.HOLDING:
-                self._say(Watch.IDLE, '')
+        """Return the time within the running motion; None where it is over or unknown [s]."""
+        if self._tracker.is_over(now):
+            self._tracker.forget()
+            self.pending_stop = ''
+            if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
+                self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
+            elif self._state is not MonitorState.HOLDING:
+                self._set_state(MonitorState.IDLE, '')
             return None
-        phase = self._followed.phase(now)
-        is_lost = phase is None and self._followed.is_lost(now)
-        if is_lost and self._reporter.guard[1] != ELSEWHERE:
-            self._node.get_logger().error(ELSEWHERE)
-            self._say(self._state, ELSEWHERE)
+        phase = self._tracker.phase(now)
+        is_lost = phase is None and self._tracker.is_lost(now)
+        if is_lost and self._reporter.monitor_state[1] != OFF_TRAJECTORY:
+            self._node.get_logger().error(OFF_TRAJECTORY)
+            self._set_state(self._state, OFF_TRAJECTORY)
         return phase
 
     def _stop(self, phase: float, then: float, scene: Scene, arrived: int) -> None:
-        """Stop an arm, that was so far then, for a body in its way; the lock is held."""
-        why = 'the wearer moved into the way'
-        # What was looked at since then may have taken its time.
+        """Stop the arm for a body, from its phase at a time `then` [s]; the lock is held."""
+        why = 'the remaining motion is not proven free of the wearer'
+        # The check since then took time.
         now = self._now()
         phase += now - then
         running, parameters = self.running, self._parameters
         if running is None or phase >= running.trajectory.duration:
             return
         stopped = self._stop_of(running, phase, now)
-        is_safe = is_still_free(
+        is_safe = is_remaining_free(
             stopped,
             0.0,
             parameters.arm,
@@ -335,7 +341,7 @@ class ExecutionMonitor:
             margin=parameters.margin,
             ray_guard_length=parameters.ray_guard_length,
         )
-        if not is_safe and leads_away(
+        if not is_safe and escapes_by_continuing(
             running,
             phase,
             parameters.arm,
@@ -343,108 +349,110 @@ class ExecutionMonitor:
             margin=parameters.margin,
             ray_guard_length=parameters.ray_guard_length,
         ):
-            sentence = f'{why}: braking would stay there, going on leads away: the arm goes on'
-            if self._reporter.guard[1] != sentence:
+            sentence = f'{why}, but it escapes and a stop would not: motion continues'
+            if self._reporter.monitor_state[1] != sentence:
                 self._node.get_logger().error(sentence)
-            self._say(Watch.WATCHING, sentence)
+            self._set_state(MonitorState.MONITORING, sentence)
             return
         self._publish_stop(stopped, why)
-        took = self._waited(arrived)
-        warning = '' if is_safe else self._warning(stopped.trajectory, scene)
-        self._reporter.braked(took)
-        self._tell_of_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
-        self._keep(stopped.trajectory, None if warning else scene)
+        took = self._elapsed(arrived)
+        warning = '' if is_safe else self._clearance_warning(stopped.trajectory, scene)
+        self._reporter.stop_published(took)
+        self._report_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
+        self._record_stop(stopped.trajectory, None if warning else scene)
 
     def _stop_for_failure(self) -> None:
-        """Publish the stop that is due, by as little as can be; the lock is held."""
+        """Publish the pending stop with as little code as possible; the lock is held."""
         running = self.running
         if running is None:
-            self.due = ''
+            self.pending_stop = ''
             return
         try:
             now = self._now()
-            phase = self._phase_for_certain(running, now)
+            phase = self._phase_or_elapsed(running, now)
             if phase is None:
                 return
             if phase >= running.trajectory.duration:
-                # It has come to its end.
-                self.due = ''
+                # The motion has ended.
+                self.pending_stop = ''
                 return
             stopped = self._stop_of(running, phase, now)
-            self._publish_stop(stopped, self.due)
+            self._publish_stop(stopped, self.pending_stop)
         except Exception:
-            # It is tried again at the next look, and nobody says that the planner is alive.
+            # It is tried again at the next check; until then liveliness is not asserted.
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
             return
-        took = time.perf_counter() - self._since
-        # What is said of it must not undo it.
+        took = time.perf_counter() - self._pending_since
+        # An error in the report must not undo the stop.
         with suppress(Exception):
-            self._reporter.braked(took)
-            self._tell_of_stop(stopped.trajectory)
-            self._keep(stopped.trajectory, None, self._is_again)
+            self._reporter.stop_published(took)
+            self._report_stop(stopped.trajectory)
+            self._record_stop(stopped.trajectory, None, self._is_replanned)
 
-    def _keep(self, stop: Trajectory, scene: Scene | None, is_again: bool = True) -> None:
-        """Keep a stop for whoever follows it up, and the wearer that it was proven free of."""
-        is_again = is_again and self._reporter.parameters.replan
-        goal, n_begun = self._goal, self.n_begun
-        self._stops.append(Stop(stop, goal, self._parameters, scene, is_again, n_begun))
+    def _record_stop(
+        self, stop: Trajectory, scene: Scene | None, is_replanned: bool = True
+    ) -> None:
+        """Keep a stop for `take_stops`, with the wearer that it is proven free of."""
+        is_replanned = is_replanned and self._reporter.parameters.replan
+        goal, n_motions = self._goal, self.n_motions
+        self._stops.append(Stop(stop, goal, self._parameters, scene, is_replanned, n_motions))
 
-    def _phase_for_certain(self, running: ExecutingMotion, now: float) -> float | None:
-        """Return the time within a motion, whatever is wrong; None where the arm is not on it."""
+    def _phase_or_elapsed(self, running: ExecutingMotion, now: float) -> float | None:
+        """Return the time within a motion, even after an error; None where the arm is off it."""
         try:
-            return self._followed.phase(now)
+            return self._tracker.phase(now)
         except Exception:
-            # What is told of where the arm is may be what is wrong; it was told to be here.
+            # The joint states may be what is wrong: then the commanded state counts.
             return now - running.start_time
 
     def _publish_stop(self, stop: ExecutingMotion, why: str) -> None:
-        """Publish a stop, and follow the arm on that."""
-        before = copy(self._followed)
-        self._followed.stop(stop)
+        """Publish a stop, and track the arm on it."""
+        before = copy(self._tracker)
+        self._tracker.stop(stop)
         try:
             self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
         except Exception:
-            self._followed = before
+            self._tracker = before
             raise
-        # From here on nothing may fail: the same stop would be published again.
-        self._state, self.cause, self.due = Watch.BRAKING, why, ''
-        self.n_brakes += 1
+        # From here on nothing may raise: the same stop would be published again.
+        self._state, self.stop_reason, self.pending_stop = MonitorState.STOPPING, why, ''
+        self.n_stops += 1
 
-    def _tell_of_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
-        """Say in log and diagnostics why the arm brakes."""
-        sentence = f'{self.cause}: the arm brakes, at rest in {stop.duration:.2f} s{warning}'
-        self._say(Watch.BRAKING, sentence)
-        # A line each: rclpy raises where one and the same line logs at another severity.
+    def _report_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
+        """Report in log and diagnostics why the arm stops."""
+        sentence = f'{self.stop_reason}: fail-safe stop, at rest in {stop.duration:.2f} s{warning}'
+        self._set_state(MonitorState.STOPPING, sentence)
+        # Two calls: rclpy raises where one line of code logs at changing severities.
         if warning:
             self._node.get_logger().error(f'{sentence}{note}')
         else:
             self._node.get_logger().warning(f'{sentence}{note}')
 
-    def _warning(self, stop: Trajectory, scene: Scene) -> str:
-        """Return what is to be said of a stop that is not proven free."""
+    def _clearance_warning(self, stop: Trajectory, scene: Scene) -> str:
+        """Return the clearance of a stop that is not proven free, as a sentence."""
         parameters = self._parameters
         world = arm_world(parameters.arm, scene, 0.0, parameters.ray_guard_length)
         clearance = least_clearance(stop, world)
-        return f'; braking is not proven safe either, least clearance {clearance:.4f} m'
+        return f'; the stop is not proven free either, least clearance {clearance:.4f} m'
 
     def hold(self, why: str) -> None:
-        """Stay where the arm came to rest, since it cannot go on."""
+        """Report that the arm stays where it came to rest."""
         with self._lock:
-            if self._state is Watch.WATCHING:
-                # Another motion has begun since then.
+            if self._state is MonitorState.MONITORING:
+                # Another motion was commanded meanwhile.
                 return
-            sentence = f'the arm holds where it is: {why}'
-            self._say(Watch.HOLDING, sentence)
+            sentence = f'arm holds its position: {why}'
+            self._set_state(MonitorState.HOLDING, sentence)
             self._node.get_logger().warning(sentence)
 
-    def _say(self, state: Watch, sentence: str) -> None:
+    def _set_state(self, state: MonitorState, sentence: str) -> None:
         self._state = state
-        self._reporter.guard = (state.value, sentence)
+        self._reporter.monitor_state = (state.value, sentence)
         self._reporter.publish_soon()
 
-    def _waited(self, arrived: int) -> float:
-        """Return how long ago a body came [ns -> s]."""
+    def _elapsed(self, arrived: int) -> float:
+        """Return the time since the arrival of a body [ns -> s]."""
         return 1e-9 * (time.time_ns() - arrived)
 
     def _now(self) -> float:

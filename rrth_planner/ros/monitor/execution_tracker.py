@@ -1,56 +1,56 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which motion an arm follows, of those that it was told, and how far it has come."""
+"""Localization of the arm on the commanded motion, or on the one before."""
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.localization import phase_of
-from rrth_planner.execution.remaining_motion import taken_over
+from rrth_planner.execution.remaining_motion import with_lead_in
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import REST_SPEED, sample
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
 
-# An arm that stands still that long after the end of its motion is taken to have arrived; where it
-# is nowhere on it for as long, it does something else [s].
+# An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
+# long is lost [s].
 GRACE = 0.5
-# An arm stands still where it does not go further than at `REST_SPEED` for this time [s].
+# An arm is at rest where it moves no further than at `REST_SPEED` for this time [s].
 STILL = 0.1
-# An arm that is further from its motion than this [rad], and nearer to another one by so great a
-# share, follows that.
+# An arm that is further from its motion than this [rad] executes another one where the distance to
+# that is less than this share.
 ASIDE, NEARER = 0.02, 0.25
-# An arm may be so late [s].
+# Greatest lag of an arm [s].
 LATE = 0.1
-# Between two places of a stop that are looked at [s].
+# Spacing of the samples of a stop [s].
 SPACING = 2e-3
 
 
-class Pace:
-    """Whether an arm moves, by what it says and by where it is: not every driver says."""
+class MotionDetector:
+    """Whether an arm moves, by its velocities and positions: not every driver has velocities."""
 
     def __init__(self) -> None:
-        """Begin with nothing seen."""
+        """Begin without a reading."""
         self._place: Array = np.zeros(0)
         self._then = 0.0
 
     def is_moving(self, reading: JointReading, now: float) -> bool:
-        """Return whether the arm moves, as far as its last readings tell, at a time [s]."""
+        """Return whether the arm moves at a time [s], by its last readings."""
         q = reading.positions
         if self._place.shape != q.shape or np.abs(q - self._place).max() > REST_SPEED * STILL:
             self._place, self._then = q, now
             return True
-        # A clock that was set back tells no time that passed, and NaN is no rest.
+        # After a step back of the clock the elapsed time is unknown; NaN is not at rest.
         is_fast = not (np.abs(reading.velocities) <= REST_SPEED).all()
         return is_fast or abs(now - self._then) < STILL
 
 
-def goes_on(reading: JointReading, before: ExecutingMotion, stop: ExecutingMotion) -> bool:
+def has_missed_stop(reading: JointReading, before: ExecutingMotion, stop: ExecutingMotion) -> bool:
     """
-    Return whether an arm is seen to go on along a motion that it was told to stop.
+    Return whether an arm continues a motion in spite of a commanded stop.
 
-    One that obeys is where the stop was at some time until now, however late it heard of it, and
-    wherever the motion slows down by itself; or it is not there yet: an arm may lag, or have
-    stopped before it was told to.
+    One that executes the stop, however late, is where the stop was at some time until now, even
+    where the motion slows down by itself; or not there yet: an arm may lag, or have stopped
+    before.
     """
     elapsed = reading.taken - stop.start_time
     if elapsed <= LATE:
@@ -72,7 +72,7 @@ def is_on_other(reading: JointReading, motion: ExecutingMotion, other: Executing
 
 class ExecutionTracker:
     """
-    The motion that an arm was told last, or the one before, as its joint states bear out.
+    Tracks which commanded motion the arm executes, the last or the previous one, and how far.
 
     Parameters
     ----------
@@ -84,31 +84,31 @@ class ExecutionTracker:
     def __init__(self, joints: Input[JointReading | None]) -> None:
         """Begin with no motion."""
         self.motion: ExecutingMotion | None = None
-        # Whether that is what the arm was told last.
-        self.is_told = True
-        self._joints, self._pace = joints, Pace()
-        # What the arm followed when it was told what it follows now: as the way that it stops on,
-        # and as the motion that gave way to another one.
+        # Whether that is the last commanded one.
+        self.is_latest = True
+        self._joints, self._detector = joints, MotionDetector()
+        # The motion that the present stop ends, and the one that the last motion replaced.
         self._stopped: ExecutingMotion | None = None
-        self._replaced: ExecutingMotion | None = None
-        # When the arm was last where its motion leads [s].
-        self._seen = 0.0
+        self._previous: ExecutingMotion | None = None
+        # When the arm was last found on its motion [s].
+        self._last_on_motion = 0.0
 
     def begin(self, motion: ExecutingMotion, now: float) -> None:
-        """Follow a motion from its beginning on, and the present one, if any, until then."""
+        """Track a motion from its beginning on, and the present one, if any, until then."""
         phase = None if self.is_over(now) else self.phase(now)
-        self._replaced = None if phase is None else self.motion
+        self._previous = None if phase is None else self.motion
         if self.motion is not None and phase is not None and now < motion.start_time:
-            motion = taken_over(self.motion, phase, motion, now)
-        self.motion, self.is_told, self._stopped, self._seen = motion, True, None, now
+            motion = with_lead_in(self.motion, phase, motion, now)
+        self.motion, self._stopped = motion, None
+        self.is_latest, self._last_on_motion = True, now
 
     def stop(self, stop: ExecutingMotion) -> None:
-        """Follow a stop on the way of the present motion."""
+        """Track a stop along the path of the present motion."""
         self.motion, self._stopped = stop, self.motion
 
     def forget(self) -> None:
-        """Follow nothing any more."""
-        self.motion = self._stopped = self._replaced = None
+        """Track nothing any more."""
+        self.motion = self._stopped = self._previous = None
 
     def is_over(self, now: float) -> bool:
         """Return whether the motion, if there is one, has ended and the arm is at rest."""
@@ -117,44 +117,46 @@ class ExecutionTracker:
             return False
         since = now - motion.start_time - motion.trajectory.duration
         if since <= GRACE - 2.0 * STILL:
-            # Whether the arm stands still is not asked yet, and a brake may wait for the answer.
+            # The test for standstill costs time that a stop may have to wait for.
             return False
-        is_moving = self._pace.is_moving(reading, now)
+        is_moving = self._detector.is_moving(reading, now)
         return since > GRACE and not is_moving
 
     def phase(self, now: float) -> float | None:
-        """Return the time within the motion; None where the arm is nowhere on it [s]."""
+        """Return the time within the motion [s]; None where the arm is not on it."""
         motion, reading = self.motion, self._joints.value
         if motion is None or reading is None:
             return None
         phase = motion.phase(reading.positions, reading.taken, now)
         if phase is not None:
-            self._seen = now
+            self._last_on_motion = now
         return phase
 
     def is_lost(self, now: float) -> bool:
-        """Return whether the arm has been nowhere on its motion for a while."""
-        return self.motion is not None and abs(now - self._seen) > GRACE
+        """Return whether the arm has been off its motion for longer than `GRACE`."""
+        return self.motion is not None and abs(now - self._last_on_motion) > GRACE
 
-    def look_back(self) -> bool:
-        """Follow the motion before where the arm is seen to do so; return whether that is new."""
-        motion, before, reading = self.motion, self._replaced, self._joints.value
+    def follow_previous(self) -> bool:
+        """Track the previous motion where the arm follows that; return whether that is new."""
+        motion, before, reading = self.motion, self._previous, self._joints.value
         if motion is None or before is None or reading is None:
             return False
         if reading.taken - motion.start_time <= LATE or not is_on_other(reading, motion, before):
             return False
-        # A stop may come by the motion before: then the arm must go its way, too.
+        # A stop may pass near the previous motion: then the direction must match, too.
         q, v = reading.positions, reading.velocities
         if self._stopped is not None and phase_of(q, v, before.trajectory) is None:
             return False
-        self.motion, self._replaced, self._stopped = before, motion, None
-        self.is_told = not self.is_told
+        self.motion, self._previous, self._stopped = before, motion, None
+        self.is_latest = not self.is_latest
         return True
 
-    def unstopped(self, now: float) -> tuple[ExecutingMotion, float] | None:
-        """Return the motion that the arm goes on with although it was stopped, and the time."""
+    def missed_stop(self, now: float) -> tuple[ExecutingMotion, float] | None:
+        """Return the motion that the arm continues in spite of a stop, and the time within it."""
         stop, before, reading = self.motion, self._stopped, self._joints.value
-        if stop is None or before is None or reading is None or not goes_on(reading, before, stop):
+        if stop is None or before is None or reading is None:
+            return None
+        if not has_missed_stop(reading, before, stop):
             return None
         phase = before.phase(reading.positions, reading.taken, now)
         if phase is None or phase >= before.trajectory.duration:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a motion begins that takes over from another one, and when it is told."""
+"""The handover from a running motion to a new one: where it begins, and when to publish it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,57 +9,56 @@ import time
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LEAD
 from rrth_planner.model.start_state import StartState
 
-# How far ahead a motion begins that takes over from one that runs: that long its plan may take,
-# and once more with more time [s].
+# How far ahead a handover is planned for; the second value, where the first was too short [s].
 LEADS = (0.05, LONGEST_LEAD)
-# So great a share of that before it begins it is told, so that the arm has it in time; not where
-# the present motion is unknown, since the arm has to be looked at as late as can be.
+# The motion is published this share of the lead before it begins, so that the controller has it in
+# time; not where the present motion is unknown: then the arm is checked as late as possible.
 EARLY = 0.5
-# So late a motion may be told of which nobody knows how the arm moved until then [s].
+# A motion may be published so late where the present motion is unknown [s].
 LATE = 0.02
-# Whoever wakes up takes the interpreter from what monitors the arm [s].
-LONGEST_NAP = 0.02
+# Polling more often would take the interpreter from the monitor [s].
+LONGEST_SLEEP = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class Handover:
     """
-    Where a motion of an arm that moves begins.
+    Where and when a new motion replaces the running one.
 
     Parameters
     ----------
     time : float
         [s].
     lead : float
-        So long before that it was planned for [s].
-    takeover : StartState
-        What the arm does then.
+        How long before that it was planned [s].
+    start_state : StartState
+        The state of the arm then.
     running : ExecutingMotion or None
-        The motion that it was last told to follow.
+        The last commanded motion.
 
     """
 
     time: float
     lead: float
-    takeover: StartState
+    start_state: StartState
     running: ExecutingMotion | None
 
     @property
-    def early(self) -> float:
-        """How long before it begins the motion is told, if all goes well [s]."""
-        return 0.0 if self.takeover.running is None else EARLY * self.lead
+    def publish_ahead(self) -> float:
+        """How long before it begins the motion is published [s]."""
+        return 0.0 if self.start_state.running is None else EARLY * self.lead
 
     @property
-    def latest(self) -> float:
-        """When the motion can still be told [s]."""
-        return self.time + (LATE if self.takeover.running is None else 0.0)
+    def deadline(self) -> float:
+        """Until when the motion may be published [s]."""
+        return self.time + (LATE if self.start_state.running is None else 0.0)
 
     def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
-        """Return when the motion is to be told, or as soon as it should stop."""
+        """Return when the motion is to be published, or as soon as it is cancelled."""
         # A simulated clock may stand still.
         end = time.monotonic() + 2 * LEADS[-1]
         while time.monotonic() < end and not should_stop():
-            left = self.time - self.early - clock()
+            left = self.time - self.publish_ahead - clock()
             if left <= 0.0:
                 return
-            time.sleep(min(LONGEST_NAP, left))
+            time.sleep(min(LONGEST_SLEEP, left))

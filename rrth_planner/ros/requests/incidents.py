@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a node keeps its incidents, and what it says of them."""
+"""Where a node keeps its incident files, and how it reports them."""
 
 from pathlib import Path
 import shlex
@@ -15,7 +15,7 @@ from rrth_planner.pipeline.request import PlanQuestion
 
 
 class PlanError(RrthError):
-    """An error that nobody expected, its cause, beside the question that led to it."""
+    """An unexpected error, its cause, with the question that led to it."""
 
     def __init__(self, question: PlanQuestion, trajectory: Trajectory | None = None) -> None:
         """Keep the question, and the motion if there was one already."""
@@ -34,7 +34,7 @@ def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
     """
     Write an incident to its file; return what to add to the answer, and the file.
 
-    Whatever is wrong with the folder, the answer must not suffer.
+    An error in writing does not change the answer.
     """
     try:
         path = write_incident(incident, incident_folder(folder))
@@ -45,7 +45,7 @@ def keep(incident: Incident, folder: str) -> tuple[str, Path | None]:
 
 
 def incident_of(problem: BaseException) -> Incident | None:
-    """Return the record of an error, where what was asked is known."""
+    """Return the record of an error, where its question is known."""
     if not isinstance(problem, PlanError):
         return None
     cause = cause_of(problem)
@@ -53,18 +53,18 @@ def incident_of(problem: BaseException) -> Incident | None:
     try:
         return error_incident(problem.question, cause, where, problem.trajectory)
     except Exception:
-        # The answer must not suffer; the error itself is in the log.
+        # The answer comes without it; the error itself is in the log.
         return None
 
 
 def cause_of(problem: BaseException) -> BaseException:
-    """Return the error itself, without what was put round it."""
+    """Return the error itself, unwrapped."""
     if isinstance(problem, PlanError) and problem.__cause__ is not None:
         return problem.__cause__
     return problem
 
 
 def sentence_of(problem: BaseException) -> str:
-    """Return what is said of an error that nobody expected."""
+    """Return the sentence of an unexpected error."""
     cause = cause_of(problem)
     return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""One request: from what was heard to an outcome with a code, whatever happens."""
+"""One request: from the latest inputs to an outcome with a code, even after an error."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,10 +13,10 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
-from rrth_planner.ros.requests.handover import LEADS, Start
+from rrth_planner.ros.requests.handover import Handover, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
 from rrth_planner.ros.requests.revalidation import Revalidation
 
@@ -24,37 +24,37 @@ from rrth_planner.ros.requests.revalidation import Revalidation
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanOutcome:
     """
-    How a request ended: code and sentence; the rest where there was any.
+    How a request ended: code, sentence and, where known, the rest.
 
     Parameters
     ----------
     code : ErrorCode
     sentence : str
     plan : MotionPlan or None
-    inputs : PlanInputs or None
-    start : Start or None
+    snapshot : InputSnapshot or None
+    handover : Handover or None
     incident : Incident or None
-        To be kept in a file, which the answer then names.
+        To be written to a file, which the answer names.
 
     """
 
     code: ErrorCode
     sentence: str
     plan: MotionPlan | None = None
-    inputs: PlanInputs | None = None
-    start: Start | None = None
+    snapshot: InputSnapshot | None = None
+    handover: Handover | None = None
     incident: Incident | None = None
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The motion that is told; None unless the request succeeded."""
+        """The motion to publish; None unless the request succeeded."""
         if self.plan is None or self.code is not ErrorCode.SUCCESS:
             return None
         return self.plan.trajectory
 
 
 def plan_request(
-    heard: Inputs,
+    inputs: Inputs,
     parameters: PlannerParameters,
     clock: Callable[[], float],
     planner: Planner,
@@ -66,13 +66,13 @@ def plan_request(
     """
     Return the outcome of a request that begins now, once its motion is published.
 
-    A motion for an arm that moves begins with the state that the arm is going to be in shortly,
-    and is published not long before.
+    Where the arm moves, the motion begins with its predicted state at the handover, and is
+    published shortly before.
 
     Parameters
     ----------
-    heard : Inputs
-        What a plan begins with is copied from here at once; at the end it is looked at again.
+    inputs : Inputs
+        Copied at the beginning; checked again before the motion is published.
     parameters : PlannerParameters
     clock : callable
         Returns the present time [s].
@@ -80,17 +80,17 @@ def plan_request(
     should_stop : callable
         Polled while planning; True cancels.
     publish : callable
-        Gets an outcome with a motion, and what says whether it still fits; publishes the motion,
-        or returns False where it is too late. May raise RequestError.
+        Takes an outcome with a motion, and its revalidation; publishes the motion, or returns
+        False where it is too late. May raise RequestError.
     goal : PointingGoal, optional
         Of the request; without, the last target.
     running : ExecutingMotion, optional
-        The motion that the arm was last told to follow.
+        The last commanded motion.
 
     Raises
     ------
     PlanError
-        Of an error that nobody expected, once it is known what was asked.
+        On an unexpected error, once the question is known.
 
     """
     question: PlanQuestion | None = None
@@ -98,29 +98,31 @@ def plan_request(
     try:
         for lead in LEADS:
             question = plan = None
-            require_wanted(should_stop, 'the request was cancelled before its turn')
+            require_not_cancelled(should_stop, 'the request was cancelled before its turn')
             now = clock()
-            inputs = heard.at(now, parameters, goal)
-            start = None
-            if inputs.is_moving(now) or inputs.pauses(running, now, lead):
-                ahead = inputs.ahead(running, now + lead, parameters.arm)
-                start = Start(now + lead, lead, ahead, running)
-            question = _question(inputs, parameters, start)
+            snapshot = inputs.at(now, parameters, goal)
+            handover = None
+            if snapshot.is_moving(now) or snapshot.is_about_to_move(running, now, lead):
+                ahead = snapshot.start_state_at(running, now + lead, parameters.arm)
+                handover = Handover(now + lead, lead, ahead, running)
+            question = _question(snapshot, parameters, handover)
             plan = planner.plan(question, should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
                 incident = disagreement_incident(question, plan.disagreement)
-                return PlanOutcome(code, plan.sentence, plan, inputs, incident=incident)
-            outcome = PlanOutcome(code, plan.sentence, plan, inputs, start)
+                return PlanOutcome(code, plan.sentence, plan, snapshot, incident=incident)
+            outcome = PlanOutcome(code, plan.sentence, plan, snapshot, handover)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return outcome
-            if start is not None:
-                if clock() > start.time:
+            if handover is not None:
+                if clock() > handover.time:
                     continue
-                start.wait(clock, should_stop)
-            revalidation = Revalidation(heard, clock, parameters, inputs, plan, start, running)
+                handover.wait(clock, should_stop)
+            revalidation = Revalidation(
+                inputs, clock, parameters, snapshot, plan, handover, running
+            )
             try:
-                require_wanted(should_stop)
+                require_not_cancelled(should_stop)
                 found = revalidation.disagreement(planner)
                 if found is not None:
                     incident = disagreement_incident(question, *found)
@@ -130,13 +132,12 @@ def plan_request(
                 if publish(outcome, revalidation):
                     return outcome
             except ArmHasMoved:
-                if start is not None or running is None or lead == LEADS[-1]:
+                if handover is not None or running is None or lead == LEADS[-1]:
                     raise
-                # It seemed at rest, and has just begun the motion that it was told.
+                # It seemed at rest, and has just begun its commanded motion.
         raise RequestError(
             ErrorCode.TIMED_OUT,
-            f'the arm moves, and no plan was ready and checked within {LEADS[-1]:g} s to take '
-            'over from its motion',
+            f'the arm moves, and no handover was planned and checked within {LEADS[-1]:g} s',
         )
     except RequestError as problem:
         return PlanOutcome(problem.code, str(problem), plan)
@@ -146,7 +147,7 @@ def plan_request(
         raise PlanError(question, None if plan is None else plan.trajectory) from problem
 
 
-def require_wanted(
+def require_not_cancelled(
     should_stop: Callable[[], bool], sentence: str = 'the request was cancelled'
 ) -> None:
     """Raise RequestError where a request was cancelled."""
@@ -155,18 +156,18 @@ def require_wanted(
 
 
 def _question(
-    inputs: PlanInputs, parameters: PlannerParameters, start: Start | None
+    snapshot: InputSnapshot, parameters: PlannerParameters, handover: Handover | None
 ) -> PlanQuestion:
     return PlanQuestion(
         arm=parameters.arm,
-        scene=inputs.scene,
-        q_start=inputs.q_start if start is None else start.takeover.state.positions,
-        goal=inputs.goal,
+        scene=snapshot.scene,
+        q_start=snapshot.q_start if handover is None else handover.start_state.state.positions,
+        goal=snapshot.goal,
         limits=parameters.limits,
         options=parameters.options,
         margin=parameters.margin,
         ray_guard_length=parameters.ray_guard_length,
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
-        moving=None if start is None else start.takeover,
+        moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests one after the other, in a thread of their own, so that the node hears meanwhile."""
+"""Requests one after the other, in a worker thread, while the node receives messages."""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -25,13 +25,13 @@ from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
 from rrth_planner.ros.requests.incidents import incident_of, keep, sentence_of
-from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_wanted
+from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
 from rrth_planner.ros.requests.stop_validation import incident_of_stop
 from rrth_planner.ros.requests.wait_for_rest import Rest
 from trajectory_msgs.msg import JointTrajectory
 
-# How often stops are followed up, and motions shown at most [s].
+# Period of the work after a stop, and shortest one between motions shown [s].
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
@@ -39,7 +39,7 @@ CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
     """
-    What a request is answered.
+    The response to a request.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Response:
     tool_path : callable
         Returns the tool's path; empty where no motion was published.
     conclude : callable
-        What is left to do when it has been answered: to show and to report it.
+        Called after the answer is sent: shows and reports the motion.
 
     """
 
@@ -72,7 +72,7 @@ class _Resumption:
     ticket: _Ticket
     goal: PointingGoal
     rest: Rest
-    n_begun: int
+    n_motions: int
 
 
 class PlanQueue:
@@ -82,12 +82,12 @@ class PlanQueue:
     Parameters
     ----------
     node : Node
-    heard : Inputs
+    inputs : Inputs
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
     publishers : PlanPublishers
     monitor : ExecutionMonitor
-        Given each motion that is published; its stops are followed up.
+        Monitors each published motion; its stops are checked again here, and replanned.
     planner : Planner
     handled : callable
         As in `ExecutorBarrier`, of the bodies.
@@ -97,7 +97,7 @@ class PlanQueue:
     def __init__(
         self,
         node: Node,
-        heard: Inputs,
+        inputs: Inputs,
         reporter: Reporter,
         publishers: PlanPublishers,
         monitor: ExecutionMonitor,
@@ -105,13 +105,13 @@ class PlanQueue:
         handled: Callable[[], tuple[int, int]],
     ) -> None:
         """Start with nothing to do."""
-        self._node, self._heard, self._reporter = node, heard, reporter
+        self._node, self._inputs, self._reporter = node, inputs, reporter
         self._publishers, self._monitor, self._planner = publishers, monitor, planner
         self._barrier = ExecutorBarrier(node, handled)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None
-        # The newest motion that is still to be shown, and when one was shown last [s].
+        # The newest motion that is not shown yet, and when one was last shown [s].
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
@@ -139,34 +139,34 @@ class PlanQueue:
             response: Response = await future
             executor = self._node.executor
             if executor is not None:
-                # As a task of its own: the answer is sent before the executor comes to it.
+                # As a task of its own: the answer is sent before it runs.
                 executor.create_task(self.prepare, response.conclude)
             return response
         finally:
             self._open.discard(ticket)
 
     def prepare(self, work: Callable[[], None]) -> None:
-        """Have something done in the worker's thread before the requests that follow."""
+        """Run something in the worker thread before the requests that follow."""
 
         def prepared() -> None:
             try:
                 work()
             except Exception:
-                # The request that needs it will say what is wrong.
+                # The request that needs it will report the error.
                 self._node.get_logger().error(traceback.format_exc())
 
         if not self._is_closed:
             self._worker.submit(prepared)
 
     def cancel(self) -> int:
-        """End the requests that have published no motion yet; return how many these are."""
+        """Cancel the requests that have published no motion yet; return their number."""
         ended, self._open, self._resumption = self._open, set(), None
         for ticket in ended:
             ticket.is_cancelled = True
         return len(ended)
 
     def close(self) -> None:
-        """End everything; nothing is published any more, and no request may follow."""
+        """End everything; nothing is published afterwards, and no request may follow."""
         self._is_closed = True
         self.cancel()
         self._monitor.close()
@@ -177,28 +177,28 @@ class PlanQueue:
         """Plan and publish; called in the worker's thread."""
         figures, shown, incident = PlanReport(), None, None
         parameters, monitor = self._reporter.parameters, self._monitor
-        n_brakes, running = monitor.n_brakes, monitor.running
+        n_stops, running = monitor.n_stops, monitor.running
 
         def publish(outcome: PlanOutcome, revalidation: Revalidation) -> bool:
             assert outcome.trajectory is not None
-            start = 0.0 if outcome.start is None else outcome.start.time
+            start = 0.0 if outcome.handover is None else outcome.handover.time
             msg = self._publishers.motion(outcome.trajectory, parameters, start)
             try:
-                # In the node's own thread, once all that came is read.
+                # In the node's own thread, once all received messages are processed.
                 return self._barrier.call(
-                    lambda: self._publish(ticket, outcome, revalidation, n_brakes, msg)
+                    lambda: self._publish(ticket, outcome, revalidation, n_stops, msg)
                 )
             except NodeIsBusyError:
-                require_wanted(lambda: ticket.is_cancelled)
+                require_not_cancelled(lambda: ticket.is_cancelled)
                 raise RequestError(
                     ErrorCode.SENSOR_INFO_STALE,
-                    'the node is busy: the bodies that came while the motion was planned are not '
-                    'read yet',
+                    'the node is busy: bodies received while the motion was planned are not '
+                    'processed yet',
                 ) from None
 
         try:
             outcome = plan_request(
-                self._heard,
+                self._inputs,
                 parameters,
                 self._now,
                 self._planner,
@@ -223,7 +223,7 @@ class PlanQueue:
             elif ticket.is_cancelled and code is not ErrorCode.PREEMPTED:
                 code, sentence = CANCELLED
         except Exception as problem:
-            # Whatever it is, the caller gets an answer, and the node lives on.
+            # After any error the caller gets an answer, and the node continues.
             self._node.get_logger().error(traceback.format_exc())
             code, sentence, shown = ErrorCode.FAILURE, sentence_of(problem), None
             incident = incident_of(problem)
@@ -248,60 +248,61 @@ class PlanQueue:
         ticket: _Ticket,
         outcome: PlanOutcome,
         revalidation: Revalidation,
-        n_brakes: int,
+        n_stops: int,
         msg: JointTrajectory,
     ) -> bool:
         """
         Publish the motion of a request, and have it monitored; called in the node's own thread.
 
-        Return False where it is too late; raise RequestError where it does not fit any more.
+        Return False where it is too late; raise RequestError where it is no longer valid.
         """
         monitor, parameters = self._monitor, revalidation.parameters
-        require_wanted(lambda: ticket.is_cancelled)
-        if n_brakes != monitor.n_brakes:
+        require_not_cancelled(lambda: ticket.is_cancelled)
+        if n_stops != monitor.n_stops:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the arm was stopped while its motion was planned: {monitor.cause}',
+                f'the arm was stopped while its motion was planned: {monitor.stop_reason}',
             )
-        if monitor.due:
+        if monitor.pending_stop:
             raise RequestError(
-                ErrorCode.FAILURE, f'a stop of the arm could not be published: {monitor.due}'
+                ErrorCode.FAILURE,
+                f'a stop of the arm could not be published: {monitor.pending_stop}',
             )
         revalidation.require_fit()
         if revalidation.is_late():
             return False
-        trajectory, plan, inputs = outcome.trajectory, outcome.plan, outcome.inputs
-        assert trajectory is not None and plan is not None and inputs is not None
-        # Whoever cancels from here on cancels nothing.
+        trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
+        assert trajectory is not None and plan is not None and snapshot is not None
+        # From here on the request cannot be cancelled.
         self._open.discard(ticket)
         monitor.begin(
             ExecutingMotion(
                 trajectory=trajectory,
-                start_time=self._now() if outcome.start is None else outcome.start.time,
-                reach=plan.reach,
+                start_time=self._now() if outcome.handover is None else outcome.handover.time,
+                target_distance=plan.target_distance,
                 escape_time=plan.escape_time,
             ),
-            inputs.goal,
+            snapshot.goal,
             parameters,
-            lambda: self._publishers.tell(msg),
+            lambda: self._publishers.publish(msg),
         )
         return True
 
     def _follow_up(self) -> None:
-        """See to what comes after a motion, and after a stop: its second check, another plan."""
+        """Show the newest motion; after a stop, check it a second time and plan again."""
         self._show_newest()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
-            if stop.is_again and stop.goal is not None and not self._is_closed:
+            if stop.is_replanned and stop.goal is not None and not self._is_closed:
                 self._discard_resumption()
-                rest = Rest(self._heard.joints, self._now, stop.trajectory.duration)
-                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_begun)
+                rest = Rest(self._inputs.joints, self._now, stop.trajectory.duration)
+                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_motions)
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
         if resumption is None:
             return
-        if resumption.n_begun != self._monitor.n_begun:
-            # Whoever asked for a motion that has begun since then wants that one.
+        if resumption.n_motions != self._monitor.n_motions:
+            # A motion that was requested since then has priority.
             self._discard_resumption()
         elif resumption.rest.is_over():
             self._resumption = None
@@ -315,7 +316,7 @@ class PlanQueue:
     def _resume(self, resumption: _Resumption) -> None:
         """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
         ticket = resumption.ticket
-        if ticket.is_cancelled or resumption.n_begun != self._monitor.n_begun:
+        if ticket.is_cancelled or resumption.n_motions != self._monitor.n_motions:
             self._open.discard(ticket)
             return
         response = self._work(resumption.goal, time.perf_counter(), ticket)
@@ -325,15 +326,15 @@ class PlanQueue:
             self._monitor.hold(response.text)
 
     def _check_stop(self, stop: Stop) -> None:
-        """Have the second checker look at a stop that was published as proven free."""
+        """Have the second checker check a stop that was published as proven free."""
         incident = incident_of_stop(stop, self._planner)
         if incident is not None:
             noted, file = keep(incident, stop.parameters.incident_folder)
             self._reporter.incident(file)
-            self._node.get_logger().error(f'the arm brakes, but {incident.sentence}{noted}')
+            self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
 
     def _tool_path(self, outcome: PlanOutcome, parameters: PlannerParameters) -> Path:
-        """Return the tool's path; a failure of this does not unsay the motion."""
+        """Return the tool's path; empty after an error, since the motion is published already."""
         assert outcome.trajectory is not None
         try:
             return self._publishers.tool_path(outcome.trajectory, parameters)
@@ -343,9 +344,9 @@ class PlanQueue:
 
     def _show_newest(self) -> None:
         """
-        Have the newest motion shown, once somebody looks.
+        Have the newest motion shown, if there is a subscriber.
 
-        That takes the interpreter for several milliseconds, which a brake may have to wait for.
+        That takes the interpreter for several milliseconds, which could delay a stop.
         """
         present, unseen = time.monotonic(), self._unseen
         if (
@@ -358,10 +359,10 @@ class PlanQueue:
 
     def _show(self, outcome: PlanOutcome, parameters: PlannerParameters) -> None:
         """Publish what shows a motion."""
-        assert outcome.trajectory is not None and outcome.inputs is not None
-        inputs = outcome.inputs
+        assert outcome.trajectory is not None and outcome.snapshot is not None
+        snapshot = outcome.snapshot
         self._publishers.publish_view(
-            outcome.trajectory, parameters, inputs.scene, inputs.goal.target
+            outcome.trajectory, parameters, snapshot.scene, snapshot.goal.target
         )
 
     def _now(self) -> float:

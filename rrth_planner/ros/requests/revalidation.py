@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Before a motion is published: whether it still fits wearer and arm, who may have moved since."""
+"""Revalidation of a planned motion against the latest inputs, just before it is published."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, PlanInputs, RequestError
+from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.requests.handover import LEADS, Start
+from rrth_planner.ros.requests.handover import Handover, LEADS
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
 START_TOLERANCE = 1e-3
@@ -28,43 +28,43 @@ START_TOLERANCE = 1e-3
 @dataclass(frozen=True, slots=True, eq=False)
 class Revalidation:
     """
-    Checks a planned motion against wearer and arm as they are by now, as often as need be.
+    Checks a planned motion against wearer and arm as they are now; may be repeated.
 
     Parameters
     ----------
-    heard : Inputs
-        What is heard now.
+    inputs : Inputs
+        The latest ones.
     clock : callable
         Returns the present time [s].
     parameters : PlannerParameters
-    inputs : PlanInputs
-        What it was planned for.
+    snapshot : InputSnapshot
+        The inputs of the plan.
     plan : MotionPlan
         With a motion.
-    start : Start or None
+    handover : Handover or None
         None: from rest.
     running : ExecutingMotion or None
-        The motion that the arm was last told to follow.
+        The last commanded motion.
 
     """
 
-    heard: Inputs
+    inputs: Inputs
     clock: Callable[[], float]
     parameters: PlannerParameters
-    inputs: PlanInputs
+    snapshot: InputSnapshot
     plan: MotionPlan
-    start: Start | None
+    handover: Handover | None
     running: ExecutingMotion | None
 
     def disagreement(self, planner: Planner) -> tuple[Disagreement, Scene] | None:
         """
-        Return what the second checker has against a motion that the first one finds free.
+        Return the violation that only the second checker finds, and in which scene.
 
-        And round which wearer; it is asked only where he has moved. Raise RequestError where the
-        motion no longer fits.
+        It is asked only where the wearer has moved. Raise RequestError where the motion is no
+        longer valid.
         """
         scene = self.require_fit()
-        if _is_same(scene, self.inputs.scene):
+        if _is_same(scene, self.snapshot.scene):
             return None
         parameters = self.parameters
         violation = planner.violation_seen(
@@ -73,7 +73,7 @@ class Revalidation:
             self._motion,
             parameters.margin,
             parameters.ray_guard_length,
-            self._reach,
+            self._target_distance,
             self.plan.escape_time,
         )
         if violation is None:
@@ -82,37 +82,39 @@ class Revalidation:
 
     def is_late(self) -> bool:
         """Return whether it is too late to publish the motion."""
-        return self.start is not None and self.clock() > self.start.latest
+        return self.handover is not None and self.clock() > self.handover.deadline
 
     def require_fit(self) -> Scene:
         """
-        Return the wearer as he is now, of whom the motion is proven free.
+        Return the present wearer, of whom the motion is proven free.
 
-        Raise RequestError where it is not, or where the arm is not where the motion needs it.
+        Raise RequestError where it is not, or where the arm is not at the start of the motion.
         """
         now = self.clock()
-        present = self.heard.at(now, self.parameters, self.inputs.goal)
+        present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
-        if not _is_same(present.scene, self.inputs.scene):
+        if not _is_same(present.scene, self.snapshot.scene):
             self._require_proof(present.scene)
         return present.scene
 
-    def _require_arm(self, present: PlanInputs, now: float) -> None:
-        """Raise ArmHasMoved where the arm is not where the motion needs it."""
-        inputs, start, arm = self.inputs, self.start, self.parameters.arm
-        expected = inputs.q_start
-        if start is None:
+    def _require_arm(self, present: InputSnapshot, now: float) -> None:
+        """Raise ArmHasMoved where the arm is not at the start of the motion."""
+        snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
+        expected = snapshot.q_start
+        if handover is None:
             present.require_rest(now, arm)
-            if present.pauses(self.running, now, LEADS[0]):
+            if present.is_about_to_move(self.running, now, LEADS[0]):
                 raise ArmHasMoved(
                     ErrorCode.START_STATE_INVALID,
-                    'the arm has begun the motion that it was told, expected an arm at rest',
+                    'the arm has begun its commanded motion, expected an arm at rest',
                 )
         else:
-            expected = inputs.ahead(start.running, present.joints.taken, arm).state.positions
+            expected = snapshot.start_state_at(
+                handover.running, present.joints.taken, arm
+            ).state.positions
         moved = float(np.abs(present.q_start - expected).max())
         if not moved <= START_TOLERANCE:
-            what = 'moved by' if start is None else 'is off its course by'
+            what = 'moved by' if handover is None else 'deviates from its trajectory by'
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
@@ -128,11 +130,13 @@ class Revalidation:
             escape_time > 0.0
             and box_depths(world, self._motion.positions[0]).max() >= parameters.escape_depth
         )
-        if is_too_deep or not is_proven_free(world, self._motion, self._reach, escape_time):
+        if is_too_deep or not is_proven_free(
+            world, self._motion, self._target_distance, escape_time
+        ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the wearer moved while the motion was planned, and it is no longer proven free '
-                'of the present body',
+                'the wearer moved while the motion was planned: it is not proven free of the '
+                'present body',
             )
 
     @property
@@ -142,8 +146,8 @@ class Revalidation:
         return trajectory
 
     @property
-    def _reach(self) -> float:
-        target = self.inputs.goal.target
+    def _target_distance(self) -> float:
+        target = self.snapshot.goal.target
         return reach_to(self.parameters.arm, target, self._motion.positions[-1])
 
 

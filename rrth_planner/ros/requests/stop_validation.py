@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the second checker says of a stop, once it is published: a moving arm does not wait."""
+"""Second check of a stop, after it is published: a moving arm does not wait for it."""
 
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.io.incident import disagreement_incident, Incident
@@ -10,7 +10,7 @@ from rrth_planner.ros.monitor.execution_monitor import Stop
 
 
 def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
-    """Return the record of a stop that is proven free and touches for python-fcl, or None."""
+    """Return the record of a stop that is proven free but violates for python-fcl, or None."""
     if stop.scene is None or stop.goal is None:
         return None
     parameters, trajectory = stop.parameters, stop.trajectory

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Wait for an arm that brakes."""
+"""Wait until a stopping arm is at rest."""
 
 from collections.abc import Callable
 import time
@@ -10,35 +10,35 @@ from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
 
-# So much longer than its brake an arm may need to come to rest [s].
+# An arm may come to rest so much later than its commanded stop [s].
 LONGEST_SETTLING = 1.0
 
 
 class Rest:
     """
-    The rest that an arm comes to when it has braked.
+    The rest of an arm after a commanded stop.
 
     Parameters
     ----------
     joints : Input
         Where the arm is.
     clock : callable
-        Returns the time by which its readings are dated [s].
-    brake : float
-        How long it brakes from now on; what was read before says nothing of its rest [s].
+        Returns the time on the clock of the readings [s].
+    stop_duration : float
+        Duration of the stop from now on; readings from before its end do not count [s].
 
     """
 
     def __init__(
-        self, joints: Input[JointReading | None], clock: Callable[[], float], brake: float
+        self, joints: Input[JointReading | None], clock: Callable[[], float], stop_duration: float
     ) -> None:
-        """Begin to brake."""
-        self._joints, self._begin = joints, clock() + brake
+        """Begin with the stop."""
+        self._joints, self._begin = joints, clock() + stop_duration
         # A simulated clock may stand still.
-        self._end = time.monotonic() + brake + LONGEST_SETTLING
+        self._end = time.monotonic() + stop_duration + LONGEST_SETTLING
 
     def is_over(self) -> bool:
-        """Return whether the arm is at rest, or the time for that is over."""
+        """Return whether the arm is at rest, or the time for that has passed."""
         if time.monotonic() >= self._end:
             return True
         reading = self._joints.value

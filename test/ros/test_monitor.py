@@ -32,11 +32,11 @@ FAR, OTHER = (1.0, 1.5, 0.8), (2.0, 0.3, 0.4)
 
 
 class Client(Node):
-    """Tells the planner everything, and writes down what the nodes say."""
+    """Publishes all inputs, and records what the nodes publish."""
 
     def __init__(self):
         """Connect to both nodes."""
-        super().__init__('guarded')
+        super().__init__('monitored')
         self.body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self.target = self.create_publisher(PointStamped, 'target', LATCHED)
         self.states, self.motions, self.figures = [], [], {}
@@ -69,8 +69,8 @@ def body(*more):
 
 
 @pytest.fixture
-def scene_of_a_motion(wait_until, tell, spinning):
-    """Have an arm on its way to a target; give the client."""
+def scene_of_a_motion(wait_until, send, spinning):
+    """Have an arm in motion to a target; give the client."""
 
     def begin(*settings):
         client = Client()
@@ -84,8 +84,8 @@ def scene_of_a_motion(wait_until, tell, spinning):
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')
-        tell(client, client.body, body()[0])
-        tell(client, client.target, samples.target(*FAR))
+        send(client, client.body, body()[0])
+        send(client, client.target, samples.target(*FAR))
         future = client.plan.call_async(Trigger.Request())
         wait_until(future.done)
         assert future.result().success
@@ -100,7 +100,7 @@ def scene_of_a_motion(wait_until, tell, spinning):
 
 
 def in_the_way(client, ahead):
-    """Return a box that the arm would touch so much later [s]."""
+    """Return a box that the arm would collide with so much later [s]."""
     arm, motion = worlds.table_1_arm(), client.motion()
     gaps = np.linspace(0.0, motion.duration, 500)
     q, _, _ = sample(motion, gaps)
@@ -119,37 +119,37 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     msg, scene = body(box)
     client.body.publish(msg)
     wait_until(lambda: len(client.motions) == 2)
-    brake = client.motion(1)
-    assert brake.velocities[0].any()
-    assert brake.duration < client.motion(0).duration
-    # It goes on by itself, or holds and says so.
-    wait_until(lambda: len(client.motions) == 3 or 'holds' in client.figures.get('guard', ''))
+    stop = client.motion(1)
+    assert stop.velocities[0].any()
+    assert stop.duration < client.motion(0).duration
+    # It replans, or holds and reports that.
+    wait_until(lambda: len(client.motions) == 3 or 'holding' in client.figures.get('monitor', ''))
     wait_until(lambda: client.speed() == 0.0)
     q = np.array([state.position for state in client.states[n:]])
-    touch = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
-    assert touch is None
-    assert any('the wearer moved into the way' in line for line in said)
-    assert not [line for line in said if 'refused' in line]
-    wait_until(lambda: client.figures['brakes'].startswith('1,'))
+    contact = reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0)
+    assert contact is None
+    assert any('not proven free of the wearer' in line for line in said)
+    assert not [line for line in said if 'rejected' in line]
+    wait_until(lambda: client.figures['fail-safe stops'].startswith('1,'))
 
 
-def test_a_new_target_is_planned_for_while_the_arm_brakes(scene_of_a_motion, wait_until, tell):
+def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
     msg, scene = body(box)
-    tell(client, client.target, samples.target(*OTHER))
+    send(client, client.target, samples.target(*OTHER))
     client.body.publish(msg)
     wait_until(lambda: len(client.motions) == 2)
     future = client.plan.call_async(Trigger.Request())
     wait_until(future.done)
-    # For the new target, be it that the arm was at rest before and on its way to the old one.
+    # For the new target, whether the arm was at rest or in motion to the old one.
     assert future.result().success, future.result().message
     last = client.motion().positions[-1]
     assert pointing_error(worlds.table_1_arm(), last, np.array(OTHER)) < 1e-6
     wait_until(lambda: client.speed() == 0.0 and np.allclose(client.states[-1].position, last))
     q = np.array([state.position for state in client.states[n:]])
     assert reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
-    assert not [line for line in said if 'refused' in line]
+    assert not [line for line in said if 'rejected' in line]
 
 
 def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_until):
@@ -167,7 +167,7 @@ def test_a_wearer_who_moves_elsewhere_stops_nothing(scene_of_a_motion, wait_unti
 def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, wait_until):
     client, said = scene_of_a_motion('body_timeout:=1.0')
     wait_until(lambda: len(client.motions) == 2)
-    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert any('body_timeout' in line for line in said)
     assert len(client.motions) == 2
@@ -176,6 +176,6 @@ def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, 
 def test_without_replan_the_arm_holds_where_it_stopped(scene_of_a_motion, wait_until):
     client, said = scene_of_a_motion('replan:=false')
     client.body.publish(body(in_the_way(client, 1.6))[0])
-    wait_until(lambda: client.figures.get('guard') == 'holds')
+    wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert len(client.motions) == 2

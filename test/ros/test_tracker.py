@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""An arm that obeys a stop is told from one that goes on, where its motion slows down anyhow."""
+"""A missed stop is detected, and an executed one is not taken for it."""
 
 from hypothesis import assume, given, strategies as st
 import numpy as np
@@ -11,13 +11,13 @@ pytest.importorskip('rclpy')
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import ASIDE, goes_on, LATE  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LATE  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402
 from worlds import examples, limits  # noqa: E402
 
 BEGIN = 100.0
-# How often the arm is looked at [s].
+# Period of the readings [s].
 TICK = 0.02
 
 
@@ -31,14 +31,14 @@ def _stopped(seed):
     return before, phase, ExecutingMotion(trajectory=stop, start_time=BEGIN)
 
 
-def _seen_to_go_on(before, stop, arm, span):
-    """Return the times after the stop at which an arm is found to go on [s]."""
+def _missed_at(before, stop, arm, span):
+    """Return the times after the stop at which the stop is found to be missed [s]."""
     times = np.arange(TICK, span, TICK)
     found = []
     for time in times:
         q, v = arm(time)
         reading = JointReading(q, v, BEGIN + time, BEGIN + time, float('inf'))
-        if goes_on(reading, before, stop):
+        if has_missed_stop(reading, before, stop):
             found.append(float(time))
     return found
 
@@ -47,8 +47,8 @@ def _at(trajectory, time):
     return tuple(row[0] for row in sample(trajectory, [time])[:2])
 
 
-def _told(before, phase, stop, late):
-    """Return what an arm does that hears of its stop so late [s]."""
+def _executed(before, phase, stop, late):
+    """Return the motion of an arm that receives its stop so late [s]."""
 
     def arm(time):
         if time < late:
@@ -60,31 +60,31 @@ def _told(before, phase, stop, late):
 
 @examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.013, 0.05, 0.09]))
-def test_an_arm_that_obeys_never_goes_on(seed, late):
+def test_an_executed_stop_is_never_taken_for_a_missed_one(seed, late):
     before, phase, stop = _stopped(seed)
-    obeys = _told(before, phase, stop, late)
-    assert _seen_to_go_on(before, stop, obeys, stop.trajectory.duration + 0.3) == []
+    executes = _executed(before, phase, stop, late)
+    assert _missed_at(before, stop, executes, stop.trajectory.duration + 0.3) == []
 
 
 @examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([-0.005, 0.0, 0.05]))
-def test_an_arm_whose_readings_are_poor_obeys_all_the_same(seed, late):
+def test_poor_readings_are_not_taken_for_a_missed_stop(seed, late):
     before, phase, stop = _stopped(seed)
-    obeys = _told(before, phase, stop, late)
+    executes = _executed(before, phase, stop, late)
     rng = np.random.default_rng(seed)
 
     def differenced(time):
         # As of a driver that has no velocities: half a period behind, and noisy.
-        (q_before, _), (q, _) = obeys(time - TICK), obeys(time)
+        (q_before, _), (q, _) = executes(time - TICK), executes(time)
         noise = 2e-4 * rng.standard_normal((2, 4))
         return q + noise[0], (q - q_before) / TICK + noise[1] / TICK
 
-    assert _seen_to_go_on(before, stop, differenced, stop.trajectory.duration + 0.3) == []
+    assert _missed_at(before, stop, differenced, stop.trajectory.duration + 0.3) == []
 
 
 @examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.5, 1.0]))
-def test_an_arm_that_goes_on_is_found_out(seed, rate):
+def test_an_arm_that_misses_its_stop_is_detected(seed, rate):
     before, phase, stop = _stopped(seed)
     left = (before.trajectory.duration - phase) / rate
 
@@ -100,32 +100,32 @@ def test_an_arm_that_goes_on_is_found_out(seed, rate):
         ahead = np.abs(way - q).max(axis=1).min()
         if time > LATE + 1e-9 and ahead > ASIDE and np.linalg.norm(v) > 0.05:
             due.add(float(time))
-    found = _seen_to_go_on(before, stop, ignores, left)
-    # Places are looked at some milliseconds apart.
+    found = _missed_at(before, stop, ignores, left)
+    # The samples are some milliseconds apart.
     assert due <= set(found)
     assert all(time > LATE for time in found)
 
 
 @examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.15, 0.3]))
-def test_an_arm_that_lags_or_has_stopped_by_itself_does_not_go_on(seed, lag):
+def test_an_arm_that_lags_or_has_stopped_by_itself_misses_no_stop(seed, lag):
     before, phase, stop = _stopped(seed)
 
     def lags(time):
-        # It is told late, too, since it does everything late.
+        # It receives the stop late, too.
         since = time - lag
         if since >= 0.0:
             return _at(stop.trajectory, since)
         return _at(before.trajectory, phase + since)
 
-    assert _seen_to_go_on(before, stop, lags, stop.trajectory.duration + lag + 0.2) == []
-    # So long before it was told to.
+    assert _missed_at(before, stop, lags, stop.trajectory.duration + lag + 0.2) == []
+    # So long before the commanded stop.
     early = min(lag, phase)
     stopped = fast_stop(before.trajectory, phase - early, limits())
     # One that begins earlier, at a corner say, may take longer and go further.
     assume(stopped.duration - early <= stop.trajectory.duration)
 
-    def brakes(time):
+    def stops(time):
         return _at(stopped, early + time)
 
-    assert _seen_to_go_on(before, stop, brakes, stop.trajectory.duration + 0.2) == []
+    assert _missed_at(before, stop, stops, stop.trajectory.duration + 0.2) == []
