@@ -25,7 +25,7 @@ from benchmarks.common.client import Client, LATCHED
 PATIENCE = 10.0
 DEPTH = 1000
 # What the node logs of a brake: how long after the body came it was published [ms].
-BRAKE = re.compile(r'the arm brakes.*; published after ([\d.]+) ms')
+BRAKE = re.compile(r'fail-safe stop.*; published after ([\d.]+) ms')
 
 
 @dataclass(frozen=True, slots=True)

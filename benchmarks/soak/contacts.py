@@ -67,7 +67,7 @@ def judge_episode(arm: ArmModel, episode: Episode) -> tuple[str, ...]:
     scene = scene_of_body(episode.body)
     if episode.followed:
         words.append(BRAKED)
-        if episode.guard == 'holds':
+        if episode.guard == 'holding':
             words.append(HELD)
         elif episode.guard == 'no motion':
             words.append(AGAIN)

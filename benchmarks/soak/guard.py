@@ -92,11 +92,11 @@ def soak_guard(
 
     def listen(line: str) -> None:
         record.brakes += brakes_in(line)
-        if 'not proven safe either' in line:
+        if 'not proven free either' in line:
             record.said['braking not proven safe'] += 1
-        if 'the arm goes on' in line:
+        if 'motion continues' in line:
             record.said['going on led away, braking would not'] += 1
-        if 'joint_trajectory refused' in line:
+        if 'joint_trajectory rejected' in line:
             record.said['motions that the playback refused'] += 1
 
     with (
@@ -196,7 +196,7 @@ def _episode(
         followed=tuple(_trajectory(client, m) for m in found),
         times=np.array([s[0] for s in states]),
         positions=np.array([s[1] for s in states]),
-        guard=client.figures['guard'],
+        guard=client.figures['monitor'],
     )
 
 
@@ -221,7 +221,7 @@ def _wait_for_rest(client: SoakClient) -> None:
 
     def is_over() -> bool:
         speed = max(map(abs, client.states[-1][2]))
-        return speed == 0.0 and client.figures['guard'] in ('no motion', 'holds')
+        return speed == 0.0 and client.figures['monitor'] in ('no motion', 'holding')
 
     client.hear(LONGEST, is_over)
 

@@ -124,7 +124,7 @@ def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
                 [['call, as its client sees it', *_percentiles(np.array(plans.calls) * 1e3)]],
             ),
-            *(f'- {k}: {v}' for k, v in plans.figures.items() if k in ('brakes',)),
+            *(f'- {k}: {v}' for k, v in plans.figures.items() if k in ('fail-safe stops',)),
         ]
     )
 
@@ -167,7 +167,7 @@ def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
     counts = [[word, str(n)] for word, n in (*guard.outcomes.items(), *guard.said.items())]
     figures = [
         [name, guard.figures.get(name, '')]
-        for name in ('motions held against a new body', 'brakes')
+        for name in ('remaining motion checks', 'fail-safe stops')
     ]
     return '\n\n'.join(
         [

@@ -25,7 +25,7 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
     unsafe = sum(n for (word, _), n in plans.verdicts.items() if word != FREE)
     n_judged = sum(plans.verdicts.values())
     heard = heard_by(plans.figures)
-    refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('refused messages'))
+    refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('rejected messages'))
     growth = growth_of([m for _, m in plans.memory]).growth if plans.memory else np.nan
     age = max((look.age for look in plans.looks), default=np.nan)
     return [
@@ -50,7 +50,7 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
 
 def guard_targets(guard: GuardRecord) -> list[list[str]]:
     """Return the lines of targets of the guard."""
-    held = _milliseconds(guard.figures.get('motions held against a new body', ''), 'p50')
+    held = _milliseconds(guard.figures.get('remaining motion checks', ''), 'p50')
     bad = guard.outcomes[contacts.TOUCHED] + guard.outcomes[contacts.MISSED]
     return [
         _line(
@@ -93,7 +93,7 @@ def flood_target(floods: Sequence[FloodRecord]) -> list[str]:
 
 def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:
     """Return the line of the target of the brakes."""
-    braked = figures.get('brakes', '')
+    braked = figures.get('fail-safe stops', '')
     p99 = _milliseconds(braked, 'p99')
     n_brakes = braked.split(',')[0]
     # Where nothing was measured nothing is met.

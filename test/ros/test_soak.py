@@ -83,7 +83,7 @@ def hand_behind(motion):
 
 
 BRAKES = '3, last 1.000 ms, p50 2.000 ms, p99 4.000 ms, at most 4.000 ms'
-FIGURES = {'good messages, body': '7', 'refused messages, body': '0', 'brakes': BRAKES}
+FIGURES = {'good messages, body': '7', 'rejected messages, body': '0', 'fail-safe stops': BRAKES}
 
 
 def plans(**changes):
@@ -167,9 +167,9 @@ def test_each_fault_misses_its_target():
         ({'verdicts': Counter({(judge.FREE, False): 1, (judge.TOUCHES, False): 1})}, 'free'),
         ({'verdicts': Counter({(judge.FREE, False): 1})}, 'free'),
         ({'n_sent': 8}, 'heard'),
-        ({'figures': FIGURES | {'refused messages, body': '1'}}, 'heard'),
-        ({'figures': FIGURES | {'brakes': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
-        ({'figures': FIGURES | {'brakes': '0, last 0 ms, p50 0 ms, p99 0 ms'}}, 'busy'),
+        ({'figures': FIGURES | {'rejected messages, body': '1'}}, 'heard'),
+        ({'figures': FIGURES | {'fail-safe stops': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
+        ({'figures': FIGURES | {'fail-safe stops': '0, last 0 ms, p50 0 ms, p99 0 ms'}}, 'busy'),
         ({'looks': [Look(1, 0.01, 7, 7), Look(2, 0.06, 7, 7)]}, 'age'),
         ({'looks': []}, 'age'),
         ({'memory': leaking}, 'memory'),
@@ -250,8 +250,8 @@ def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
 
 def test_figures_of_the_guard_are_held_to_its_targets():
     figures = {
-        'motions held against a new body': '9, last 1 ms, p50 0.200 ms, p99 1 ms, at most 2 ms',
-        'brakes': BRAKES,
+        'remaining motion checks': '9, last 1 ms, p50 0.200 ms, p99 1 ms, at most 2 ms',
+        'fail-safe stops': BRAKES,
     }
     assert unmet(guard_targets(GuardRecord(figures=figures))) == []
     slow = {key: value.replace('p99 4', 'p99 6') for key, value in figures.items()}
@@ -384,11 +384,11 @@ def test_processors_are_kept_awake_where_their_host_takes_them_away(
     assert lose_time_asleep() is is_so
 
 
-def test_where_idle_priority_is_refused_nothing_is_kept_awake(monkeypatch):
-    def refuse(*_):
+def test_where_idle_priority_is_rejected_nothing_is_kept_awake(monkeypatch):
+    def reject(*_):
         raise PermissionError
 
-    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    monkeypatch.setattr(os, 'sched_setscheduler', reject)
     ours, theirs = Pipe()
     # It would not return otherwise: nobody ends it.
     assert stay_awake(theirs) is None
@@ -410,18 +410,18 @@ def test_moments_of_several_processors_are_united():
 
 
 def test_a_brake_is_read_from_the_log():
-    line = 'WARN: the wearer moved into the way: the arm '
-    told = 'brakes, at rest in 0.12 s; published after 20.50 ms'
+    line = 'WARN: the remaining motion is not proven free of the wearer: '
+    told = 'fail-safe stop, at rest in 0.12 s; published after 20.50 ms'
     before = time.time_ns()
     ((came, took),) = brakes_in(line + told)
     assert took == 20.5
     assert before <= came + 20_500_000 <= time.time_ns()
-    assert brakes_in(line + told.replace('; published', '; braking is not proven; published'))
-    assert brakes_in(line + 'goes on') == []
+    assert brakes_in(line + told.replace('; published', '; the stop is not proven; published'))
+    assert brakes_in(line + 'motion continues') == []
 
 
 def test_brakes_are_judged_apart_where_the_machine_ran():
-    figures = {'motions held against a new body': 'p50 0.2 ms', 'brakes': BRAKES}
+    figures = {'remaining motion checks': 'p50 0.2 ms', 'fail-safe stops': BRAKES}
     ms = 1_000_000
     still = united([(1003 * ms, 1020 * ms)], 10**10)
     quick = [(100 * k * ms, 3.0) for k in range(20, 120)]
