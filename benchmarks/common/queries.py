@@ -56,7 +56,7 @@ class Query:
     is_path_free: Callable[[Array], bool]
 
     def is_solved_by(self, waypoints: Array) -> bool:
-        """Return whether a path leads from the start to the goal and touches nothing."""
+        """Return whether a path leads from the start to the goal and is free."""
         ends = np.array([self.problem.q_start, self.problem.q_goals[0]])
         return bool(
             np.abs(waypoints[[0, -1]] - ends).max() < 1e-6 and self.is_path_free(waypoints)

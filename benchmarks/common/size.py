@@ -17,7 +17,7 @@ class Extent:
     n_edges : int
         Edges, or configurations, in such a loop.
     n_taut : int
-        Blocked queries whose shortened paths give taut edges.
+        Blocked queries whose shortcut paths give edges in contact.
     seeds : int
         Runs of our planners on each problem.
     improve_time : float
