@@ -67,20 +67,20 @@ class Client(Node):
             markers.append(marker)
         for marker in markers:
             marker.header.frame_id = FRAME
-        self._tell(self._body, MarkerArray(markers=markers))
+        self._publish_acked(self._body, MarkerArray(markers=markers))
 
     def publish_target(self, target: Array) -> None:
         """Publish a target [m]."""
         message = PointStamped()
         message.header.frame_id = FRAME
         message.point.x, message.point.y, message.point.z = target.tolist()
-        self._tell(self._target, message)
+        self._publish_acked(self._target, message)
 
     def publish_joints(self, names: tuple[str, ...], q: Array) -> None:
         """Publish where the arm is, at rest [rad]."""
         still = [0.0] * len(names)
         message = JointState(name=list(names), position=q.tolist(), velocity=still)
-        self._tell(self._joints, message)
+        self._publish_acked(self._joints, message)
 
     def ask(self) -> tuple[float, Trigger.Response]:
         """Return how long the planner takes to answer [s], and what it answers."""
@@ -94,7 +94,7 @@ class Client(Node):
             raise RrthError(f'planner node: no answer within {ANSWER:g} s')
         return elapsed, future.result()
 
-    def _tell(self, publisher: Any, message: Any) -> None:
+    def _publish_acked(self, publisher: Any, message: Any) -> None:
         end = time.monotonic() + ANSWER
         while publisher.get_subscription_count() == 0:
             if time.monotonic() > end:

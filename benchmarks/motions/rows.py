@@ -76,14 +76,14 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     arm, case, plan = table_1_arm(), motion.case, motion.plan
     path, trajectory = plan.path, plan.trajectory
     assert path is not None and trajectory is not None
-    told = verdict(
+    found = verdict(
         *(arm, case.scene, trajectory, limits),
         margin=MARGIN,
         ray_length=RAY,
         reach=plan.reach,
     )
-    if not told.is_increasing:
-        return told.columns()
+    if not found.is_increasing:
+        return found.columns()
     curve = curve_of(trajectory)
     pieces = [piece for part in planned_pieces(path, motion.chosen) for piece in part]
     q = derivative(curve, instants(curve), 0)
@@ -91,7 +91,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     unlimited = without_jerk(path, motion.rounded, limits)
     is_bent = any(blend.half_length > 0.0 for blend in motion.rounded)
     return {
-        **told.columns(),
+        **found.columns(),
         'duration': trajectory.duration,
         'duration_stopping': duration_stopping(path, motion.rounded, limits),
         'duration_unlimited': unlimited.duration,

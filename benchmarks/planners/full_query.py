@@ -98,7 +98,7 @@ def _runs(body: int, n: int, n_long: int) -> list[Row]:
     chosen = cases(body, n)
     for case in chosen:
         query(arm, case, np.random.default_rng(0))
-    # One after the other: what judges a path in between would leave no warm cache.
+    # One after the other: checking a path in between would leave no warm cache.
     with uncollected():
         timings = [
             timed(lambda case=case, rng=rng: query(arm, case, rng))

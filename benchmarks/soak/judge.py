@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a soak is judged by: motions by the reference checker, memory, answers; nothing of ROS but bytes."""
+"""The checks of a soak: motions by the reference checker, memory; nothing of ROS but bytes."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
