@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pages and sources say the field's words, not the private ones that once stood for them."""
 
+from functools import cache
 import io
 from os.path import relpath
 from pathlib import Path
@@ -46,6 +47,7 @@ ALLOWED = re.compile(
 )
 
 
+@cache
 def private_words(text):
     """Return (line within the text, private word, what to say instead) of each private word."""
     text = ALLOWED.sub('allowed', re.sub(r'(?<=[a-z0-9])(?=[A-Z])|[_-]', ' ', text))
@@ -108,9 +110,7 @@ def test_a_private_word_is_found_in_names_and_across_lines():
 
 def test_what_others_call_so_is_allowed():
     for text in (
-        '`ray_guard_length`',
-        'create_guard_condition',
-        'ConnectionRefusedError',
+        '`ray_guard_length`, create_guard_condition, ConnectionRefusedError',
         'an emergency-stop switch',
         '.tell',
         'A rest of 0.1 s; a look at it; the right way; the depth; a clean sample; grippers.',
