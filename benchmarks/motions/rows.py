@@ -13,14 +13,14 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.reproduction.row_store import replace_file
 
+from benchmarks.common.controller_curve import Curve, curve_of, derivative, instants
+from benchmarks.common.fcl_checker import least_distance, PERIOD
 from benchmarks.common.queries import table_1_arm
 from benchmarks.common.task import origin, Row
-from benchmarks.motions.curve import Curve, derivative, instants
-from benchmarks.motions.fcl import least_distance, PERIOD
-from benchmarks.motions.judge import curve_of, speed_ratios, verdict
 from benchmarks.motions.path import distances, planned_pieces
 from benchmarks.motions.plan import duration_stopping, Motion, without_jerk
 from benchmarks.motions.toppra_peer import optimal_duration
+from benchmarks.motions.verdict import speed_ratios, verdict
 from benchmarks.planners.full_query import MARGIN, RAY
 
 # A distance this much below the margin is rounding of python-fcl [m].

@@ -5,12 +5,13 @@
 import numpy as np
 from rrth_planner.model.arrays import Array
 
-from benchmarks.common.path_checker import is_arm_path_free, SPACING
+from benchmarks.common import dense_checker
+from benchmarks.common.numpy_checker import is_arm_path_free, SPACING
 from benchmarks.common.queries import table_1_arm, wearer, wearer_world
 from benchmarks.common.random_draws import random_edges
 from benchmarks.common.size import Extent
 from benchmarks.common.task import figure_row, Row, Task
-from benchmarks.planners import dense_checker, loops
+from benchmarks.planners import loops
 
 # Edges in one task.
 BATCH = 50_000

@@ -10,12 +10,13 @@ from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
 from rrth_planner.planning.problem import PlanningProblem
 
+from benchmarks.common import dense_checker
 from benchmarks.common.clock import repeated
 from benchmarks.common.queries import table_1_arm, wearer, wearer_world
 from benchmarks.common.random_draws import free_configurations
 from benchmarks.common.size import Extent
 from benchmarks.common.task import figure_row, Row, Task
-from benchmarks.planners import dense_checker, loops
+from benchmarks.planners import loops
 
 # The shortcuts are checked at this spacing, not by the certificate, which would select the edges
 # that it can prove [rad].

@@ -12,8 +12,9 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 
+from benchmarks.common.controller_curve import positions_of
 from benchmarks.soak.body import BodyAt, HAND, scene_of_body
-from benchmarks.soak.judge import COARSE, MARGIN, RAY, SLACK, states_of
+from benchmarks.soak.judge import COARSE, MARGIN, RAY, SLACK
 
 BRAKED, WENT_ON = 'stopped', 'not stopped, which was not needed'
 LED_AWAY = 'not stopped: the arm was too near when the hand came, and its motion escaped'
@@ -78,7 +79,7 @@ def judge_episode(arm: ArmModel, episode: Episode) -> tuple[str, ...]:
         else:
             words.append(NOT_OVER)
     else:
-        q = states_of(episode.motion, COARSE)
+        q = positions_of(episode.motion, COARSE)
         left = q[min(len(q) - 1, round(episode.phase / COARSE)) :]
         words.append(word_of_going_on(arm, scene, left))
     contact = contact_word(arm, scene, episode)
@@ -124,7 +125,7 @@ def contact_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
     if first_contact(arm, hand, present, 0.0, 0.0) is not None:
         return PUT_ON
     if episode.followed:
-        braked = states_of(episode.followed[0], COARSE)
+        braked = positions_of(episode.followed[0], COARSE)
         if first_contact(arm, hand, braked, 0.0, 0.0) is not None:
             return TOO_LATE
     return HIT

@@ -11,12 +11,10 @@ import numpy as np
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 
-from benchmarks.motions.curve import derivative, instants
-from benchmarks.motions.judge import curve_of
+from benchmarks.common.controller_curve import positions_of
 
 MARGIN, RAY, SLACK = 0.02, 1.0, 1e-6
 # Between two instants at which a motion is sampled, and one in a hundred [s].
@@ -76,7 +74,7 @@ def verdict_on(
         To be kept [m].
 
     """
-    q = states_of(trajectory, period)
+    q = positions_of(trajectory, period)
     checked: list[Scene] = []
     for k, scene in enumerate(scenes):
         checked.append(scene)
@@ -92,14 +90,6 @@ def name_of(verdict: tuple[str, bool]) -> str:
     """Return what to call a verdict of `judge_bytes`."""
     word, is_brake = verdict
     return f'stop: {word}' if is_brake else word
-
-
-def states_of(trajectory: Trajectory, period: float) -> Array:
-    """Return where a controller takes the arm, every `period` [s] and at each point, [rad]."""
-    if len(trajectory.times) == 1:
-        return trajectory.positions
-    curve = curve_of(trajectory)
-    return derivative(curve, instants(curve, period), 0)
 
 
 def newest_before(sent: Sequence[int], time: int, n: int) -> list[int]:

@@ -12,12 +12,12 @@ pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
 from benchmarks import __main__ as starter
-from benchmarks.common import path_checker, random_draws
+from benchmarks.common import dense_checker, numpy_checker, random_draws
 from benchmarks.common.queries import load_query, MAPS, QUERIES, table_1_arm, wearer, wearer_world
 from benchmarks.common.rows import read_rows, write_rows
 from benchmarks.common.size import Extent, QUICK
 from benchmarks.common.task import figure_row, origin, path_row
-from benchmarks.planners import dense_checker, figures, harness, machine_speed, measures, table
+from benchmarks.planners import figures, harness, machine_speed, measures, table
 from benchmarks.planners.main import main
 from benchmarks.planners.report import report
 from benchmarks.planners.table import peer_lines, survival_lines, TARGET_HEADER, target_lines
@@ -133,7 +133,7 @@ def test_the_problems_are_valid_and_their_best_cost_can_be(name):
 def test_the_shortest_path_on_a_map_passes():
     from benchmarks.common.queries import load_map
 
-    assert path_checker.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
+    assert numpy_checker.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
 
 
 def test_the_dense_check_agrees_with_the_reference_checker():
@@ -141,11 +141,11 @@ def test_the_dense_check_agrees_with_the_reference_checker():
     starts = rng.uniform(*world.bounds, (60, 4))
     edges = random_draws.random_edges(rng, world, starts, rng.uniform(0.02, 0.3, 60))
     flags = dense_checker.colliding_edges(
-        table_1_arm(), wearer(), world.ray_length, 0.0, edges, path_checker.SPACING
+        table_1_arm(), wearer(), world.ray_length, 0.0, edges, numpy_checker.SPACING
     )
     assert 0 < flags.sum() < len(flags)
     for is_colliding, *edge in zip(flags, *edges, strict=True):
-        is_free = path_checker.is_arm_path_free(
+        is_free = numpy_checker.is_arm_path_free(
             table_1_arm(), wearer(), np.array(edge), world.ray_length, 0.0
         )
         assert is_free is not bool(is_colliding)

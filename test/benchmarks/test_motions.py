@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('fcl')
 
+from benchmarks.common.controller_curve import curve_of, derivative, greatest_jerk, instants
+from benchmarks.common.fcl_checker import least_distance
 from benchmarks.common.queries import wearer
-from benchmarks.motions.curve import derivative, greatest_jerk, instants
-from benchmarks.motions.fcl import least_distance
-from benchmarks.motions.judge import curve_of, verdict
 from benchmarks.motions.path import distances, planned_pieces
+from benchmarks.motions.verdict import verdict
 import numpy as np
 from rrth_planner.collision import reference_checker
 from rrth_planner.model.path import Path

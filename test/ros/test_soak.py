@@ -116,7 +116,7 @@ def test_a_motion_that_collides_is_caught(motion):
 def test_a_motion_within_the_margin_is_caught(motion):
     away = scene_of_body(BODY)
     clearance = reference_checker.least_clearance(
-        ARM, away, judge.states_of(motion, 1e-3), judge.RAY
+        ARM, away, judge.positions_of(motion, 1e-3), judge.RAY
     )
     margin = clearance + 0.005
     assert judge.verdict_on(ARM, [away, away], motion, margin=margin) == judge.NEAR
@@ -266,7 +266,7 @@ def test_figures_of_the_guard_are_held_to_its_targets():
 
 def episode(motion, body, **changes):
     """Return an episode of an arm that follows a motion in spite of a hand."""
-    q = judge.states_of(motion, 0.01)
+    q = judge.positions_of(motion, 0.01)
     fields = {
         'body': body,
         'motion': motion,

@@ -11,15 +11,15 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
-from benchmarks.common.task import Row
-from benchmarks.motions.curve import (
-    controller_curve,
+from benchmarks.common.controller_curve import (
     Curve,
+    curve_of,
     derivative,
     greatest_jerk,
     instants,
     whole_nanoseconds,
 )
+from benchmarks.common.task import Row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,16 +55,6 @@ class Verdict:
     def columns(self) -> Row:
         """Return the verdict as columns of a row."""
         return asdict(self)
-
-
-def curve_of(trajectory: Trajectory) -> Curve:
-    """Return the controller's curve of a trajectory whose times strictly increase."""
-    return controller_curve(
-        whole_nanoseconds(trajectory.times),
-        trajectory.positions,
-        trajectory.velocities,
-        trajectory.accelerations,
-    )
 
 
 def verdict(
