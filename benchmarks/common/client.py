@@ -30,7 +30,7 @@ START, ANSWER = 300.0, 30.0
 
 
 class Client(Node):
-    """Tells a planner node everything, and asks it."""
+    """Publishes the inputs of a planner node, and requests plans."""
 
     def __init__(self) -> None:
         """Connect to the planner's topics and service."""
@@ -39,8 +39,8 @@ class Client(Node):
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = self.create_publisher(JointState, 'joint_states', LATCHED)
         self._plan = self.create_client(Trigger, 'rrth_planner/plan')
-        # What was told last of each topic.
-        self.told: dict[str, Any] = {}
+        # The last message of each topic.
+        self.published: dict[str, Any] = {}
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
@@ -53,7 +53,7 @@ class Client(Node):
                 raise RrthError(f'planner node: not ready within {START:g} s')
             time.sleep(0.01)
 
-    def tell_body(self, scene: Scene) -> None:
+    def publish_body(self, scene: Scene) -> None:
         """Publish a wearer."""
         markers = [Marker(action=Marker.DELETEALL)]
         for box in scene.boxes:
@@ -67,20 +67,20 @@ class Client(Node):
             markers.append(marker)
         for marker in markers:
             marker.header.frame_id = FRAME
-        self._tell(self._body, MarkerArray(markers=markers))
+        self._publish_acked(self._body, MarkerArray(markers=markers))
 
-    def tell_target(self, target: Array) -> None:
+    def publish_target(self, target: Array) -> None:
         """Publish a target [m]."""
         message = PointStamped()
         message.header.frame_id = FRAME
         message.point.x, message.point.y, message.point.z = target.tolist()
-        self._tell(self._target, message)
+        self._publish_acked(self._target, message)
 
-    def tell_joints(self, names: tuple[str, ...], q: Array) -> None:
+    def publish_joints(self, names: tuple[str, ...], q: Array) -> None:
         """Publish where the arm is, at rest [rad]."""
         still = [0.0] * len(names)
         message = JointState(name=list(names), position=q.tolist(), velocity=still)
-        self._tell(self._joints, message)
+        self._publish_acked(self._joints, message)
 
     def ask(self) -> tuple[float, Trigger.Response]:
         """Return how long the planner takes to answer [s], and what it answers."""
@@ -94,7 +94,7 @@ class Client(Node):
             raise RrthError(f'planner node: no answer within {ANSWER:g} s')
         return elapsed, future.result()
 
-    def _tell(self, publisher: Any, message: Any) -> None:
+    def _publish_acked(self, publisher: Any, message: Any) -> None:
         end = time.monotonic() + ANSWER
         while publisher.get_subscription_count() == 0:
             if time.monotonic() > end:
@@ -102,7 +102,7 @@ class Client(Node):
             time.sleep(0.002)
         publisher.publish(message)
         publisher.wait_for_all_acked()
-        self.told[publisher.topic.rpartition('/')[2]] = message
+        self.published[publisher.topic.rpartition('/')[2]] = message
 
 
 T = TypeVar('T', bound=Client)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Something that a process of its own does on each processor, until it is told to end."""
+"""Something that a process of its own does on each processor, until it is asked to end."""
 
 from collections.abc import Callable
 from contextlib import suppress

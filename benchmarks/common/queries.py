@@ -23,7 +23,7 @@ from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.visibility_graph import shortest_path
 
-from benchmarks.common import path_checker
+from benchmarks.common import numpy_checker
 
 FOLDER = Path(__file__).parents[1] / 'problems'
 MAPS = ('c_shape', 'spiral', 'fence')
@@ -56,7 +56,7 @@ class Query:
     is_path_free: Callable[[Array], bool]
 
     def is_solved_by(self, waypoints: Array) -> bool:
-        """Return whether a path leads from the start to the goal and touches nothing."""
+        """Return whether a path leads from the start to the goal and is free."""
         ends = np.array([self.problem.q_start, self.problem.q_goals[0]])
         return bool(
             np.abs(waypoints[[0, -1]] - ends).max() < 1e-6 and self.is_path_free(waypoints)
@@ -98,7 +98,7 @@ def load_query(name: str) -> Query:
             is_map=True,
             problem=map_problem(box_map),
             best_cost=shortest_path(box_map)[0],
-            is_path_free=lambda waypoints: path_checker.is_map_path_free(box_map, waypoints),
+            is_path_free=lambda waypoints: numpy_checker.is_map_path_free(box_map, waypoints),
         )
     data, world = _arm_data(), wearer_world()
     query = data['queries'][name]
@@ -108,7 +108,7 @@ def load_query(name: str) -> Query:
         is_map=False,
         problem=problem,
         best_cost=query['best_cost'],
-        is_path_free=lambda waypoints: path_checker.is_arm_path_free(
+        is_path_free=lambda waypoints: numpy_checker.is_arm_path_free(
             table_1_arm(), wearer(), waypoints, world.ray_length, data['margin']
         ),
     )

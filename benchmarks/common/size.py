@@ -16,8 +16,8 @@ class Extent:
         Timings of each compiled loop.
     n_edges : int
         Edges, or configurations, in such a loop.
-    n_taut : int
-        Blocked queries whose shortened paths give taut edges.
+    n_shortcut : int
+        Blocked queries whose shortcut paths give edges in contact.
     seeds : int
         Runs of our planners on each problem.
     improve_time : float
@@ -29,7 +29,7 @@ class Extent:
     peer_seeds, peer_time : int, float
         Runs of each peer on each problem, and how long one that improves its path runs.
     n_certified, n_judged : int
-        Certified edges that are looked at densely, and those of them that the oracle judges too.
+        Certified edges that are checked densely, and those that the reference checker checks too.
     n_plans : int
         Requests to one node.
     cold_starts, warm_starts : int
@@ -41,7 +41,7 @@ class Extent:
 
     repeats: int = 30
     n_edges: int = 4000
-    n_taut: int = 300
+    n_shortcut: int = 300
     seeds: int = 100
     improve_time: float = 0.1
     n_queries: int = 1000
@@ -60,7 +60,7 @@ class Extent:
 QUICK = Extent(
     repeats=5,
     n_edges=1000,
-    n_taut=10,
+    n_shortcut=10,
     seeds=4,
     improve_time=0.05,
     n_queries=20,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.common.processors import OnEachProcessor
 from benchmarks.common.real_time import put_ahead
 
-# The clock is looked at so often; the machine stood still where that was so late [ns].
+# The clock is read so often; the machine stood still where that was so late [ns].
 PERIOD, LATE = 1_000_000, 1_000_000
 # Between two looks at whether it is over, which take much longer: they would be felt.
 LOOKS = 100
@@ -53,10 +53,10 @@ class Standstills:
         lengths = (self.ends - self.begins) * 1e-6
         share = 1e2 * self.within(0, 2**62) / self.span
         return (
-            'Threads that go before all others, one for each processor, looked at the clock every '
+            'Threads of the highest priority, one for each processor, read the clock every '
             f'millisecond: {len(lengths)} times one of them was a millisecond late or more, '
-            f'{share:.2f} % of the time all told and at most {lengths.max(initial=0.0):.1f} ms. '
-            'In such moments the machine stands still, whatever runs on it.'
+            f'{share:.2f} % of the time in all and at most {lengths.max(initial=0.0):.1f} ms. '
+            'In such moments the machine is stalled for every process.'
         )
 
 

@@ -35,7 +35,7 @@ RATES = (100.0, 500.0)
 SWING, REACH = 2.0, 1.2
 # What a node may take to start, and messages that do not count after a change [s].
 START, SETTLE = 30.0, 0.5
-# Where a motion is fast enough to tell the time from the position [rad/s].
+# Where a motion is fast enough to derive the time from the position [rad/s].
 FAST = 0.3
 
 

@@ -13,12 +13,11 @@ HEADER = ('Hz', 'arm', 'by', 'p50 [ms]', 'p99 [ms]', 'max [ms]', 'missed', 'of')
 COUNTS = ('missed', 'intervals')
 METHOD = """\
 - **published**: by the stamps of `joint_states`; **received**: when a subscriber in another
-  process got them. Figures are those of |interval - period|, and how many periods passed without a
-  message.
+  process got them. Figures are of |interval - period|; missed are periods without a message.
 - **bare loop**: a Python loop that does nothing but wait for each period, measured just before: no
   program in Python is steadier on this machine.
 - **positions**: how far the instant that a position belongs to is from its stamp, while the first
-  joint swings back and forth. A message that comes late tells where the arm was at its stamp."""
+  joint swings back and forth. A message that comes late has the position at its stamp."""
 
 
 def page(
@@ -50,7 +49,7 @@ def page(
     parts = [
         '# How steadily the playback publishes',
         f'Written by `{command}`; do not edit.\n{made["machine"]} ({made["n_cores"]} cores); '
-        f'Python {made["python_version"]}{commit}. Watcher and node run {scheduling()}; '
+        f'Python {made["python_version"]}{commit}. Subscriber and node run {scheduling()}; '
         f'{seconds:g} s a figure.',
         markdown_table(HEADER, lines),
         METHOD,

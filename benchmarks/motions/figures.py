@@ -12,9 +12,8 @@ import numpy as np
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.reproduction.row_store import replace_file
 
+from benchmarks.common.controller_curve import curve_of, derivative, instants
 from benchmarks.common.task import Row
-from benchmarks.motions.curve import derivative, instants
-from benchmarks.motions.judge import curve_of
 from benchmarks.motions.table import OPTIMUM, ratios, STOPPING, with_corners
 
 # Corners that the motion in the picture shall have.

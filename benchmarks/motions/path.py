@@ -10,7 +10,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.timing.corner_blends import Blend
 
-# Places on a bent piece from which the nearest is looked for, and steps of that search.
+# Places on a bent piece from which the nearest is searched, and steps of that search.
 STARTS, STEPS = 65, 5
 # A straight shorter than this is none: blends may take whole edges [rad].
 NONE = 1e-12

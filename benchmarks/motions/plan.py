@@ -72,11 +72,11 @@ class Motion:
 
 def default_limits() -> MotionLimits:
     """Return the limits that the node starts with."""
-    told = load_yaml(resource_path('config/planner.yaml'))['/**']['ros__parameters']
+    parameters = load_yaml(resource_path('config/planner.yaml'))['/**']['ros__parameters']
     return MotionLimits(
-        velocity=told['max_velocity'],
-        acceleration=told['max_acceleration'],
-        jerk=told['max_jerk'],
+        velocity=parameters['max_velocity'],
+        acceleration=parameters['max_acceleration'],
+        jerk=parameters['max_jerk'],
     )
 
 

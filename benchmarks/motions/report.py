@@ -23,32 +23,32 @@ from benchmarks.motions.table import (
 # Motions that are listed with what they break.
 LISTED = 25
 FIGURE_HEADER = ('what', 'mean', 'median', 'p90', 'p99', 'greatest')
-FAULT_HEADER = ('wearer', 'query', 'what', 'most over a limit', 'off the path [rad]', 'touches')
+FAULT_HEADER = ('wearer', 'query', 'what', 'most over a limit', 'off the path [rad]', 'collides')
 METHOD = """\
 - **Queries** are drawn like those of [performance.md](performance.md), round other wearers: each
   can be answered. Planned by `pipeline.plan_motion` with default limits and options, a margin of
   2 cm and 1 m of the ray kept clear.
 - **Motions with corners** are those of the random queries and of further ones, round further
   wearers, until there are enough; of the further queries those answered by a straight motion are
-  left out. What may never happen is counted over all motions, shares and ratios "with corners"
+  left out. Violations are counted over all motions, shares and ratios "with corners"
   over these, all else over the random queries alone.
 - **The curve** is what joint_trajectory_controller interpolates by the numbers of the message,
   computed as its source does, in seconds and whole nanoseconds; nothing of it comes from
-  `rrth_planner.model.trajectory`. It is looked at every 0.2 ms and at both sides of every point;
-  jerk is the third derivative of each quintic, greatest exactly.
-- **Touching** is judged by plain numpy that shares nothing with the planner: bars of the arm
+  `rrth_planner.model.trajectory`. It is sampled every 0.2 ms and at both sides of every point;
+  jerk is the exact maximum of the third derivative of each quintic.
+- **Collision** is checked by plain numpy that shares nothing with the planner: bars of the arm
   against the boxes grown by the margin, at the end with the ray out to the target.
 - **Off the planned path** is the distance of the curve, at the same instants, from the straight
   edges and the rounded corners of the path.
-- **Stopping** is the same path from rest to rest, edge by edge. The target is a share of the two
-  mean durations, of the motions that have corners: where there is none, there is nowhere to stop.
-  The mean of the shares of the motions one by one stands among the figures. A motion that
-  stops although corners could be rounded does so because it is faster.
+- **Stopping** is the same path from rest to rest, edge by edge. The target is the ratio of the two
+  mean durations, of the motions that have corners. The mean of the ratios of the single motions is
+  among the figures. A motion that stops although corners could be rounded does so because it is
+  faster.
 - **toppra** gets the same rounded path with limits of velocity and acceleration on a fine grid
-  (constraints held at both ends of each interval); ours is timed on it with a jerk of 1e6 rad/s^3,
-  and whether it holds velocity and acceleration is looked at too.
+  (constraints at both ends of each interval); ours is timed on it with a jerk of 1e6 rad/s^3,
+  and its velocity and acceleration are checked too.
   Where a corner cannot be rounded both stop.
-- **python-fcl** is asked in the pipeline, and again by code of its own every 1 ms: distance of
+- **python-fcl** checks in the pipeline, and again by code of its own every 1 ms: distance of
   each bar from each box that is not clearly further away than the margin.
 - **Times** are taken in the pipeline, warm, on one pinned core, without the garbage collector."""
 
@@ -94,7 +94,7 @@ Written by `{command}`; do not edit.
 
 {METHOD}
 
-## Motions that break something
+## Motions that violate something
 
 {_faults(rows)}
 

@@ -13,14 +13,14 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.reproduction.row_store import replace_file
 
+from benchmarks.common.controller_curve import Curve, curve_of, derivative, instants
+from benchmarks.common.fcl_checker import least_distance, PERIOD
 from benchmarks.common.queries import table_1_arm
 from benchmarks.common.task import origin, Row
-from benchmarks.motions.curve import Curve, derivative, instants
-from benchmarks.motions.fcl import least_distance, PERIOD
-from benchmarks.motions.judge import curve_of, speed_ratios, verdict
 from benchmarks.motions.path import distances, planned_pieces
 from benchmarks.motions.plan import duration_stopping, Motion, without_jerk
 from benchmarks.motions.toppra_peer import optimal_duration
+from benchmarks.motions.verdict import speed_ratios, verdict
 from benchmarks.planners.full_query import MARGIN, RAY
 
 # A distance this much below the margin is rounding of python-fcl [m].
@@ -76,14 +76,14 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     arm, case, plan = table_1_arm(), motion.case, motion.plan
     path, trajectory = plan.path, plan.trajectory
     assert path is not None and trajectory is not None
-    told = verdict(
+    found = verdict(
         *(arm, case.scene, trajectory, limits),
         margin=MARGIN,
         ray_length=RAY,
         reach=plan.target_distance,
     )
-    if not told.is_increasing:
-        return told.columns()
+    if not found.is_increasing:
+        return found.columns()
     curve = curve_of(trajectory)
     pieces = [piece for part in planned_pieces(path, motion.chosen) for piece in part]
     q = derivative(curve, instants(curve), 0)
@@ -91,7 +91,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     unlimited = without_jerk(path, motion.rounded, limits)
     is_bent = any(blend.half_length > 0.0 for blend in motion.rounded)
     return {
-        **told.columns(),
+        **found.columns(),
         'duration': trajectory.duration,
         'duration_stopping': duration_stopping(path, motion.rounded, limits),
         'duration_unlimited': unlimited.duration,

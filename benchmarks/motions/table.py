@@ -43,9 +43,9 @@ def is_disputed(row: Row) -> bool:
     return row['fcl_distance'] is None or row['fcl_distance'] < MARGIN - TOLERANCE
 
 
-# By what a motion may break: whether a row does.
+# By each violation: whether a row has it.
 FAULTS: dict[str, Callable[[Row], bool]] = {
-    'touches the wearer': lambda row: bool(row['contact']),
+    'collides with the wearer': lambda row: bool(row['contact']),
     'over a limit by more than 1 %': lambda row: worst_ratio(row) > 1.0 + EXCESS,
     'not at rest at both ends': lambda row: row['is_at_rest'] is False,
     'not from the start to the end of its path': lambda row: row['is_at_ends'] is False,
@@ -67,7 +67,9 @@ def target_lines(rows: Sequence[Row]) -> list[list[str]]:
     bent, usual = with_corners(rows), [row for row in at_random(rows) if row['is_solved']]
     stopping = ratio_of_means(bent, 'duration', 'duration_stopping')
     lines = [
-        _count(rows, 'touches the wearer', f'motions of {len(rows)} with a sample that touches')
+        _count(
+            rows, 'collides with the wearer', f'motions of {len(rows)} with a sample in collision'
+        )
     ]
     for name in ('velocity', 'acceleration', 'jerk'):
         worst = column(rows, f'{name}_ratio').max(initial=0.0) - 1.0
@@ -157,8 +159,8 @@ def figure_lines(rows: Sequence[Row]) -> list[list[str]]:
         ('parameterise and certify [ms]', step_time(usual), 1e3, '.3f'),
         ('parameterise and certify, with corners [ms]', step_time(bent), 1e3, '.3f'),
         ('of that: round the corners [ms]', column(usual, 'time_round'), 1e3, '.3f'),
-        ('of that: time and prove [ms]', column(usual, 'time_prove'), 1e3, '.3f'),
-        ('second opinion, python-fcl [ms]', column(usual, 'time_second'), 1e3, '.3f'),
+        ('of that: parameterise and certify alone [ms]', column(usual, 'time_prove'), 1e3, '.3f'),
+        ('second check, python-fcl [ms]', column(usual, 'time_second'), 1e3, '.3f'),
         ('whole plan [ms]', column(usual, 'time_plan'), 1e3, '.3f'),
     ]
     return [

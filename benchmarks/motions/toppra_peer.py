@@ -54,7 +54,7 @@ class RoundedPath(AbstractGeometricPath):  # type: ignore[misc]
         return np.array([0.0, self._ends[-1]])
 
     def grid(self, refinement: int = 1) -> Array:
-        """Return the places at which toppra looks at the path, shape (n,) [rad]."""
+        """Return the grid points of toppra on the path, shape (n,) [rad]."""
         length = self._ends[-1]
         places = [length * ENDS, length * (1.0 - ENDS), [length]]
         for piece, end in zip(self._pieces, self._ends, strict=True):

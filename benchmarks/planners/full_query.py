@@ -16,7 +16,7 @@ from rrth_planner.planning.pointing_goals import FEW, goal_configurations, MANY,
 from rrth_planner.planning.result import PlanResult
 
 from benchmarks.common.clock import timed, uncollected
-from benchmarks.common.path_checker import is_arm_path_free
+from benchmarks.common.numpy_checker import is_arm_path_free
 from benchmarks.common.queries import table_1_arm
 from benchmarks.common.random_draws import free_configurations, random_target, random_wearer
 from benchmarks.common.size import Extent
@@ -98,7 +98,7 @@ def _runs(body: int, n: int, n_long: int) -> list[Row]:
     chosen = cases(body, n)
     for case in chosen:
         query(arm, case, np.random.default_rng(0))
-    # One after the other: what judges a path in between would leave no warm cache.
+    # One after the other: checking a path in between would leave no warm cache.
     with uncollected():
         timings = [
             timed(lambda case=case, rng=rng: query(arm, case, rng))

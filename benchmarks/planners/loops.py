@@ -59,7 +59,7 @@ def check_batches(world: World, starts: Array, ends: Array, flags: Array) -> Non
 
 
 def batch_size(length: float) -> int:
-    """Return how many configurations `check_batches` looks at on a free edge of a length [rad]."""
+    """Return how many configurations `check_batches` checks on a free edge of a length [rad]."""
     return int(length / SPACING) + 1
 
 
@@ -67,8 +67,8 @@ def peer_check(world: World, is_map: bool) -> Callable[..., bool]:
     """
     Return the check of an edge that a peer calls with the numbers of both ends.
 
-    Exact on a map; that of the arm looks at configurations 0.02 rad apart. Of an edge without
-    length it looks at the configuration.
+    Exact on a map; that of the arm checks configurations 0.02 rad apart, and an edge without
+    length at its configuration.
     """
     world = world if is_map else sampled(world, SPACING)
     check = getattr(world.edge_check, 'compiled', world.edge_check)

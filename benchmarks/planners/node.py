@@ -67,9 +67,9 @@ def _plans(n: int) -> list[Row]:
         for k in range(n):
             case = bodies[k // PER_BODY % len(bodies)][k % PER_BODY]
             if k % PER_BODY == 0:
-                client.tell_body(case.scene)
-            client.tell_joints(arm.joint_names, case.q_start)
-            client.tell_target(case.goal.target)
+                client.publish_body(case.scene)
+            client.publish_joints(arm.joint_names, case.q_start)
+            client.publish_target(case.goal.target)
             elapsed, answer = client.ask()
             child.check()
             if answer.success:
@@ -81,7 +81,7 @@ def _plans(n: int) -> list[Row]:
                 )
             else:
                 rows.append(
-                    figure_row('refusal', 1e3 * elapsed, 'ms', seed=k, detail=answer.message)
+                    figure_row('rejection', 1e3 * elapsed, 'ms', seed=k, detail=answer.message)
                 )
             if (k + 1) % SAMPLE == 0:
                 memory = process.memory_info().rss / 2**20
@@ -103,8 +103,8 @@ def _start(kind: str, seed: int) -> list[Row]:
             while not ready or 'ready after' not in ready[-1]:
                 child.check()
                 time.sleep(0.01)
-    told = [re.search(r'ready after ([0-9.]+) s', line) for line in ready]
-    own = [float(found.group(1)) for found in told if found]
+    matches = [re.search(r'ready after ([0-9.]+) s', line) for line in ready]
+    own = [float(found.group(1)) for found in matches if found]
     return [
         figure_row(f'{kind} start', elapsed, 's', seed=seed),
         *(figure_row(f'{kind} start by its own log', value, 's', seed=seed) for value in own),

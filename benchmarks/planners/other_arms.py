@@ -9,7 +9,7 @@ from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.planning.pointing_goals import check_pointing_arm
 
-from benchmarks.common.path_checker import is_arm_path_free
+from benchmarks.common.numpy_checker import is_arm_path_free
 from benchmarks.common.queries import wearer
 from benchmarks.common.random_draws import free_configurations, random_target
 from benchmarks.common.size import Extent

@@ -38,7 +38,7 @@ def _runs(name: str, planner: str, extent: Extent) -> list[Row]:
     options = _options(query, planner, extent.improve_time)
     for seed in range(N_WARM):
         plan(query.problem, options, np.random.default_rng(seed))
-    # One after the other: what judges a path in between would leave no warm cache.
+    # One after the other: checking a path in between would leave no warm cache.
     with uncollected():
         timings = [
             timed(lambda rng=rng: plan(query.problem, options, rng))

@@ -24,26 +24,26 @@ METHOD = """\
   node and client share all cores.
 - **Configurations and edges** are looped over in compiled code: configurations uniform within the
   limits, edges from free configurations into random directions; each number is a mean over
-  thousands. A batch is a free edge, whose configurations every 0.02 rad are asked
-  for; where a short proof holds for the whole edge it answers for all of them.
-- **Taut edges** are those of paths between random configurations that RRT-H pulled taut with a
-  check every 0.001 rad in place of the proof, so that the proof had no say in them; truly free
-  is what the oracle passes at 0.0005 rad. Of those that clear the boxes by 0.1 mm
+  thousands. A batch is a free edge, of which every configuration 0.02 rad apart is
+  checked; where a short proof holds for the whole edge it covers all of them.
+- **Shortcut edges** are those of paths between random configurations that RRT-H shortened with a
+  check every 0.001 rad in place of the certificate, so that it did not select them; truly free
+  is what the reference checker passes at 0.0005 rad. Of those that clear the boxes by 0.1 mm
   {room} are certified.
 - **First path** is that of two trees (RRT, certified edges) before shortening. **Within 1 %** and
   **0.02 %**: when the cost of RRT-H, improving for {budget} ms, first came there; the exact
   shortest on maps is that of the visibility graph.
-- **Full query**: nearest free postures that aim, plan, shorten, by the default options and a
+- **Full query**: nearest free goal configurations, path, shortening, by the default options and a
   margin of 2 cm; the packing of the boxes, once a body message, is not counted. A long run
-  tries 4096 draws of postures at once and several times 50 ms of growths.
-- **The node** is asked over its service by a client in another process; body, target and joints
+  tries 4096 draws of goal configurations at once and several times 50 ms of growths.
+- **The node** is called over its service by a client in another process; body, target and joints
   are published and acknowledged before. Memory is its resident set.
 - **ompl wheel**: the package from the index, its edges checked by one compiled callback an edge:
   exact on the maps, at configurations 0.02 rad apart on the arm. "Restarts" repeats RRTConnect and
   simplification and keeps the best path.
-- **Judge**: every path of everyone, its ends included, in plain numpy that shares nothing with a
-  planner: exact clipping on the maps, an instant every 0.0005 rad on the arm. The certified
-  edges are looked at by compiled code just as densely, a sample of them by the judge."""
+- **Reference checker**: every path of every planner, its ends included, in plain numpy that shares
+  nothing with a planner: exact clipping on the maps, a sample every 0.0005 rad on the arm. The
+  certified edges are checked by compiled code just as densely, some by the reference checker."""
 
 
 def report(rows: Sequence[Row], command: str, machine: str, pictures: Mapping[str, str]) -> str:
@@ -84,7 +84,7 @@ Written by `{command}`; do not edit.
 
 ## What is measured, and how
 
-{METHOD.format(room=_taut_room(rows), budget=_budget(rows))}
+{METHOD.format(room=_shortcut_room(rows), budget=_budget(rows))}
 
 ## Peers
 
@@ -95,7 +95,7 @@ there. "OMPL, C++" are lines of a C++ program over the OMPL library, given with
 
 {markdown_table(PEER_HEADER, peer_lines(rows))}
 
-## Paths that survive the judge
+## Paths that pass the reference checker
 
 {markdown_table(SURVIVAL_HEADER, survival_lines(rows))}
 
@@ -113,8 +113,8 @@ def _has(rows: Sequence[Row], source: str) -> bool:
     return any(row['source'] == source for row in rows)
 
 
-def _taut_room(rows: Sequence[Row]) -> str:
-    shares = figures(rows, 'taut edges certified, 0.1 mm clear')
+def _shortcut_room(rows: Sequence[Row]) -> str:
+    shares = figures(rows, 'shortcut edges certified, 0.1 mm clear')
     return f'{100.0 * shares[0]:.2f} %' if len(shares) else '(not measured)'
 
 
@@ -126,11 +126,17 @@ def _budget(rows: Sequence[Row]) -> str:
 def _edges_sentence(rows: Sequence[Row]) -> str:
     counts = {
         name: int(figures(rows, f'certified edges{name}').sum())
-        for name in ('', ' that touch', ' judged', ' that touch by the oracle')
+        for name in (
+            '',
+            ' that collide',
+            ' sampled',
+            ' that collide by the reference checker',
+        )
     }
     if not counts['']:
-        return 'Random certified edges were not looked at.'
+        return 'Random certified edges were not checked.'
     return (
-        f'Of {counts[""]} random certified edges {counts[" that touch"]} touch at 0.0005 rad; of '
-        f'{counts[" judged"]} of them the judge finds {counts[" that touch by the oracle"]}.'
+        f'Of {counts[""]} random certified edges {counts[" that collide"]} collide at 0.0005 rad; '
+        f'of {counts[" sampled"]} of them the reference checker finds '
+        f'{counts[" that collide by the reference checker"]}.'
     )

@@ -29,7 +29,7 @@ from benchmarks.planners import (
 
 _MODULES = {
     'checks': edge_checks,
-    'taut': shortened_edges,
+    'shortcut': shortened_edges,
     'plans': plans,
     'full query': full_query,
     'other arms': other_arms,

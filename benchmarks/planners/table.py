@@ -86,8 +86,8 @@ def _details(rows: Sequence[Row], target: Target) -> list[str]:
     """Return what the rows of a single figure say about it."""
     if target.statistic != 'mean' or target.measure != 'figure':
         return []
-    told = [row['detail'] for row in rows if row['quantity'] == target.name and row['detail']]
-    return [f'{text}.' for text in told]
+    details = [row['detail'] for row in rows if row['quantity'] == target.name and row['detail']]
+    return [f'{text}.' for text in details]
 
 
 def _pace(rows: Sequence[Row], target: Target, value: float) -> list[str]:
@@ -95,10 +95,10 @@ def _pace(rows: Sequence[Row], target: Target, value: float) -> list[str]:
     slow = slowness(rows)
     if slow is None or slow <= 1.0 or target.unit not in TIMES or not np.isfinite(value):
         return []
-    told = f'The C++ peer, too, takes {slow:.2f} times as long here'
+    pace = f'The C++ peer, too, takes {slow:.2f} times as long here'
     if value <= slow * target.limit:
-        return [f'{told}.']
-    return [f'{told}; at its pace it would be {_number(value / slow)} {target.unit}.']
+        return [f'{pace}.']
+    return [f'{pace}; at its pace it would be {_number(value / slow)} {target.unit}.']
 
 
 def _peer(rows: Sequence[Row], target: Target) -> str:
@@ -165,7 +165,7 @@ def _published_line(problem: str) -> list[str]:
 
 
 def survival_lines(rows: Sequence[Row]) -> list[list[str]]:
-    """Return how many paths of each planner survive the judge, columns as in SURVIVAL_HEADER."""
+    """Return how many paths of each planner pass the checker, columns as in SURVIVAL_HEADER."""
     lines = []
     for (source, planner), group in _groups(rows).items():
         cells = []

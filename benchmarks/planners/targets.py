@@ -15,16 +15,17 @@ WHY_NOT: Mapping[str, str] = {
         'an operation on eight numbers takes two passes.'
     ),
     'one configuration, in batches along an edge, p50': (
-        'Mostly one proof of the edge answers for its fifty configurations; where that is too '
-        'short, each of them is looked at.'
+        'Mostly one proof of the edge covers its fifty configurations; where that is too '
+        'short, each of them is checked.'
     ),
-    'full query: choose the posture, plan, shorten, p90': (
-        'What is left lies in the posture. Of ten queries over 1 %, seven come below it with 4096 '
-        'draws of postures, which take 0.3 ms instead of 0.03; one with ten times the growths.'
+    'full query: choose the goal configuration, plan, shorten, p90': (
+        'What is left is due to the goal configuration. Of ten queries over 1 %, seven come below '
+        'it with 4096 draws of these, which take 0.3 ms instead of 0.03; one with ten times the '
+        'growths.'
     ),
-    'full query: choose the posture, plan, shorten, p95': (
-        'Queries that no straight way answers: a growth takes 0.1 ms, pulling its path 0.2 ms, '
-        'and the best of them 1 ms or more to lean on the boxes.'
+    'full query: choose the goal configuration, plan, shorten, p95': (
+        'Queries that no straight edge answers: a growth takes 0.1 ms, its shortcuts 0.2 ms, '
+        'and the elastic band of the best of them 1 ms or more.'
     ),
     **dict.fromkeys(
         (f'first path, {name}, p50' for name in QUERIES),
@@ -32,28 +33,28 @@ WHY_NOT: Mapping[str, str] = {
     ),
     'within 0.02 % of the exact shortest, c_shape, p50': (
         'Some 20 us are the calls from Python and the result, as on a map where the straight line '
-        'is free; growth and pulling taut take the rest.'
+        'is free; growth and shortcuts take the remaining time.'
     ),
     'path, trajectory and both checks, over the service, p50': (
-        'A service that does nothing takes 0.6 ms when asked as often. Planning, timing and both '
-        'checks take the time named as planning in the node, two thirds of it in a loop that '
-        'does nothing else. The rest waits until the bodies that came are read, looks a second '
-        'time, and tells the motion.'
+        'A service that does nothing takes 0.6 ms when called as often. Planning, time '
+        'parameterization and both checks take the time named as planning in the node, two thirds '
+        'of it in a loop that does nothing else. In the remaining time the node reads the bodies '
+        'that came, revalidates the motion and publishes it.'
     ),
     'path, trajectory and both checks, over the service, p99': (
-        'Queries with several ways round, whose shortest path leans on the boxes for some ms; '
-        'paths with many corners take the second library up to 4 ms, and one query in 500 first '
+        'Queries with several homotopy classes, where the elastic band of the shortest path takes '
+        'some ms; paths with many corners take python-fcl up to 4 ms, and one query in 500 first '
         'fails with 5 mm to spare, which takes 80 ms.'
     ),
     **dict.fromkeys(
         (f'within 1 % of the best known, {name}, p50' for name in QUERIES),
-        'A path that is only pulled taut is some 2 % too long. The rest comes when it leans on '
-        'the boxes, which takes a millisecond and more.',
+        'After shortcuts alone a path is some 2 % too long. The elastic band, which shortens it '
+        'further, takes a millisecond and more.',
     ),
     'cold start of the node to service ready, p50': (
-        'Some 48 s of processor time for 130 kernels, by two processes: half of it the compiler, '
-        'half what hands it the kernels. More than a third of it are those that guard and stop '
-        'an arm in motion.'
+        'Some 48 s of processor time for 130 kernels, in two processes: half of it the compiler, '
+        'half its front end. More than a third of it is for the kernels that monitor and stop a '
+        'moving arm.'
     ),
 }
 
@@ -117,8 +118,8 @@ def _over(measure: str, what: str, statistic: str, limits: Mapping[str, float]) 
     ]
 
 
-_FULL = 'full query: choose the posture, plan, shorten'
-_PROVEN = 'certified edges that touch at 0.0005 rad'
+_FULL = 'full query: choose the goal configuration, plan, shorten'
+_PROVEN = 'certified edges that collide at 0.0005 rad'
 
 TARGETS = (
     _figure('one configuration', 'configuration, single', 90.0, 'ns', peer='70 ns, scalar C++'),
@@ -140,8 +141,8 @@ TARGETS = (
         for length, limit in (('0.3', 1.0), ('1', 1.8), ('3', 2.4))
     ),
     _figure(
-        'truly free taut edges certified',
-        'taut edges certified',
+        'truly free shortcut edges certified',
+        'shortcut edges certified',
         0.995,
         '',
         statistic='mean',
@@ -239,10 +240,10 @@ TARGETS = (
     ),
     _figure('cold start of the node to service ready', 'cold start', 20.0, 's'),
     _figure('warm start of the node to service ready', 'warm start', 2.0, 's'),
-    _figure(_PROVEN, 'certified edges that touch', 0.0, '', statistic='sum'),
+    _figure(_PROVEN, 'certified edges that collide', 0.0, '', statistic='sum'),
     _figure(
-        f'{_PROVEN}, by the oracle',
-        'certified edges that touch by the oracle',
+        f'{_PROVEN}, by the reference checker',
+        'certified edges that collide by the reference checker',
         0.0,
         '',
         statistic='sum',

@@ -46,7 +46,7 @@ def _run(options: argparse.Namespace) -> int:
     from benchmarks.common.real_time import is_real_time
     from benchmarks.common.standstill import StandstillWatch
     from benchmarks.soak.flood import FloodRecord, soak_floods
-    from benchmarks.soak.guard import soak_guard
+    from benchmarks.soak.monitor import soak_monitor
     from benchmarks.soak.plans import soak_plans
     from benchmarks.soak.report import draw_memory, report
 
@@ -60,7 +60,7 @@ def _run(options: argparse.Namespace) -> int:
     n_hands = QUICK_HANDS if options.quick else options.hands
     n_flooded = QUICK_FLOODED if options.quick else options.flooded
     longest = 60.0 * options.minutes if options.minutes else FOREVER
-    plans = guard = None
+    plans = monitor = None
     floods: list[FloodRecord] = []
     watch = StandstillWatch()
     with (
@@ -72,8 +72,8 @@ def _run(options: argparse.Namespace) -> int:
         if n_plans:
             plans = soak_plans(n_plans, longest, Path(name), is_alone=options.alone)
         if n_hands and not (plans and plans.is_interrupted):
-            guard = soak_guard(n_hands, longest, Path(name), is_alone=options.alone)
-        parts = [part for part in (plans, guard) if part]
+            monitor = soak_monitor(n_hands, longest, Path(name), is_alone=options.alone)
+        parts = [part for part in (plans, monitor) if part]
         if n_flooded and not any(part.is_interrupted for part in parts):
             floods = soak_floods(n_flooded, Path(name), is_alone=options.alone)
     default = Path('build/reliability.md' if options.quick else 'docs/reliability.md')
@@ -81,7 +81,7 @@ def _run(options: argparse.Namespace) -> int:
     target.parent.mkdir(parents=True, exist_ok=True)
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
-    text = report(plans, guard, _command(options), options.remark, watch.found, floods)
+    text = report(plans, monitor, _command(options), options.remark, watch.found, floods)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')

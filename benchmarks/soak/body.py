@@ -143,11 +143,11 @@ class BodyStream:
         due = time.monotonic()
         while not self._end.is_set():
             with self._lock:
-                self._tell()
+                self._publish_body()
             due = next_due(due, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
 
-    def _tell(self) -> None:
+    def _publish_body(self) -> None:
         phase = time.monotonic() - self._begin
         boxes = self._msg.markers[:-1]
         base = _wearer(abs(self._wearer)).boxes

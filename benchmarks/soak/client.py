@@ -111,10 +111,10 @@ class SoakClient(Client):
         """Leave the file."""
         self._file.close()
 
-    def tell_start(self, names: tuple[str, ...], q: Array, target: Array) -> None:
+    def publish_start(self, names: tuple[str, ...], q: Array, target: Array) -> None:
         """Publish where the arm is, at rest [rad], and where to point [m]."""
-        self.tell_joints(names, q)
-        self.tell_target(target)
+        self.publish_joints(names, q)
+        self.publish_target(target)
 
     def _on_motion(self, data: bytes, info: dict[str, Any]) -> None:
         received = time.time_ns()
@@ -135,7 +135,7 @@ class SoakClient(Client):
 
 def brakes_in(line: str) -> list[tuple[int, float]]:
     """
-    Return what a line of the log, read just now, tells of a brake; nothing of another one.
+    Return what a line of the log, read just now, says of a fail-safe stop; nothing of another one.
 
     That is when the body came, or a little later [ns], and how long after it came the trajectory
     was published [ms].

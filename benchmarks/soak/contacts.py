@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What came of a hand that was held into the way of the arm, judged by the oracle."""
+"""The outcome of a hand placed in the path of the arm, by the reference checker."""
 
 from dataclasses import dataclass
 
@@ -12,25 +12,30 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 
+from benchmarks.common.controller_curve import positions_of
 from benchmarks.soak.body import BodyAt, HAND, scene_of_body
-from benchmarks.soak.judge import COARSE, MARGIN, RAY, SLACK, states_of
+from benchmarks.soak.judge import COARSE, MARGIN, RAY, SLACK
 
-BRAKED, WENT_ON = 'braked', 'no brake, none was needed'
-LED_AWAY = 'no brake: the arm was too near when the hand came, and its motion led away'
-MISSED = 'no brake, though the rest of the motion came too near'
-PUT_ON = 'touched: the hand was put right onto the arm'
-TOO_LATE = 'touched: within the distance it takes to brake'
-TOUCHED = 'touched otherwise'
-RAY_ONLY = 'only the pointing ray touched'
-# The hand came between two of the instants at which a motion is looked at [m].
+BRAKED, WENT_ON = 'stopped', 'not stopped, which was not needed'
+LED_AWAY = 'not stopped: the arm was too near when the hand came, and its motion escaped'
+MISSED = 'not stopped, though the remaining motion violated the margin'
+PUT_ON = 'contact: the hand was put right onto the arm'
+TOO_LATE = 'contact: within the stopping distance'
+HIT = 'contact otherwise'
+RAY_ONLY = 'contact of the pointing ray only'
+# The hand came between two of the instants at which a motion is sampled [m].
 NEARER = 5e-3
-AGAIN, HELD, NOT_OVER = 'planned again and went on', 'held, and said why', 'not at rest in time'
+AGAIN, HELD, NOT_OVER = (
+    'planned again and continued',
+    'held, and reported why',
+    'not at rest in time',
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Episode:
     """
-    A hand that was held into the way of a motion, and what followed.
+    A hand placed in the path of a motion, and what followed.
 
     Parameters
     ----------
@@ -46,8 +51,8 @@ class Episode:
         These motions.
     times, positions : ndarray, shape (n,), (n, dof)
         Of the arm from just before the hand came [ns, rad].
-    guard : str
-        What the guard did at last.
+    monitor : str
+        The last state of the monitor.
 
     """
 
@@ -58,31 +63,31 @@ class Episode:
     followed: tuple[Trajectory, ...]
     times: NDArray[np.int64]
     positions: Array
-    guard: str
+    monitor: str
 
 
 def judge_episode(arm: ArmModel, episode: Episode) -> tuple[str, ...]:
-    """Return the words that hold of an episode."""
+    """Return the words for the outcome of an episode."""
     words = []
     scene = scene_of_body(episode.body)
     if episode.followed:
         words.append(BRAKED)
-        if episode.guard == 'holding':
+        if episode.monitor == 'holding':
             words.append(HELD)
-        elif episode.guard == 'no motion':
+        elif episode.monitor == 'no motion':
             words.append(AGAIN)
         else:
             words.append(NOT_OVER)
     else:
-        q = states_of(episode.motion, COARSE)
+        q = positions_of(episode.motion, COARSE)
         left = q[min(len(q) - 1, round(episode.phase / COARSE)) :]
         words.append(word_of_going_on(arm, scene, left))
-    touch = touch_word(arm, scene, episode)
-    return (*words, touch) if touch else tuple(words)
+    contact = contact_word(arm, scene, episode)
+    return (*words, contact) if contact else tuple(words)
 
 
 def word_of_going_on(arm: ArmModel, scene: Scene, left: Array) -> str:
-    """Return how it is that an arm was not stopped, from what was left of its motion."""
+    """Return why an arm was not stopped, from its remaining motion."""
     if first_contact(arm, scene, left, RAY, MARGIN - SLACK) is None:
         return WENT_ON
     gaps = [least_clearance(arm, scene, q[None], RAY) for q in left]
@@ -90,28 +95,28 @@ def word_of_going_on(arm: ArmModel, scene: Scene, left: Array) -> str:
 
 
 def sentence_on(arm: ArmModel, episode: Episode) -> str:
-    """Return when a hand came, what was published then, and what it touched."""
+    """Return when a hand came, what was published then, and what the arm collided with."""
     sent = episode.body.sent
-    told = ', '.join(f'{1e-6 * (published - sent):.1f}' for published, _ in episode.published)
+    delays = ', '.join(f'{1e-6 * (published - sent):.1f}' for published, _ in episode.published)
     after = episode.times >= sent
     scene, q = scene_of_body(episode.body), episode.positions[after]
-    touch = first_contact(arm, scene, q, 0.0, 0.0)
-    contact = ''
-    if touch is not None:
-        late = 1e-6 * (episode.times[after][touch.index] - sent)
-        contact = f'; bar {touch.bar} seen to touch box "{touch.box}" {late:.1f} ms after it'
+    contact = first_contact(arm, scene, q, 0.0, 0.0)
+    place = ''
+    if contact is not None:
+        late = 1e-6 * (episode.times[after][contact.index] - sent)
+        place = f'; bar {contact.bar} collides with box "{contact.box}" {late:.1f} ms after it'
     return (
         f'the hand came {episode.phase:.3f} s after the begin of a motion of '
-        f'{episode.motion.duration:.3f} s, motions were published {told or "no"} ms after it'
-        f'{contact}'
+        f'{episode.motion.duration:.3f} s, motions were published {delays or "no"} ms after it'
+        f'{place}'
     )
 
 
-def touch_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
-    """Return how the arm touched the body after the hand came; empty where it did not."""
+def contact_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
+    """Return the contact of the arm with the body after the hand came; empty where none."""
     after = episode.times >= episode.body.sent
     q = episode.positions[after]
-    # A ray has no body: it is reported, but it is not the arm that touches.
+    # A ray has no body: it is reported, but it is no contact of the arm.
     if first_contact(arm, scene, q, 0.0, 0.0) is None:
         return RAY_ONLY if first_contact(arm, scene, q, RAY, 0.0) is not None else ''
     hand = Scene(tuple(box for box in scene.boxes if box.name == HAND))
@@ -120,7 +125,7 @@ def touch_word(arm: ArmModel, scene: Scene, episode: Episode) -> str:
     if first_contact(arm, hand, present, 0.0, 0.0) is not None:
         return PUT_ON
     if episode.followed:
-        braked = states_of(episode.followed[0], COARSE)
+        braked = positions_of(episode.followed[0], COARSE)
         if first_contact(arm, hand, braked, 0.0, 0.0) is not None:
             return TOO_LATE
-    return TOUCHED
+    return HIT

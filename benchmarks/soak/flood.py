@@ -63,13 +63,13 @@ def soak_floods(n: int, folder: Path, seed: int = 1, is_alone: bool = False) -> 
         put_ahead(*threads_of(NODE))
         rng = np.random.default_rng(seed)
         wearer, starts = free_starts(rng, 1)
-        client.tell_body(scene_of_body(BodyAt(0, -wearer, 0.0)))
-        client.tell_start(load_arm().joint_names, starts[0], random_target(rng))
+        client.publish_body(scene_of_body(BodyAt(0, -wearer, 0.0)))
+        client.publish_start(load_arm().joint_names, starts[0], random_target(rng))
         with (
             staying_off(threads_of(NODE)) if is_alone else nullcontext(),
-            tqdm(total=n * len(client.told), unit='plan', file=sys.stderr) as bar,
+            tqdm(total=n * len(client.published), unit='plan', file=sys.stderr) as bar,
         ):
-            for topic, message in list(client.told.items()):
+            for topic, message in list(client.published.items()):
                 records.append(FloodRecord(topic))
                 try:
                     with Flood(topic, message, folder) as flood:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a soak is judged by: motions by the oracle, memory, answers; nothing of ROS but bytes."""
+"""The checks of a soak: motions by the reference checker, memory; nothing of ROS but bytes."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
@@ -11,19 +11,17 @@ import numpy as np
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 
-from benchmarks.motions.curve import derivative, instants
-from benchmarks.motions.judge import curve_of
+from benchmarks.common.controller_curve import positions_of
 
 MARGIN, RAY, SLACK = 0.02, 1.0, 1e-6
-# Between two instants at which a motion is looked at, and one in a hundred [s].
+# Between two instants at which a motion is sampled, and one in a hundred [s].
 COARSE, FINE, EACH = 5e-3, 5e-4, 100
 # A motion keeps the margin from the newest body or the one before it, which may be on its way.
 IN_FLIGHT = 2
-FREE, OLDER, NEAR, TOUCHES = 'free', 'free of an older body', 'within the margin', 'touches'
+FREE, OLDER, NEAR, COLLIDES = 'free', 'free of an older body', 'within the margin', 'collides'
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,35 +69,27 @@ def verdict_on(
         The bodies before it was published, the newest first; taken as far as needed.
     trajectory : Trajectory
     period : float
-        Between two instants that are looked at [s].
+        Between two samples [s].
     margin : float
         To be kept [m].
 
     """
-    q = states_of(trajectory, period)
-    looked_at: list[Scene] = []
+    q = positions_of(trajectory, period)
+    checked: list[Scene] = []
     for k, scene in enumerate(scenes):
-        looked_at.append(scene)
+        checked.append(scene)
         if first_contact(arm, scene, q, RAY, margin - SLACK) is None:
             return FREE if k < IN_FLIGHT else OLDER
-    is_touching = all(
-        first_contact(arm, scene, q, RAY, 0.0) is not None for scene in looked_at[:IN_FLIGHT]
+    is_colliding = all(
+        first_contact(arm, scene, q, RAY, 0.0) is not None for scene in checked[:IN_FLIGHT]
     )
-    return TOUCHES if is_touching else NEAR
+    return COLLIDES if is_colliding else NEAR
 
 
 def name_of(verdict: tuple[str, bool]) -> str:
     """Return what to call a verdict of `judge_bytes`."""
     word, is_brake = verdict
-    return f'braking: {word}' if is_brake else word
-
-
-def states_of(trajectory: Trajectory, period: float) -> Array:
-    """Return where a controller takes the arm, every `period` [s] and at each point, [rad]."""
-    if len(trajectory.times) == 1:
-        return trajectory.positions
-    curve = curve_of(trajectory)
-    return derivative(curve, instants(curve, period), 0)
+    return f'stop: {word}' if is_brake else word
 
 
 def newest_before(sent: Sequence[int], time: int, n: int) -> list[int]:
@@ -110,12 +100,12 @@ def newest_before(sent: Sequence[int], time: int, n: int) -> list[int]:
 
 def judge_bytes(task: tuple[bytes, tuple, bool]) -> tuple[str, bool]:
     """
-    Return the verdict on a serialized motion, and whether it takes over, as brakes do.
+    Return the verdict on a serialized motion, and whether it is a handover, as stops are.
 
     Parameters
     ----------
     task : (bytes, tuple of BodyAt, bool)
-        The message, the bodies before it, and whether it is looked at finely.
+        The message, the bodies before it, and whether it is sampled finely.
 
     """
     from rclpy.serialization import deserialize_message

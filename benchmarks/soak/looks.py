@@ -70,7 +70,7 @@ def losses(looks: Sequence[Look], n_missing: int) -> list[Loss]:
     missing = [look.n_sent - look.n_heard for look in looks]
     lost = np.minimum.accumulate([n_missing, *reversed(missing)])[::-1].clip(min=0)
     times = [look.time for look in looks]
-    # Nothing tells when it was before the first look, or after the last one.
+    # Before the first look and after the last one the time is unknown.
     spans = zip([times[0], *times], [*times, times[-1]], strict=True)
     return [
         Loss(int(n), begin, end)

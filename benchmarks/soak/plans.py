@@ -166,7 +166,7 @@ def _ask(
                 bodies.change(wearer)
                 client.hear(SETTLE)
             q = starts[rng.integers(len(starts))]
-            client.tell_start(arm.joint_names, q, _target(rng, record.n_asked))
+            client.publish_start(arm.joint_names, q, _target(rng, record.n_asked))
             elapsed, answer = client.question()
             child.check()
             record.n_asked += 1

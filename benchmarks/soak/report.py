@@ -14,13 +14,13 @@ from benchmarks.common.real_time import scheduling
 from benchmarks.common.standstill import Standstills
 from benchmarks.common.task import origin
 from benchmarks.soak.flood import FloodRecord
-from benchmarks.soak.guard import GuardRecord
 from benchmarks.soak.judge import name_of
 from benchmarks.soak.looks import heard_by, Look, losses
+from benchmarks.soak.monitor import MonitorRecord
 from benchmarks.soak.plans import PlansRecord
 from benchmarks.soak.targets import (
     flood_target,
-    guard_targets,
+    monitor_targets,
     MOST_AGE,
     plan_targets,
     running_target,
@@ -28,7 +28,7 @@ from benchmarks.soak.targets import (
 
 # For so long after a hand came that was missed it is said whether the machine ran [ns].
 AFTERWARDS = 1_000_000_000
-# Of what may happen often the worst are told.
+# Of what may happen often the worst are listed.
 MOST_LISTED = 10
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
@@ -38,21 +38,21 @@ METHOD = """\
   behind the trunk, a new wearer every 1,000 plans. It asks back to back, each time for another
   free start, at rest, and another target; one in ten is so near that it may be out of reach. A
   call without an answer for 10 s counts as unanswered.
-- **Judged** is every trajectory that was published, braking ones too, by plain numpy that
-  shares nothing with the planner: the curve that a controller runs by the message, every 5 ms
+- **Checked** is every trajectory that was published, stops too, by plain numpy that
+  shares nothing with the planner: the curve that a controller interpolates, every 5 ms
   and, each hundredth, every 0.5 ms, against the boxes grown by the margin of 2 cm, 1 m of the
   ray included. It counts as free where it keeps the margin from the newest body that was sent
   before the planner's own time of publication, or from the one before it, which may have been
-  on its way.
+  in transit.
 - **Memory** is the resident set of the node every 20 plans; growth is the most after the first
   tenth of the samples less what it was then.
 - **Hands**: planner and playback run as processes. While a motion runs a cube appears where a
   bar of the arm or its ray is about to come, 0.05 s to 1.5 s ahead. The arm's joint states are
-  judged against the boxes without any margin until the arm rests. The time from the body to the
-  brake as the client sees it counts from the first body with the hand, even where going on was
-  less bad for a while; the node's own counts from when the middleware received the body that it
-  braked for, to when the trajectory was published.
-- `--awake`: a process of idle priority keeps each processor from falling asleep, as `idle=poll`
+  checked against the boxes without any margin until the arm is at rest. The time from body to
+  stop measured by the client counts from the first body with the hand, even where going on was
+  less bad for a while; the node's own counts from when the middleware received the body that
+  required the stop, to when the trajectory was published.
+- `--awake`: a process of idle priority keeps each processor out of idle states, as `idle=poll`
   of the kernel does. `--alone`: the planner node runs on the last processor, all else on the
   others, as with `taskset`; without, all run where the system puts them.
 - **Flooded**: another process repeats one message 2,000 times a second while the client asks
@@ -61,7 +61,7 @@ METHOD = """\
 
 def report(
     plans: PlansRecord | None,
-    guard: GuardRecord | None,
+    monitor: MonitorRecord | None,
     command: str,
     remark: str = '',
     still: Standstills | None = None,
@@ -70,10 +70,10 @@ def report(
     """Return the report in Markdown; a part that was not run is left out."""
     made = origin()
     commit = f', commit {made["commit"]}' if made['commit'] else ''
-    brakes = [brake for part in (plans, guard) if part for brake in part.brakes]
+    brakes = [brake for part in (plans, monitor) if part for brake in part.brakes]
     lines = [
         *(plan_targets(plans) if plans else []),
-        *(guard_targets(guard) if guard else []),
+        *(monitor_targets(monitor) if monitor else []),
         *([running_target(brakes, still)] if brakes and still else []),
         *([flood_target(floods)] if floods else []),
     ]
@@ -83,8 +83,8 @@ def report(
         f'Python {made["python_version"]}, numpy {made["numpy_version"]}, numba '
         f'{made["numba_version"]}{commit}. Client and nodes run {scheduling()}.',
         *(
-            ['**Interrupted**: what stands here is what had been seen until then.']
-            if any(part and part.is_interrupted for part in (plans, guard, *floods))
+            ['**Interrupted**: these are the figures up to then.']
+            if any(part and part.is_interrupted for part in (plans, monitor, *floods))
             else []
         ),
         *([still.sentence()] if still else []),
@@ -95,8 +95,8 @@ def report(
     if plans:
         parts += ['## Plans round a body that moves', _plans_text(plans, still)]
         parts += [f'![Memory of the planner node](images/reliability/{PICTURE})']
-    if guard:
-        parts += ['## Hands in the way of running motions', _guard_text(guard, still)]
+    if monitor:
+        parts += ['## Hands in the path of running motions', _monitor_text(monitor, still)]
     if floods:
         parts += ['## Topics that are flooded', _flood_text(floods)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
@@ -122,7 +122,7 @@ def _plans_text(plans: PlansRecord, still: Standstills | None) -> str:
             *_lateness(plans, still),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
-                [['call, as its client sees it', *_percentiles(np.array(plans.calls) * 1e3)]],
+                [['call, measured by its client', *_percentiles(np.array(plans.calls) * 1e3)]],
             ),
             *(f'- {k}: {v}' for k, v in plans.figures.items() if k in ('fail-safe stops',)),
         ]
@@ -148,7 +148,7 @@ def _lateness(plans: PlansRecord, still: Standstills | None) -> list[str]:
         lines.insert(
             0,
             f'- {len(old)} messages of diagnostics said that the body was {1e3 * MOST_AGE:.0f} ms '
-            f'old or older, {len(old) - len(ran)} of them only because the machine stood still',
+            f'old or older, {len(old) - len(ran)} of them only because the machine stalled',
         )
     return ['\n'.join(lines)] if lines else []
 
@@ -159,30 +159,30 @@ def _still_before(look: Look, still: Standstills | None) -> float:
     return 0.0 if still is None else 1e-9 * still.within(begin, look.time)
 
 
-def _guard_text(guard: GuardRecord, still: Standstills | None) -> str:
-    shown = [e for e in guard.episodes if e.published]
+def _monitor_text(monitor: MonitorRecord, still: Standstills | None) -> str:
+    shown = [e for e in monitor.episodes if e.published]
     sent, came = (
         np.array([(e.published[0][k] - e.body.sent) * 1e-6 for e in shown]) for k in (0, 1)
     )
-    counts = [[word, str(n)] for word, n in (*guard.outcomes.items(), *guard.said.items())]
+    counts = [[word, str(n)] for word, n in (*monitor.outcomes.items(), *monitor.said.items())]
     figures = [
-        [name, guard.figures.get(name, '')]
+        [name, monitor.figures.get(name, '')]
         for name in ('remaining motion checks', 'fail-safe stops')
     ]
     return '\n\n'.join(
         [
-            f'{len(guard.episodes)} hands in {guard.n_motions} motions.',
+            f'{len(monitor.episodes)} hands in {monitor.n_motions} motions.',
             markdown_table(('what', 'times'), counts),
             *(
                 f'- {word}: {sentence}{_stillness(still, sent_at, sent_at + AFTERWARDS)}'
-                for word, sent_at, sentence in guard.suspects
+                for word, sent_at, sentence in monitor.suspects
             ),
             markdown_table(("the node's own figures", ''), figures),
             markdown_table(
                 ('time [ms]', 'p50', 'p90', 'p99', 'most'),
                 [
-                    ['body sent to braking trajectory published', *_percentiles(sent)],
-                    ['body sent to braking trajectory received', *_percentiles(came)],
+                    ['body sent to fail-safe stop published', *_percentiles(sent)],
+                    ['body sent to fail-safe stop received', *_percentiles(came)],
                 ],
             ),
         ]
@@ -202,7 +202,7 @@ def _stillness(still: Standstills | None, begin: int, end: int) -> str:
     if still is None:
         return ''
     span = 1e-6 * (end - begin)
-    return f' (the machine stood still for {1e-6 * still.within(begin, end):.1f} of {span:.1f} ms)'
+    return f' (the machine stalled for {1e-6 * still.within(begin, end):.1f} of {span:.1f} ms)'
 
 
 def _percentiles(values: np.ndarray) -> list[str]:

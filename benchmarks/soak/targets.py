@@ -9,9 +9,9 @@ import numpy as np
 from benchmarks.common.standstill import Standstills
 from benchmarks.soak import contacts
 from benchmarks.soak.flood import FloodRecord
-from benchmarks.soak.guard import GuardRecord
 from benchmarks.soak.judge import FREE, growth_of
 from benchmarks.soak.looks import heard_by
+from benchmarks.soak.monitor import MonitorRecord
 from benchmarks.soak.plans import PlansRecord
 
 # A brake came while the machine ran where nothing stood still from so long before its body, whose
@@ -25,7 +25,7 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
     unsafe = sum(n for (word, _), n in plans.verdicts.items() if word != FREE)
     n_judged = sum(plans.verdicts.values())
     heard = heard_by(plans.figures)
-    refused = sum(int(v) for k, v in plans.figures.items() if k.startswith('rejected messages'))
+    rejected = sum(int(v) for k, v in plans.figures.items() if k.startswith('rejected messages'))
     growth = growth_of([m for _, m in plans.memory]).growth if plans.memory else np.nan
     age = max((look.age for look in plans.looks), default=np.nan)
     return [
@@ -33,35 +33,35 @@ def plan_targets(plans: PlansRecord) -> list[list[str]]:
         _line(
             'published motions that are not free of the body',
             '0',
-            f'{unsafe} of {n_judged} judged',
+            f'{unsafe} of {n_judged} checked',
             unsafe == 0 and n_judged == plans.n_motions,
         ),
         _line(
-            'bodies that were sent and not heard, or refused',
+            'bodies that were sent and not received, or rejected',
             '0',
-            f'{plans.n_sent - heard} of {plans.n_sent}, {refused} messages refused',
-            plans.n_sent == heard and refused == 0,
+            f'{plans.n_sent - heard} of {plans.n_sent}, {rejected} messages rejected',
+            plans.n_sent == heard and rejected == 0,
         ),
         _line('age of the body, at most', '50 ms', f'{1e3 * age:.0f} ms', age < MOST_AGE),
         _line('memory after the first tenth', '< 5 MB', f'{growth:+.2f} MB', growth < MOST_GROWTH),
-        _brake_line('body to braking trajectory in the busy node, p99', plans.figures),
+        _brake_line('body to fail-safe stop in the busy node, p99', plans.figures),
     ]
 
 
-def guard_targets(guard: GuardRecord) -> list[list[str]]:
-    """Return the lines of targets of the guard."""
-    held = _milliseconds(guard.figures.get('remaining motion checks', ''), 'p50')
-    bad = guard.outcomes[contacts.TOUCHED] + guard.outcomes[contacts.MISSED]
+def monitor_targets(monitor: MonitorRecord) -> list[list[str]]:
+    """Return the lines of targets of the monitor."""
+    held = _milliseconds(monitor.figures.get('remaining motion checks', ''), 'p50')
+    bad = monitor.outcomes[contacts.HIT] + monitor.outcomes[contacts.MISSED]
     return [
         _line(
-            'holding a running motion against a body, median',
+            'checking the remaining motion against a body, median',
             f'{RECERTIFIED} ms',
             f'{held:.3f} ms',
             held <= RECERTIFIED,
         ),
-        _brake_line('body to braking trajectory in the node, p99', guard.figures),
-        _line('contacts that braking could have avoided', '0', bad, bad == 0),
-        _line('arm that cannot go on', 'never', guard.stuck or 'never', not guard.stuck),
+        _brake_line('body to fail-safe stop in the node, p99', monitor.figures),
+        _line('contacts that a stop could have avoided', '0', bad, bad == 0),
+        _line('arm that cannot continue', 'never', monitor.stuck or 'never', not monitor.stuck),
     ]
 
 
@@ -71,7 +71,7 @@ def running_target(brakes: Sequence[tuple[int, float]], still: Standstills) -> l
     runs = [took for came, took in brakes if not still.within(came - EARLIER, came + MOMENT)]
     p99 = float(np.percentile(runs, 99, method='higher')) if runs else np.nan
     return _line(
-        'body to braking trajectory in either part, p99, of those that came while the machine ran',
+        'body to fail-safe stop in either part, p99, of those that came while the machine ran',
         f'{BRAKED:g} ms',
         f'{p99:.2f} ms, {len(runs)} of {len(brakes)} times',
         p99 <= BRAKED,

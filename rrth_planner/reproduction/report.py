@@ -70,7 +70,7 @@ def report(
     return f"""# What the paper says, and what we measure
 
 Zou et al. 2024, "Obstacle Avoidance Path Planning of a 4-DOF Weapon Arm Based on Improved RRT
-(RRT-H) Algorithm". Only its motion planning is looked at here.
+(RRT-H) Algorithm". Only its motion planning is considered here.
 
 Written by `{command}`; do not edit.
 {len(rows)} runs on {machine}; {versions}.
@@ -80,7 +80,7 @@ side by side. The paper gives no coordinates, step sizes or spacings: maps, targ
 ours (`config/maps`, `rrth_planner/reproduction/experiments.py`). Where it names none, the planners
 have one tree, uniform draws and a step of 10 on maps of 100 by 100. "RRT-H" is the method's three
 steps as corrected, without what the planner adds to them (`near_bias`, `corner_moves`), "as
-printed" the same steps word for word. Every path is judged by code that shares nothing with the
+printed" the same steps word for word. Every path is checked by code that shares nothing with the
 planners.
 Numbers are medians, with quartiles in brackets.
 
@@ -132,15 +132,16 @@ growth seldom takes the worse way, so that one more growth mostly mends it, with
 ## The arm's motions (section 6.2)
 
 Accumulated change of the four joint angles from the folded state to {len(extent.targets)} targets,
-each by the nearest free posture that aims at it; none is reached by a straight edge. RRT and RRT-H
+each by the nearest free goal configuration; none is reached by a straight edge. RRT and RRT-H
 come from the same growth (one tree, step {ARM_STEP} rad), mean over the targets and seeds.
 
 {arm_table(rows, extent)}
 
-Why they differ: the wearer, the mount, the targets and the postures are ours; the paper gives
-none. RRT's travel is a matter of its step, so the reductions depend on it too; joint by joint
-they depend on which joints the targets ask to move. After shortening only what the posture and
-the way round the body demand is left, which is why joint 2, which hardly has to move, loses most.
+Why they differ: the wearer, the mount, the targets and the goal configurations are ours; the paper
+gives none. RRT's travel depends on its step, and so do the reductions; joint by joint
+they depend on which joints the targets require to move. After shortening only the travel that the
+goal configuration and the detour round the body require is left, so joint 2, which hardly has to
+move, loses most.
 
 {target_table(rows, extent)}
 
@@ -150,11 +151,11 @@ the way round the body demand is left, which is why joint 2, which hardly has to
 {100 * RAY / POINTS_PER_BAR:g} cm, as the paper has them, and as many on each bar of the arm, where
 it gives no number.
 
-RRT-H with its edges checked in three ways, its paths judged every 0.002 rad by exact clipping
-against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A taut
-path leans on the body, so what a test does not see between two checks is where it touches. On
-maps the judge is exact, and RRT-H as printed is shown with check points every {SPARSE:g} and every
-{DENSE:g} map units.
+RRT-H with its edges checked in three ways, its paths verified every 0.002 rad by exact clipping
+against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A
+shortcut path is in contact with the boxes, so it collides where a sampled check has a gap. On maps
+the verification is exact, and RRT-H as printed is shown with check points every {SPARSE:g} and
+every {DENSE:g} map units.
 
 {mode_table(rows, extent)}
 

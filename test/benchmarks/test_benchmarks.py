@@ -12,12 +12,12 @@ pytest.importorskip('psutil')
 pytest.importorskip('matplotlib')
 
 from benchmarks import __main__ as starter
-from benchmarks.common import path_checker, random_draws
+from benchmarks.common import dense_checker, numpy_checker, random_draws
 from benchmarks.common.queries import load_query, MAPS, QUERIES, table_1_arm, wearer, wearer_world
 from benchmarks.common.rows import read_rows, write_rows
 from benchmarks.common.size import Extent, QUICK
 from benchmarks.common.task import figure_row, origin, path_row
-from benchmarks.planners import dense_checker, figures, harness, machine_speed, measures, table
+from benchmarks.planners import figures, harness, machine_speed, measures, table
 from benchmarks.planners.main import main
 from benchmarks.planners.report import report
 from benchmarks.planners.table import peer_lines, survival_lines, TARGET_HEADER, target_lines
@@ -85,7 +85,7 @@ def test_targets_are_met_missed_or_not_measured(tmp_path):
         [
             *(run_row(seed, 1.005 if seed < 19 else 1.05) for seed in range(20)),
             *(figure_row('configuration, single', v, 'ns', seed=v) for v in (95, 100, 105)),
-            figure_row('certified edges that touch', 0, ''),
+            figure_row('certified edges that collide', 0, ''),
         ],
     )
     near = 'runs within 1 % of the best known, lap'
@@ -97,7 +97,7 @@ def test_targets_are_met_missed_or_not_measured(tmp_path):
     assert (missed['measured'], missed['met']) == ('100 ns', '**no**')
     assert missed['why not'] == 'It is what it is.'
     assert line_of(rows, 'first path, lap', 'p50')['measured'] == 'not measured'
-    assert line_of(rows, 'certified edges that touch at 0.0005 rad', 'sum')['met'] == 'yes'
+    assert line_of(rows, 'certified edges that collide at 0.0005 rad', 'sum')['met'] == 'yes'
 
 
 def test_the_peers_of_the_same_rows_stand_beside_ours(tmp_path):
@@ -123,32 +123,32 @@ def test_the_problems_are_valid_and_their_best_cost_can_be(name):
     query = load_query(name)
     q_start, q_goal = query.problem.q_start, query.problem.q_goals[0]
     assert query.best_cost >= np.linalg.norm(q_goal - q_start)
-    # None of them is solved by a straight line, and the judge sees that.
+    # None of them is solved by a straight line, and the reference checker finds that.
     assert not query.problem.world.is_edge_valid(q_start, q_goal)
     assert not query.is_solved_by(np.array([q_start, q_goal]))
     assert query.is_path_free(q_start[None].repeat(2, axis=0))
     assert any(row['problem'] == name for row in harness.published()['rows'])
 
 
-def test_the_judge_passes_the_shortest_way_on_a_map():
+def test_the_shortest_path_on_a_map_passes():
     from benchmarks.common.queries import load_map
 
-    assert path_checker.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
+    assert numpy_checker.is_map_path_free(load_map('fence'), shortest_path(load_map('fence'))[1])
 
 
-def test_the_dense_look_agrees_with_the_judge():
+def test_the_dense_check_agrees_with_the_reference_checker():
     rng, world = np.random.default_rng(1), wearer_world()
     starts = rng.uniform(*world.bounds, (60, 4))
     edges = random_draws.random_edges(rng, world, starts, rng.uniform(0.02, 0.3, 60))
-    flags = dense_checker.touching_edges(
-        table_1_arm(), wearer(), world.ray_length, 0.0, edges, path_checker.SPACING
+    flags = dense_checker.colliding_edges(
+        table_1_arm(), wearer(), world.ray_length, 0.0, edges, numpy_checker.SPACING
     )
     assert 0 < flags.sum() < len(flags)
-    for is_touching, *edge in zip(flags, *edges, strict=True):
-        is_free = path_checker.is_arm_path_free(
+    for is_colliding, *edge in zip(flags, *edges, strict=True):
+        is_free = numpy_checker.is_arm_path_free(
             table_1_arm(), wearer(), np.array(edge), world.ray_length, 0.0
         )
-        assert is_free is not bool(is_touching)
+        assert is_free is not bool(is_colliding)
 
 
 def test_boxes_are_split_into_parts_of_the_same_volume():
@@ -209,7 +209,7 @@ def test_the_command_line_explains_itself(capsys):
     assert '--harness' in capsys.readouterr().out
 
 
-def test_a_harness_folder_without_lines_is_refused(tmp_path, capsys):
+def test_a_harness_folder_without_lines_is_rejected(tmp_path, capsys):
     assert main(['--only', 'harness', '--harness', str(tmp_path), '--output', str(tmp_path)]) == 1
     assert 'no one_*.jsonl' in capsys.readouterr().err
 

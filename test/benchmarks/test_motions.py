@@ -8,11 +8,11 @@ import pytest
 
 pytest.importorskip('fcl')
 
+from benchmarks.common.controller_curve import curve_of, derivative, greatest_jerk, instants
+from benchmarks.common.fcl_checker import least_distance
 from benchmarks.common.queries import wearer
-from benchmarks.motions.curve import derivative, greatest_jerk, instants
-from benchmarks.motions.fcl import least_distance
-from benchmarks.motions.judge import curve_of, verdict
 from benchmarks.motions.path import distances, planned_pieces
+from benchmarks.motions.verdict import verdict
 import numpy as np
 from rrth_planner.collision import reference_checker
 from rrth_planner.model.path import Path
@@ -96,22 +96,22 @@ def test_jerk_is_the_slope_of_acceleration_and_greatest_where_it_is():
 
 def test_a_right_motion_is_passed():
     trajectory, bound = straight()
-    told = judged(trajectory, bound)
-    assert (told.contact, told.is_at_rest, told.is_increasing) == ('', True, True)
-    for ratio in (told.velocity_ratio, told.acceleration_ratio, told.jerk_ratio):
+    found = judged(trajectory, bound)
+    assert (found.contact, found.is_at_rest, found.is_increasing) == ('', True, True)
+    for ratio in (found.velocity_ratio, found.acceleration_ratio, found.jerk_ratio):
         assert ratio == pytest.approx(1.0, abs=2e-3)
-    assert told.beyond_range == 0.0
-    assert told.n_points == len(trajectory.times)
+    assert found.beyond_range == 0.0
+    assert found.n_points == len(trajectory.times)
 
 
 def test_a_planted_excess_of_two_percent_is_found():
-    told = judged(*straight(1.02))
-    for ratio in (told.velocity_ratio, told.acceleration_ratio, told.jerk_ratio):
+    found = judged(*straight(1.02))
+    for ratio in (found.velocity_ratio, found.acceleration_ratio, found.jerk_ratio):
         assert ratio == pytest.approx(1.02, abs=2e-3)
 
 
-@pytest.mark.parametrize('gap, is_touching', [(0.005, True), (0.025, False)])
-def test_a_planted_touch_is_found_by_the_margin(gap, is_touching):
+@pytest.mark.parametrize('gap, is_colliding', [(0.005, True), (0.025, False)])
+def test_a_planted_collision_is_found_by_the_margin(gap, is_colliding):
     arm, (trajectory, bound) = table_1_arm(), straight()
     q = sample(trajectory, [0.37 * trajectory.duration])[0]
     # A small box beside the middle of the ray, square to it and to the way it moves.
@@ -126,14 +126,14 @@ def test_a_planted_touch_is_found_by_the_margin(gap, is_touching):
     axes[:, 1] /= np.linalg.norm(axes[:, 1])
     center = now.mean(axis=0) + (radius + gap + half) * beside
     scene = Scene((Box('planted', center, [2 * half] * 3, axes),))
-    told = judged(trajectory, bound, scene)
-    if is_touching:
-        assert 'planted' in told.contact
+    found = judged(trajectory, bound, scene)
+    if is_colliding:
+        assert 'planted' in found.contact
         places = instants(curve_of(trajectory), 1e-3)
         q = derivative(curve_of(trajectory), places, 0)
         assert least_distance(arm, scene, q, RAY, MARGIN) < MARGIN - 0.01
     else:
-        assert told.contact == ''
+        assert found.contact == ''
 
 
 def test_the_ray_is_judged_out_to_the_target_at_the_end_only():
@@ -158,9 +158,9 @@ def test_times_that_are_the_same_nanosecond_are_found():
     trajectory, bound = straight()
     times = np.array(trajectory.times)
     times[2] = times[1] + 1e-10
-    told = judged(replace(trajectory, times=times), bound)
-    assert not told.is_increasing
-    assert told.jerk_ratio == np.inf
+    found = judged(replace(trajectory, times=times), bound)
+    assert not found.is_increasing
+    assert found.jerk_ratio == np.inf
 
 
 def test_distances_from_the_rounded_path_are_those_of_a_dense_look():
@@ -187,12 +187,12 @@ def test_python_fcl_agrees_with_the_oracle_about_distances():
     n_near = 0
     for q in rng.uniform(*arm.bounds, (400, 4)):
         exact = reference_checker.least_clearance(arm, scene, q[None], RAY)
-        told = least_distance(arm, scene, q[None], RAY, MARGIN)
+        found = least_distance(arm, scene, q[None], RAY, MARGIN)
         if 1e-4 < exact < MARGIN:
             n_near += 1
-            assert told == pytest.approx(exact, abs=1e-5)
+            assert found == pytest.approx(exact, abs=1e-5)
         elif exact > MARGIN:
-            assert told > MARGIN - 1e-5
+            assert found > MARGIN - 1e-5
     assert n_near > 3
 
 

@@ -35,11 +35,11 @@ from benchmarks.soak.body import (  # noqa: E402
 )
 from benchmarks.soak.client import brakes_in  # noqa: E402
 from benchmarks.soak.flood import FloodRecord  # noqa: E402
-from benchmarks.soak.guard import GuardRecord  # noqa: E402
 from benchmarks.soak.looks import Look, look_at, Loss, losses  # noqa: E402
+from benchmarks.soak.monitor import MonitorRecord  # noqa: E402
 from benchmarks.soak.plans import free_starts, PlansRecord  # noqa: E402
 from benchmarks.soak.report import draw_memory, report  # noqa: E402
-from benchmarks.soak.targets import guard_targets, plan_targets  # noqa: E402
+from benchmarks.soak.targets import monitor_targets, plan_targets  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
@@ -104,19 +104,19 @@ def plans(**changes):
     return replace(record, **changes)
 
 
-def test_a_motion_that_touches_is_caught(motion):
-    free, touched = scene_of_body(BODY), scene_of_body(hand_at(motion, 0.5))
+def test_a_motion_that_collides_is_caught(motion):
+    free, hit = scene_of_body(BODY), scene_of_body(hand_at(motion, 0.5))
     assert judge.verdict_on(ARM, [free, free], motion) == judge.FREE
-    assert judge.verdict_on(ARM, [touched, touched, touched], motion) == judge.TOUCHES
+    assert judge.verdict_on(ARM, [hit, hit, hit], motion) == judge.COLLIDES
     # Only the body before it may have been on its way.
-    assert judge.verdict_on(ARM, [touched, free], motion) == judge.FREE
-    assert judge.verdict_on(ARM, [touched, touched, free], motion) == judge.OLDER
+    assert judge.verdict_on(ARM, [hit, free], motion) == judge.FREE
+    assert judge.verdict_on(ARM, [hit, hit, free], motion) == judge.OLDER
 
 
 def test_a_motion_within_the_margin_is_caught(motion):
     away = scene_of_body(BODY)
     clearance = reference_checker.least_clearance(
-        ARM, away, judge.states_of(motion, 1e-3), judge.RAY
+        ARM, away, judge.positions_of(motion, 1e-3), judge.RAY
     )
     margin = clearance + 0.005
     assert judge.verdict_on(ARM, [away, away], motion, margin=margin) == judge.NEAR
@@ -128,7 +128,7 @@ def test_a_motion_is_judged_by_its_bytes(motion):
     hand = hand_at(motion, 0.5)
     for is_fine in (False, True):
         assert judge.judge_bytes((data, (BODY,), is_fine)) == (judge.FREE, True)
-        assert judge.judge_bytes((data, (hand, hand), is_fine)) == (judge.TOUCHES, True)
+        assert judge.judge_bytes((data, (hand, hand), is_fine)) == (judge.COLLIDES, True)
 
 
 def test_the_bodies_before_a_motion_are_found():
@@ -164,10 +164,10 @@ def test_each_fault_misses_its_target():
     leaking = [(time, 290.0 + time) for time, _ in FLAT]
     for changes, word in (
         ({'n_unanswered': 1}, 'answer'),
-        ({'verdicts': Counter({(judge.FREE, False): 1, (judge.TOUCHES, False): 1})}, 'free'),
+        ({'verdicts': Counter({(judge.FREE, False): 1, (judge.COLLIDES, False): 1})}, 'free'),
         ({'verdicts': Counter({(judge.FREE, False): 1})}, 'free'),
-        ({'n_sent': 8}, 'heard'),
-        ({'figures': FIGURES | {'rejected messages, body': '1'}}, 'heard'),
+        ({'n_sent': 8}, 'received'),
+        ({'figures': FIGURES | {'rejected messages, body': '1'}}, 'received'),
         ({'figures': FIGURES | {'fail-safe stops': BRAKES.replace('p99 4', 'p99 6')}}, 'busy'),
         ({'figures': FIGURES | {'fail-safe stops': '0, last 0 ms, p50 0 ms, p99 0 ms'}}, 'busy'),
         ({'looks': [Look(1, 0.01, 7, 7), Look(2, 0.06, 7, 7)]}, 'age'),
@@ -179,8 +179,8 @@ def test_each_fault_misses_its_target():
 
 
 def test_the_report_says_how_old_the_bodies_before_a_bad_motion_were():
-    bad = plans(suspects=[('braking: touches', 10**9, [0.0004, 0.0104])])
-    assert '- braking: touches: published 0.4, 10.4 ms after the bodies before' in report(
+    bad = plans(suspects=[('stop: collides', 10**9, [0.0004, 0.0104])])
+    assert '- stop: collides: published 0.4, 10.4 ms after the bodies before' in report(
         bad, None, ''
     )
 
@@ -195,13 +195,15 @@ def test_the_report_says_when_the_body_was_old_and_bodies_were_lost():
     late = plans(looks=looks, n_sent=301, figures=FIGURES | {'good messages, body': '299'})
     text = report(late, None, '', still=still)
     assert '- 1 messages of diagnostics said' in text
-    assert '50 ms old or older, 1 of them only because the machine stood still' in text
+    assert '50 ms old or older, 1 of them only because the machine stalled' in text
     assert '- the body was' not in text
-    assert '- bodies were lost: 1, between two messages of diagnostics (the machine stood' in text
-    assert ' still for 600.0 of 820.0 ms)' in text
+    assert (
+        '- bodies were lost: 1, between two messages of diagnostics (the machine stalled' in text
+    )
+    assert ' for 600.0 of 820.0 ms)' in text
     running = report(late, None, '', still=united([(1_000_000_000, 1_570_000_000)], 10**10))
     assert 'older, 0 of them' in running
-    assert '- the body was 625.0 ms old (the machine stood still for 570.0 of 625.0 ms)' in running
+    assert '- the body was 625.0 ms old (the machine stalled for 570.0 of 625.0 ms)' in running
     assert '- the body was 625.0 ms old\n' in report(late, None, '')
     many = [replace(looks[1], age=0.1 + 0.001 * k) for k in range(30)]
     assert report(plans(looks=many), None, '').count('- the body was') == 10
@@ -240,7 +242,7 @@ def test_a_look_is_read_from_diagnostics():
 
 
 def test_the_report_says_what_was_interrupted_and_has_its_picture(tmp_path):
-    text = report(plans(is_interrupted=True), GuardRecord(), 'some command')
+    text = report(plans(is_interrupted=True), MonitorRecord(), 'some command')
     assert 'some command' in text
     assert 'Interrupted' in text
     assert 'Interrupted' not in report(plans(), None, '')
@@ -253,18 +255,18 @@ def test_figures_of_the_guard_are_held_to_its_targets():
         'remaining motion checks': '9, last 1 ms, p50 0.200 ms, p99 1 ms, at most 2 ms',
         'fail-safe stops': BRAKES,
     }
-    assert unmet(guard_targets(GuardRecord(figures=figures))) == []
+    assert unmet(monitor_targets(MonitorRecord(figures=figures))) == []
     slow = {key: value.replace('p99 4', 'p99 6') for key, value in figures.items()}
-    assert unmet(guard_targets(GuardRecord(figures=slow))) == [
-        'body to braking trajectory in the node, p99'
+    assert unmet(monitor_targets(MonitorRecord(figures=slow))) == [
+        'body to fail-safe stop in the node, p99'
     ]
-    touched = GuardRecord(figures=figures, outcomes=Counter({contacts.TOUCHED: 1}))
-    assert len(unmet(guard_targets(touched))) == 1
+    hit = MonitorRecord(figures=figures, outcomes=Counter({contacts.HIT: 1}))
+    assert len(unmet(monitor_targets(hit))) == 1
 
 
 def episode(motion, body, **changes):
     """Return an episode of an arm that follows a motion in spite of a hand."""
-    q = judge.states_of(motion, 0.01)
+    q = judge.positions_of(motion, 0.01)
     fields = {
         'body': body,
         'motion': motion,
@@ -273,12 +275,12 @@ def episode(motion, body, **changes):
         'followed': (),
         'times': np.arange(len(q)) * 10_000_000 - 1,
         'positions': q,
-        'guard': 'no motion',
+        'monitor': 'no motion',
     }
     return contacts.Episode(**(fields | changes))
 
 
-def test_contacts_are_told_apart():
+def test_contacts_are_distinguished():
     q = free_starts(np.random.default_rng(0), 1)[1][0]
     long = swing(q, q + [0.0, 0.0, 0.0, 1.0])
     there, here = hand_at(long, 1.0), hand_at(long, 0.0)
@@ -287,9 +289,9 @@ def test_contacts_are_told_apart():
     far = swing(q, q + [0.8, 0.0, 0.0, 0.0])
     there = hand_at(far, 1.0)
     words = contacts.judge_episode(ARM, episode(far, there))
-    assert words == (contacts.MISSED, contacts.TOUCHED)
-    # A brake that touches itself came too late; one that does not was not followed.
-    for brake, word in ((far, contacts.TOO_LATE), (swing(q, q), contacts.TOUCHED)):
+    assert words == (contacts.MISSED, contacts.HIT)
+    # A stop that collides itself came too late; one that does not was not followed.
+    for brake, word in ((far, contacts.TOO_LATE), (swing(q, q), contacts.HIT)):
         found = episode(far, there, published=((1, 2),), followed=(brake,))
         assert contacts.judge_episode(ARM, found)[-1] == word
         assert 'motions were published 0.0 ms after it; bar ' in contacts.sentence_on(ARM, found)
@@ -409,7 +411,7 @@ def test_moments_of_several_processors_are_united():
     assert '0 times' in nothing.sentence()
 
 
-def test_a_stop_is_read_from_the_log():
+def test_a_brake_is_read_from_the_log():
     line = 'WARN: the remaining motion is not proven free of the wearer: '
     told = 'fail-safe stop, at rest in 0.12 s; published after 20.50 ms'
     before = time.time_ns()
@@ -427,20 +429,20 @@ def test_brakes_are_judged_apart_where_the_machine_ran():
     quick = [(100 * k * ms, 3.0) for k in range(20, 120)]
     # Slow since the machine stood still, and slow though it ran.
     for slow, is_met in (((1000 * ms, 21.0), True), ((1500 * ms, 21.0), False)):
-        guard = GuardRecord(figures=figures, brakes=[*quick[:50], slow])
+        monitor = MonitorRecord(figures=figures, brakes=[*quick[:50], slow])
         some = plans(brakes=[*quick[50:], slow])
-        text = report(some, guard, '', still=still)
+        text = report(some, monitor, '', still=still)
         (line,) = [line for line in text.splitlines() if 'in either part' in line]
         n, p99 = (100, '3.00') if is_met else (102, '21.00')
         assert f'{p99} ms, {n} of 102 times' in line
         assert ('**no**' in line) != is_met
-    assert 'in either part' not in report(plans(), GuardRecord(), '', still=still)
+    assert 'in either part' not in report(plans(), MonitorRecord(), '', still=still)
     suspects = [(contacts.MISSED, 1000 * ms, 'it came soon')]
-    text = report(None, GuardRecord(figures=figures, suspects=suspects), '', still=still)
-    assert '- no brake, though the rest of the motion came too near: it came soon (' in text
-    assert 'stood still for 17.0 of 1000.0 ms' in text
-    bad = plans(suspects=[('touches', 1010 * ms, [0.001, 0.011, 0.5])])
-    assert 'stood still for 7.0 of 11.0 ms' in report(bad, None, '', still=still)
+    text = report(None, MonitorRecord(figures=figures, suspects=suspects), '', still=still)
+    assert '- not stopped, though the remaining motion violated the margin: it came soon (' in text
+    assert 'stalled for 17.0 of 1000.0 ms' in text
+    bad = plans(suspects=[('collides', 1010 * ms, [0.001, 0.011, 0.5])])
+    assert 'stalled for 7.0 of 11.0 ms' in report(bad, None, '', still=still)
 
 
 @pytest.mark.parametrize('kind', [os.SCHED_RR, os.SCHED_FIFO, os.SCHED_OTHER])

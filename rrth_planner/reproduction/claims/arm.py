@@ -102,7 +102,7 @@ def mean_travel_of(rows: Rows) -> Array:
 
 
 def mode_table(rows: Rows, extent: Extent) -> str:
-    """Return how many paths each way to check collisions lets through that touch."""
+    """Return how many paths each way to check collisions lets through that collide."""
     lines = []
     names = (
         (CERTIFIED, 'certified (ours, default)'),
@@ -125,9 +125,15 @@ def mode_table(rows: Rows, extent: Extent) -> str:
     for problem in extent.maps:
         for name in (RRT_H, PRINTED, PRINTED_FINE):
             some = rows.where(problem=problem, algorithm=name)
-            touch = percent(1 - some.share('is_valid'), 1)
-            lines.append([problem, name, str(some.n_solved()), touch, 'no margin'])
-    header = ('problem', 'planner or check', 'paths', 'touch', 'touch without the margin')
+            share = percent(1 - some.share('is_valid'), 1)
+            lines.append([problem, name, str(some.n_solved()), share, 'no margin'])
+    header = (
+        'problem',
+        'planner or check',
+        'paths',
+        'in collision',
+        'in collision without the margin',
+    )
     return markdown_table(header, lines)
 
 

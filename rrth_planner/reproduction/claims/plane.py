@@ -98,9 +98,9 @@ def plane_claims(rows: Rows, extent: Extent) -> list[list[str]]:
             'After shortening it is below all.',
             extent.maps,
             _cost_after,
-            'Pulled taut, RRT-H stands within a thousandth of the exact shortest path of its way '
-            'round; each seed is compared with the same seed of each other planner. No path '
-            'counts as longer than any.',
+            'After shortcuts RRT-H is within a thousandth of the exact shortest path of its '
+            'homotopy class; each seed is compared with the same seed of each other planner. No '
+            'path counts as longer than any.',
         ),
         (
             f'It reaches a better path in a shorter time than {", ".join(OTHERS)} with {STEPS} '
@@ -125,7 +125,7 @@ def plane_claims(rows: Rows, extent: Extent) -> list[list[str]]:
             extent.maps,
             _costs_time(PRINTED_DENSE),
             f'RRT-H as printed, P_C every {DENSE:g} against every {SPARSE:g} map units, all else '
-            'the same: the same growths, then more points to look at. Compared seed by seed; '
+            'the same: the same growths, then more points to check. Compared seed by seed; '
             'undecided where as many are slower as a fair coin might bring.',
         ),
         (

@@ -10,9 +10,9 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.planning.visibility_graph import enters, extended_obstacles
 
-# Between two instants at which the arm is looked at [rad].
+# Between two instants at which the arm is checked [rad].
 SPACING = 5e-4
-# Instants that are looked at together: bounds the memory.
+# Instants that are checked together: bounds the memory.
 CHUNK = 20_000
 
 
@@ -20,7 +20,7 @@ def is_arm_path_free(
     arm: ArmModel, scene: Scene, waypoints: Array, ray_length: float, margin: float
 ) -> bool:
     """
-    Return whether the arm touches no box at any instant of a path, every 0.0005 rad.
+    Return whether the arm collides with no box at any instant of a path, every 0.0005 rad.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.trajectory import Trajectory
 
 NANOSECONDS = 1e9
 # Between two samples of a curve [s].
@@ -58,24 +59,17 @@ def whole_nanoseconds(times: Array) -> NDArray[np.int64]:
     return np.rint(np.asarray(times) * NANOSECONDS).astype(np.int64)
 
 
-def controller_curve(
-    nanoseconds: NDArray[np.int64], positions: Array, velocities: Array, accelerations: Array
-) -> Curve:
+def curve_of(trajectory: Trajectory) -> Curve:
     """
     Return the curve of a message, as `Trajectory::interpolate_between_points` computes it.
 
-    Parameters
-    ----------
-    nanoseconds : ndarray of int, shape (n + 1,)
-        `time_from_start` of each point, strictly increasing [ns].
-    positions, velocities, accelerations : ndarray, shape (n + 1, dof)
-        [rad, rad/s, rad/s^2].
-
+    The times of the trajectory must strictly increase.
     """
+    nanoseconds = whole_nanoseconds(trajectory.times)
     T = (np.diff(nanoseconds) / NANOSECONDS)[:, None]
-    p0, p1 = positions[:-1], positions[1:]
-    v0, v1 = velocities[:-1], velocities[1:]
-    a0, a1 = accelerations[:-1], accelerations[1:]
+    p0, p1 = trajectory.positions[:-1], trajectory.positions[1:]
+    v0, v1 = trajectory.velocities[:-1], trajectory.velocities[1:]
+    a0, a1 = trajectory.accelerations[:-1], trajectory.accelerations[1:]
     c = [
         p0,
         v0,
@@ -113,6 +107,14 @@ def derivative(curve: Curve, places: Instants, order: int) -> Array:
     for k in reversed(range(c.shape[1])):
         value = value * places.since[:, None] + c[places.pieces, k]
     return value
+
+
+def positions_of(trajectory: Trajectory, period: float) -> Array:
+    """Return where a controller takes the arm, every `period` [s] and at each point, [rad]."""
+    if len(trajectory.times) == 1:
+        return trajectory.positions
+    curve = curve_of(trajectory)
+    return derivative(curve, instants(curve, period), 0)
 
 
 def greatest_jerk(curve: Curve) -> Array:

@@ -34,7 +34,7 @@ def least_distance(
     ray_length : float
         How much of the ray counts as arm [m].
     margin : float
-        What is clearly further apart is not looked at [m].
+        What is clearly further apart is not checked [m].
 
     Returns
     -------

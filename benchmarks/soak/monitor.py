@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Part two of the soak: a hand is held into the way of running motions."""
+"""Part two of the soak: a hand is placed in the path of running motions."""
 
 from collections import Counter
 from contextlib import nullcontext
@@ -26,7 +26,7 @@ from benchmarks.common.random_draws import random_target
 from benchmarks.common.real_time import put_ahead, staying_off
 from benchmarks.soak.body import BodyStream, NO_HAND
 from benchmarks.soak.client import brakes_in, Published, SoakClient, threads_of
-from benchmarks.soak.contacts import Episode, judge_episode, MISSED, sentence_on, TOUCHED
+from benchmarks.soak.contacts import Episode, HIT, judge_episode, MISSED, sentence_on
 from benchmarks.soak.judge import RAY
 
 PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
@@ -36,30 +36,30 @@ SHARE, LEAD, SIDE = (0.05, 0.7), (0.05, 1.5), (0.05, 0.15)
 # A place that the arm moves so far to is in the way [m]; places that are tried.
 WAY, PLACES = 0.1, 40
 SHORTEST, LONGEST, SETTLE = 0.4, 12.0, 0.25
-# So many refusals in a row, and the arm is taken to be stuck.
+# So many rejections in a row, and the arm counts as stuck.
 STUCK = 100
 
 
 @dataclass(slots=True)
-class GuardRecord:
+class MonitorRecord:
     """
-    What was seen of the guard.
+    What was recorded of the monitor.
 
     Parameters
     ----------
-    n_motions, n_refused : int
-        That began, and requests that were refused.
+    n_motions, n_rejected : int
+        That began, and requests that were rejected.
     episodes : list of Episode
         A hand each.
     outcomes : Counter
         Of the words of `judge_episode`, and of how the motions went on.
     suspects : list of (str, int, str)
-        Of each hand that was missed or touched though it need not be: the word, when it came
+        Of each hand that was missed or hit though it need not be: the word, when it came
         [ns], and `sentence_on` it.
     brakes : list of (int, float)
         As from `brakes_in`.
     said : Counter
-        What the logs of both nodes say of brakes that are not safe and of refusals.
+        What the logs of both nodes say of stops that are not proven free and of rejections.
     figures : dict
         The last diagnostics.
     is_interrupted : bool
@@ -69,7 +69,7 @@ class GuardRecord:
     """
 
     n_motions: int = 0
-    n_refused: int = 0
+    n_rejected: int = 0
     episodes: list[Episode] = field(default_factory=list)
     outcomes: Counter = field(default_factory=Counter)
     suspects: list[tuple[str, int, str]] = field(default_factory=list)
@@ -80,24 +80,24 @@ class GuardRecord:
     stuck: str = ''
 
 
-def soak_guard(
+def soak_monitor(
     n: int, longest: float, folder: Path, seed: int = 1, is_alone: bool = False
-) -> GuardRecord:
+) -> MonitorRecord:
     """
-    Return what was seen of the guard within a time [s], with a hand for each of n motions.
+    Return what was recorded of the monitor within a time [s], with a hand for each of n motions.
 
     Where it is alone the planner has a processor for itself.
     """
-    record = GuardRecord()
+    record = MonitorRecord()
 
     def listen(line: str) -> None:
         record.brakes += brakes_in(line)
         if 'not proven free either' in line:
-            record.said['braking not proven safe'] += 1
+            record.said['stop not proven free'] += 1
         if 'motion continues' in line:
-            record.said['going on led away, braking would not'] += 1
+            record.said['continuing escaped, a stop would not'] += 1
         if 'joint_trajectory rejected' in line:
-            record.said['motions that the playback refused'] += 1
+            record.said['motions that the playback rejected'] += 1
 
     with (
         ros_client(lambda: SoakClient(folder)) as client,
@@ -123,7 +123,7 @@ def soak_guard(
     for episode in record.episodes:
         words = judge_episode(load_arm(), episode)
         record.outcomes.update(words)
-        for word in {MISSED, TOUCHED}.intersection(words):
+        for word in {MISSED, HIT}.intersection(words):
             sentence = sentence_on(load_arm(), episode)
             record.suspects.append((word, episode.body.sent, sentence))
     return record
@@ -132,32 +132,32 @@ def soak_guard(
 def _run(
     client: SoakClient,
     bodies: BodyStream,
-    record: GuardRecord,
+    record: MonitorRecord,
     n: int,
     longest: float,
     seed: int,
     children: tuple[ChildProcess, ...],
 ) -> None:
     rng, end = np.random.default_rng(seed), time.monotonic() + longest
-    refused = 0
+    rejected = 0
     with tqdm(total=n, unit='hand', file=sys.stderr, mininterval=2.0) as bar:
         while len(record.episodes) < n and time.monotonic() < end:
             for child in children:
                 child.check()
             client.motions.clear()
             client.states = client.states[-20:]
-            client.tell_target(random_target(rng))
+            client.publish_target(random_target(rng))
             _, answer = client.question()
             if answer is None or not answer.success:
-                record.n_refused += 1
+                record.n_rejected += 1
                 record.said[f'requests answered {answer and answer.message.split(" ")[0]}'] += 1
-                refused += 1
-                if refused == STUCK:
+                rejected += 1
+                if rejected == STUCK:
                     record.stuck = answer.message if answer else 'no answer'
                     return
                 client.hear(0.02)
                 continue
-            refused = 0
+            rejected = 0
             record.n_motions += 1
             client.hear(1.0, lambda: client.motions)
             motion = client.motions[-1]
@@ -175,7 +175,7 @@ def _episode(
     motion: Published,
     trajectory: Trajectory,
 ) -> Episode:
-    """Hold a hand into the way of a motion that has begun; return what happened."""
+    """Place a hand in the path of a motion that has begun; return what happened."""
     arm = load_arm()
     client.hear(rng.uniform(*SHARE) * trajectory.duration)
     phase = (time.time_ns() - motion.published) * 1e-9
@@ -196,7 +196,7 @@ def _episode(
         followed=tuple(_trajectory(client, m) for m in found),
         times=np.array([s[0] for s in states]),
         positions=np.array([s[1] for s in states]),
-        guard=client.figures['monitor'],
+        monitor=client.figures['monitor'],
     )
 
 
@@ -216,7 +216,7 @@ def _in_the_way(
 
 
 def _wait_for_rest(client: SoakClient) -> None:
-    """Return when the arm rests and the guard has nothing to watch any more."""
+    """Return when the arm is at rest and nothing is monitored any more."""
     client.hear(SETTLE)
 
     def is_over() -> bool:

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The strict judge of a timed motion, of the curve that a controller runs by its numbers."""
+"""The strict check of a timed motion: of the curve that a controller interpolates."""
 
 from dataclasses import asdict, dataclass
 
@@ -11,26 +11,26 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
-from benchmarks.common.task import Row
-from benchmarks.motions.curve import (
-    controller_curve,
+from benchmarks.common.controller_curve import (
     Curve,
+    curve_of,
     derivative,
     greatest_jerk,
     instants,
     whole_nanoseconds,
 )
+from benchmarks.common.task import Row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """
-    What the judge says of a motion.
+    The figures of a checked motion.
 
     Parameters
     ----------
     contact : str
-        Which bar touches which box, and when; empty where none does.
+        Which bar collides with which box, and when; empty where none does.
     velocity_ratio, acceleration_ratio, jerk_ratio : float
         The greatest magnitude of any joint over its limit [-].
     beyond_range : float
@@ -57,16 +57,6 @@ class Verdict:
         return asdict(self)
 
 
-def curve_of(trajectory: Trajectory) -> Curve:
-    """Return the controller's curve of a trajectory whose times strictly increase."""
-    return controller_curve(
-        whole_nanoseconds(trajectory.times),
-        trajectory.positions,
-        trajectory.velocities,
-        trajectory.accelerations,
-    )
-
-
 def verdict(
     arm: ArmModel,
     scene: Scene,
@@ -89,7 +79,7 @@ def verdict(
     margin : float
         Clearance to keep from every box [m].
     ray_length : float
-        How much of the ray is guarded in motion [m].
+        How much of the ray is checked in motion [m].
     reach : float
         How much of it must be clear at the end [m].
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A dense look at many edges, compiled, for an arm of revolute joints.
+A dense check of many edges, compiled, for an arm of revolute joints.
 
 Nothing is shared with the kernels: frames are multiplied out, bars are clipped by the slabs of the
-boxes. Stretches of an edge are passed at once where the arm at their middle does not touch the
-boxes grown by as much as any of its points moves until their ends.
+boxes. An interval of an edge is passed at once where the arm at its middle does not collide with
+the boxes grown by the most that any of its points moves until the ends.
 """
 
 from numba import njit
@@ -15,7 +15,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 
 
-def touching_edges(
+def colliding_edges(
     arm: ArmModel,
     scene: Scene,
     ray_length: float,
@@ -24,7 +24,7 @@ def touching_edges(
     spacing: float,
 ) -> Array:
     """
-    Return which edges touch a box at any of their instants, shape (n,).
+    Return which edges collide with a box at any of their samples, shape (n,).
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def touching_edges(
     assert not any(arm.is_prismatic)
     reach = float(np.abs(arm.dh[1:, [1, 3]]).sum() + ray_length)
     flags = np.zeros(len(edges[0]), dtype=np.bool_)
-    _look(
+    _check(
         arm.dh,
         arm.T_base_mount,
         ray_length,
@@ -62,7 +62,7 @@ def touching_edges(
 
 
 @njit(nogil=True)
-def _look(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, spacing, flags):
+def _check(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, spacing, flags):
     stack = np.empty((128, 2), np.int64)
     for e in range(starts.shape[0]):
         step = ends[e] - starts[e]
@@ -76,7 +76,7 @@ def _look(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, sp
             middle = (first + last) // 2
             q = starts[e] + middle / n * step
             growth = speed * max(last - middle, middle - first)
-            if not _touches(dh, T, ray, radii, centers, rotations, halves, q, growth):
+            if not _collides(dh, T, ray, radii, centers, rotations, halves, q, growth):
                 continue
             if first == last:
                 flags[e] = True
@@ -87,7 +87,7 @@ def _look(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, sp
 
 
 @njit(nogil=True)
-def _touches(dh, T, ray, radii, centers, rotations, halves, q, growth):
+def _collides(dh, T, ray, radii, centers, rotations, halves, q, growth):
     dof = q.shape[0]
     R, p = T[:3, :3].copy(), T[:3, 3].copy()
     turned, corner, end = np.empty((3, 3)), np.empty(3), np.empty(3)
@@ -104,9 +104,11 @@ def _touches(dh, T, ray, radii, centers, rotations, halves, q, growth):
             end[r] = corner[r] + d * z
         # The bars before the first joint are the mount's.
         if i > 0:
-            if a != 0.0 and _bar_touches(p, corner, radii[i] + growth, centers, rotations, halves):
+            if a != 0.0 and _bar_collides(
+                p, corner, radii[i] + growth, centers, rotations, halves
+            ):
                 return True
-            if _bar_touches(corner, end, radii[i] + growth, centers, rotations, halves):
+            if _bar_collides(corner, end, radii[i] + growth, centers, rotations, halves):
                 return True
         R[:] = turned
         p[:] = end
@@ -114,7 +116,7 @@ def _touches(dh, T, ray, radii, centers, rotations, halves, q, growth):
 
 
 @njit(nogil=True)
-def _bar_touches(first, last, growth, centers, rotations, halves):
+def _bar_collides(first, last, growth, centers, rotations, halves):
     for j in range(centers.shape[0]):
         enter, leave = 0.0, 1.0
         for axis in range(3):
