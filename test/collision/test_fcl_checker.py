@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The second opinion agrees with the kernels and finds what the oracle finds."""
+"""python-fcl agrees with the kernels and with the reference checker."""
 
 import numpy as np
 import pytest

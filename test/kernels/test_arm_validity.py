@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.certificate import derivative_bounds
-from rrth_planner.collision.reference_checker import bar_box_touch, bars, first_contact
+from rrth_planner.collision.reference_checker import bar_box_contact, bars, first_contact
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
@@ -103,7 +103,7 @@ def test_configurations_are_judged_as_by_the_oracle():
             ends, touched = bars(arm, q, RAY), np.zeros(len(q), dtype=bool)
             for box in scene.boxes:
                 half = 0.5 * box.size + MARGIN + arm.radii[0]
-                touched |= bar_box_touch(ends, box.center, box.rotation, half).any(axis=1)
+                touched |= bar_box_contact(ends, box.center, box.rotation, half).any(axis=1)
             assert np.array_equal(got, ~touched)
             assert 300 < np.sum(got) < 2450
 

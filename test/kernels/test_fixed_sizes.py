@@ -10,7 +10,7 @@ import re
 import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import tree_depth
-from rrth_planner.collision.reference_checker import bar_box_touch
+from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
 from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
@@ -201,7 +201,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         ends = oracle_bars(arm, q, 0.5)
         assert np.abs(kernel_bars(arm, world, q, 0.5) - ends[0]).max() < 1e-12
         touched = [
-            bar_box_touch(ends, b.center, b.rotation, 0.5 * b.size + MARGIN + 0.01).any()
+            bar_box_contact(ends, b.center, b.rotation, 0.5 * b.size + MARGIN + 0.01).any()
             for b in scene.boxes
         ]
         assert world.is_valid(q) == (not any(touched))
@@ -289,7 +289,7 @@ def test_as_many_boxes_as_there_is_room_for_are_judged_as_by_the_oracle():
             )
             half = np.full(3, 0.0025)
             touched |= any(
-                bar_box_touch(np.array([[[a, b]]]), c, np.eye(3), half).any()
+                bar_box_contact(np.array([[[a, b]]]), c, np.eye(3), half).any()
                 for c in rows[near, :3]
             )
         assert world.is_valid(q) == (not touched)

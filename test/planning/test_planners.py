@@ -541,7 +541,7 @@ def test_bars_of_the_oracle_touch_where_the_check_points_do():
     touching = np.zeros(len(q), dtype=bool)
     for box in scene.boxes:
         half = 0.5 * box.size
-        touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+        touching |= reference_checker.bar_box_contact(ends, box.center, box.rotation, half).any(
             axis=1
         )
     # A check point inside means a bar inside; a seventh of the colliding postures is missed.

@@ -360,7 +360,7 @@ def test_both_judges_are_asked_about_a_way_out_when_the_wearer_moved(
         wait_until(lambda: inputs.body.value is not body)
         for touch in touches:
             monkeypatch.setattr(
-                trajectory_validation, 'touch_on_way_out', lambda *_, touch=touch: touch
+                trajectory_validation, 'first_escape_violation', lambda *_, touch=touch: touch
             )
         return plan
 
