@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a command is called by whoever started it."""
+"""Name and output of a command."""
 
 from pathlib import Path
 import sys

@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         target = output / 'reproduction.md'
         replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     except KeyboardInterrupt:
-        print(f'interrupted; the next start goes on from {data}', file=sys.stderr)
+        print(f'interrupted; the next start continues from {data}', file=sys.stderr)
         return 130
     except (RrthError, OSError) as problem:
         tell('reproduce', str(problem))
@@ -121,10 +121,13 @@ def _parser() -> argparse.ArgumentParser:
         type=_positive,
         nargs='+',
         metavar='N',
-        help='timed runs of each planner on each map: fewest and most are told (10 100)',
+        help='timed runs per planner and map; the fewest and most are reported (10 100)',
     )
     parser.add_argument(
-        '--seeds', type=_positive, metavar='N', help='runs behind each share and draw (1000)'
+        '--seeds',
+        type=_positive,
+        metavar='N',
+        help='runs for each share and number of draws (1000)',
     )
     parser.add_argument('--maps', nargs='+', metavar='NAME', help='only these maps')
     parser.add_argument(
@@ -132,9 +135,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
-        '--scheduler', metavar='tcp://HOST:PORT', help='a dask scheduler (a local cluster)'
+        '--scheduler',
+        metavar='tcp://HOST:PORT',
+        help='address of a dask scheduler (default: a local cluster)',
     )
-    where.add_argument('--serial', action='store_true', help='all runs here, one after another')
+    where.add_argument('--serial', action='store_true', help='run all in this process, one by one')
     return parser
 
 

@@ -155,7 +155,7 @@ def test_a_joint_without_velocity_is_named(tmp_path, capsys):
         assert read_urdf.main([str(file_of(tmp_path, text)), *output]) == 0
         said.append([line for line in capsys.readouterr().out.split('\n') if 'max_vel' in line])
     ((line,), none) = said
-    assert '[?, 1.6, 1.6, 2.4, 2.4, 2.4]; it gives none for turn: write one' in line
+    assert '[?, 1.6, 1.6, 2.4, 2.4, 2.4]; none given for turn: replace' in line
     assert none == []
 
 
