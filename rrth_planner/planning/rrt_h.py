@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
+"""RRT-H: grow, shortcut, and repeat while avoiding earlier paths (Zou et al. 2024)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,7 @@ from rrth_planner.planning.result import PlanResult, Tree
 from rrth_planner.planning.rrt import grown_trees, plant, room_for
 
 TIGHTEN = jit.first_class(elastic_band.tighten)
-# Time between two looks at whether to stop [s].
+# Time between two checks of the deadline [s].
 SLICE = 0.005
 
 
@@ -34,7 +34,7 @@ def search(
     shorten: Any = TIGHTEN,
 ) -> PlanResult:
     """
-    Return the shortest path of some growths, each pulled taut.
+    Return the shortest path of some growths, each with shortcuts.
 
     The straight edges to the goals come first, nearest goal first: a length that no path to a
     later goal can beat ends the search. `shorten` is the seam `kernels.jit.SHORTEN`.
