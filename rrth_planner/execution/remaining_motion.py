@@ -172,7 +172,7 @@ def _is_rest_free(
         return world.is_valid(trajectory.positions[0], max(ray_guard_length, running.reach))
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
-        trajectory_check.is_rest_free(
+        trajectory_check.is_remaining_motion_free(
             trajectory.times,
             trajectory.positions,
             trajectory.velocities,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.reference_checker import bar_box_contact
-from rrth_planner.kernels.collision.bar_box import bar_box_distance, open_lanes, touched_lanes
+from rrth_planner.kernels.collision.bar_box import bar_box_distance, contact_lanes, open_lanes
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from worlds import examples, random_rotation
 
@@ -27,7 +27,7 @@ def packed(center, rotation, half):
 
 def touches(a, b, radius, boxes):
     """Return whether the bar a-b touches any box of the only group."""
-    return touched_lanes(np.array([*a, 0.0, *b, radius]), 0, boxes, 0) != 0
+    return contact_lanes(np.array([*a, 0.0, *b, radius]), 0, boxes, 0) != 0
 
 
 def is_open(points, bow_start, bow_end, radius, boxes):
@@ -118,7 +118,7 @@ def test_each_lane_is_judged_as_if_it_were_alone(cases):
             alone = [touches(p, q, 0.0, group) for group in groups[first : first + n]]
             together[:BOX_HALF, n:] = 0.0
             points = np.array([*p, 0.0, *q, 0.0])
-            bits = touched_lanes(points, 0, together.reshape(1, -1), 0)
+            bits = contact_lanes(points, 0, together.reshape(1, -1), 0)
             assert [bool(bits >> lane & 1) for lane in range(LANES)] == [*alone, False]
 
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.search.shortcut import pull_forward, pull_taut, TAUT
+from rrth_planner.kernels.search.shortcut import LEAST_GAIN, shortcut_forward, shortcut_path
 from rrth_planner.kernels.vectors import path_length
 from rrth_planner.planning.box_map import BoxMap, map_world
 from worlds import (
@@ -25,11 +25,11 @@ def raw():
     return raw_paths(wearer_world(), np.random.default_rng(44), 20)
 
 
-def taut(world, waypoints, spacing=0.01, room=64, enough=TAUT):
+def taut(world, waypoints, spacing=0.01, room=64, enough=LEAST_GAIN):
     path = np.full((room, 4), np.nan)
     path[: len(waypoints)] = waypoints
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    n = pull_taut(*seam, path, len(waypoints), spacing, enough)
+    n = shortcut_path(*seam, path, len(waypoints), spacing, enough)
     return path[:n]
 
 
@@ -106,6 +106,6 @@ def test_forward_goes_to_the_last_visible_point_whatever_is_how_thin(spacing, wi
     world = map_world(box_map)
     path = np.array([[0.0, 0.0], [0.0, 4.0], [8.0, 4.0]])
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    assert pull_forward(*seam, path, 3, spacing) == 3
+    assert shortcut_forward(*seam, path, 3, spacing) == 3
     assert path[1, 1] == 4.0
     assert 2.8 - spacing <= path[1, 0] <= 2.8 + 1e-5

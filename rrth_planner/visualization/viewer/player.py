@@ -60,7 +60,7 @@ class Player:
         return self if self.is_playing or self.time > 0.0 else self.at_end()
 
     def loaded(self, duration: float) -> 'Player':
-        """Return it in another motion [s]: at the beginning when playing, else at the same share."""
+        """Return it in another motion [s]: restarted when playing, else at the same share."""
         share = self.time / self.duration if self.duration > 0.0 else self.share
         time = 0.0 if self.is_playing else share * duration
         return replace(self, duration=duration, time=time, share=share)
