@@ -422,7 +422,7 @@ from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.planning.pointing_goals import goal_configurations, pointing_problem
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.kernels.clock import now
-from rrth_planner.kernels.collision.edge_contacts import edge_contacts, SLOPES
+from rrth_planner.kernels.collision.edge_contacts import edge_contacts, GRADIENT
 from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform
 from rrth_planner.kernels.search.sampling import draw_near
 from rrth_planner.planning.options import RRTHOptions
@@ -456,7 +456,7 @@ options = RRTHOptions(
     club_attempts=1, corner_moves=3, improve_time=1000.0, time_limit=1000.0
 )
 result = plan(problem, options, np.random.default_rng(3))
-contacts = np.empty((64, SLOPES + 4))
+contacts = np.empty((64, GRADIENT + 4))
 leans = []
 for a, b in zip(result.path.waypoints[:-1], result.path.waypoints[1:]):
     n = edge_contacts(a, b, world.chain, world.robot, world.obstacles, contacts)

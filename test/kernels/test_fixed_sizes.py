@@ -208,7 +208,7 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         n_free += not any(touched)
     assert 10 < n_free < 90
     proofs = {1: 0, 0: 0, -1: 0}
-    rows = np.empty((50, edge_contacts.SLOPES + n_joints))
+    rows = np.empty((50, edge_contacts.GRADIENT + n_joints))
     for _ in range(20):
         q = free_configuration(rng, world)
         step = rng.standard_normal(n_joints)
@@ -335,7 +335,7 @@ def test_an_edge_that_leans_on_more_than_there_is_room_for_finds_as_many_as_ther
     for _ in range(40):
         q_from, q_to = rng.uniform(*arm.bounds, (2, 4))
         for capacity in (0, 1, 7, elastic_band.MAX_CONTACTS):
-            rows = np.full((capacity + 2, edge_contacts.SLOPES + 4), 7.0)
+            rows = np.full((capacity + 2, edge_contacts.GRADIENT + 4), 7.0)
             n = edge_contacts.edge_contacts(
                 q_from, q_to, world.chain, world.robot, world.obstacles, rows[:capacity]
             )
@@ -378,7 +378,7 @@ def test_a_stretch_has_no_more_phases_than_there_is_room_for():
         v_from, v_to, top = np.sort(rng.uniform(0.0, 1.0, 3))
         cell = np.array([10.0 ** rng.uniform(-3, 1), top, *10.0 ** rng.uniform(-1, 2, 2)])
         phases = np.full((speed_profile.MOST_PHASES + 1, 2), 7.0)
-        n = speed_profile.stretch_phases(v_from, v_to, cell, phases[: speed_profile.MOST_PHASES])
+        n = speed_profile.cell_phases(v_from, v_to, cell, phases[: speed_profile.MOST_PHASES])
         assert (phases[-1] == 7.0).all()
         found.add(n)
     assert max(found) == speed_profile.MOST_PHASES

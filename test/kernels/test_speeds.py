@@ -41,7 +41,7 @@ def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     assert Ruckig(1).calculate(request, profile) in (Result.Working, Result.Finished)
     phases = np.empty((7, 2))
     cell = np.array([length, top, a_max, j_max])
-    n = speed_profile.stretch_phases(v_from, v_to, cell, phases)
+    n = speed_profile.cell_phases(v_from, v_to, cell, phases)
     assert phases[:n, 0].sum() == pytest.approx(profile.duration, rel=1e-5, abs=1e-6)
 
 

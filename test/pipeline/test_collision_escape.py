@@ -351,7 +351,7 @@ def second_opinion(arm, scene, world, trajectory):
     )
 
 
-def test_a_way_out_that_touches_for_the_second_judge_is_refused(monkeypatch):
+def test_an_escape_with_a_violation_by_python_fcl_is_rejected(monkeypatch):
     arm, scene = pressed()
     touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
     monkeypatch.setattr(trajectory_validation, 'first_escape_violation', lambda *_: touch)

@@ -18,7 +18,7 @@ from rrth_planner.model.trajectory import (
 )
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.corner_blends import Blend
-from rrth_planner.timing.fast_stop import fast_stop, ON_ITS_WAY
+from rrth_planner.timing.fast_stop import fast_stop, LATENCY
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
@@ -44,7 +44,7 @@ def check_stop(stop, motion, time, bounds):
     ticks = stop.times * 1e9
     assert np.abs(ticks - np.round(ticks)).max() < 1e-3
     # A controller that gets it late finds itself on it.
-    late = np.linspace(0.0, min(ON_ITS_WAY, stop.duration - 1e-7), 20)
+    late = np.linspace(0.0, min(LATENCY, stop.duration - 1e-7), 20)
     for got, running in zip(sample(stop, late), sample(motion, time + late), strict=True):
         np.testing.assert_allclose(got, running, rtol=1e-5, atol=1e-6)
 
@@ -89,10 +89,10 @@ def test_a_quick_stop_of_any_number_and_kind_of_joints_is_one(seed):
 
 def later_brake(motion, time):
     """Return how long a motion lasts that goes on for a little and is braked then [s]."""
-    later = time + ON_ITS_WAY
+    later = time + LATENCY
     if later >= motion.duration:
         return motion.duration - time
-    return ON_ITS_WAY + brake(motion, later, LIMITS).duration
+    return LATENCY + brake(motion, later, LIMITS).duration
 
 
 @pytest.mark.parametrize('make', [planned_motion, foreign_motion])
@@ -119,7 +119,7 @@ def test_a_quick_stop_of_an_arm_that_gets_faster_is_soon():
 def test_a_quick_stop_keeps_to_points_that_are_close_to_where_it_begins():
     motion = planned_motion(np.random.default_rng(4))
     for knot in motion.times[1:-1]:
-        for gap in (-ON_ITS_WAY - 3e-5, -ON_ITS_WAY, -ON_ITS_WAY + 3e-5, -3e-5, -3e-6, 0.0):
+        for gap in (-LATENCY - 3e-5, -LATENCY, -LATENCY + 3e-5, -3e-5, -3e-6, 0.0):
             time = max(0.0, knot + gap)
             stop = fast_stop(motion, time, LIMITS)
             assert stop.duration <= 1.2 * later_brake(motion, time) + 1e-3
