@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Incidents are played back: what happens again, what does not, and which judge says what."""
+"""Incidents are replayed: what is reproduced, what is not, and the results of the checkers."""
 
 from dataclasses import replace
 import os
@@ -43,7 +43,7 @@ QUESTION = PlanQuestion(
 
 
 def disagree(monkeypatch):
-    """Have python-fcl see a touch in every motion."""
+    """Have python-fcl find a violation in every motion."""
     monkeypatch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
 
 
@@ -236,7 +236,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],
 )
-def test_a_bad_file_is_refused_in_one_sentence(capsys, tmp_path, content, sentence):
+def test_a_bad_file_is_rejected_in_one_sentence(capsys, tmp_path, content, sentence):
     path = tmp_path / 'incident.yaml'
     if content is not None:
         path.write_text(content)

@@ -95,7 +95,7 @@ def check_certificate(arm, scene, trajectory):
     return certificate
 
 
-def test_no_trajectory_that_touches_is_certified():
+def test_no_trajectory_that_collides_is_certified():
     rng = np.random.default_rng(81)
     n_proven = n_touching = n_later = 0
     for i in range(250):
@@ -121,7 +121,7 @@ def varied_body_of(i):
     return BODIES[i % 5]
 
 
-def test_no_trajectory_of_any_chain_that_touches_is_certified():
+def test_no_trajectory_of_any_chain_that_collides_is_certified():
     rng = np.random.default_rng(82)
     said = []
     for i in range(80):

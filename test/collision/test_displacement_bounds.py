@@ -13,7 +13,7 @@ RAY = 0.8
 
 @examples(80)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_no_point_of_a_bar_moves_further_than_its_way(seed):
+def test_no_point_of_a_bar_moves_further_than_its_bound(seed):
     rng = np.random.default_rng(seed)
     arm = table_1_arm() if rng.random() < 0.5 else random_chain(rng, rng.random() < 0.5)
     n, scale = int(rng.integers(2, 6)), rng.choice([0.1, 1.0, 10.0])
@@ -54,7 +54,7 @@ def test_the_way_of_a_joint_that_turns_alone_is_its_arc():
     assert RAY <= ways[2, 1] <= 1.8 * RAY
 
 
-def test_an_arm_that_holds_still_has_no_way():
+def test_an_arm_that_holds_still_has_no_displacement():
     arm = table_1_arm()
     one = np.zeros((1, 4))
     hold = Trajectory(times=[0.0], positions=one, velocities=one, accelerations=one)

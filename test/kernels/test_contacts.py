@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an edge leans on boxes: gaps, their slopes, and none that is overlooked."""
+"""Contacts of an edge with boxes: gaps, their gradients, and none that is overlooked."""
 
 import numpy as np
 import pytest
@@ -195,7 +195,7 @@ def test_the_close_pairs_of_an_edge_are_found_with_their_slopes(case):
     assert n_kinks <= 0.05 * n_contacts
 
 
-def test_an_edge_far_from_every_box_leans_on_nothing():
+def test_an_edge_far_from_every_box_has_no_contacts():
     arm = table_1_arm()
     far = Scene(tuple(random_boxes(np.random.default_rng(75), 20).boxes))
     world = arm_world(arm, Scene(()), MARGIN, RAY)

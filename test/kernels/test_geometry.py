@@ -106,7 +106,7 @@ def test_a_radius_grows_the_box(cases):
         assert touches(a, b, 0.07, boxes) == touches(a, b, 0.0, fat)
 
 
-def test_each_lane_is_judged_as_if_it_were_alone(cases):
+def test_each_lane_is_checked_as_if_it_were_alone(cases):
     n = LANES - 1
     a, b, center, rotation, half = (part[:60] for part in cases)
     groups = [packed(c, r, h) for c, r, h in zip(center, rotation, half, strict=True)]
@@ -279,7 +279,7 @@ def test_a_number_that_is_none_counts_as_contact():
 
 @examples(400)
 @given(seed=SEEDS)
-def test_a_hull_that_is_apart_contains_no_bar_that_touches(seed):
+def test_a_hull_that_is_apart_contains_no_bar_that_collides(seed):
     rng = np.random.default_rng(seed)
     center, rotation = rng.uniform(-0.5, 0.5, 3), random_rotation(rng)
     half = rng.uniform(0.05, 0.4, 3)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Paths that lean on boxes: never longer than taut ones, the same ends, every edge proven."""
+"""Elastic band: paths never longer than by shortcuts, the same ends, every edge proven."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def length(waypoints):
 
 
 def check_shorter(arm, scene, world, raw):
-    """Check what becomes of a path; return its gain over the taut one, relative."""
+    """Check the elastic band of a path; return its relative gain over shortcuts."""
     taut = shortened(world, raw, shortcut_path)
     band = shortened(world, raw, shorten, ROUNDS)
     assert length(band) <= length(taut) * (1 + 1e-12)
@@ -63,14 +63,14 @@ def raw():
     return world, raw_paths(world, np.random.default_rng(91), 30)
 
 
-def test_leaning_never_lengthens_and_every_edge_is_proven(raw):
+def test_the_band_never_lengthens_and_every_edge_is_proven(raw):
     world, paths = raw
     gains = [check_shorter(table_1_arm(), wearer(), world, path) for path in paths]
     assert np.mean(gains) > 0.005
     assert np.mean(np.array(gains) > 1e-4) > 0.5
 
 
-def test_leaning_never_lengthens_a_path_of_any_arm():
+def test_the_band_never_lengthens_a_path_of_any_arm():
     rng, gains, seen = np.random.default_rng(92), [], set()
     while len(gains) < 24:
         arm = compiled_chain(rng, len(gains) % 2 == 0)
@@ -93,7 +93,7 @@ def has_blocked_pairs(world, rng):
     return len(free) > 40 and sum(not world.is_edge_valid(a, b) for a, b in pairs) > 5
 
 
-def test_leaning_stays_within_limits_that_the_shorter_way_would_pass(raw):
+def test_the_band_stays_within_limits_that_a_shorter_path_would_pass(raw):
     world, paths = raw
     n_outside = n_shorter = 0
     for path in paths:
@@ -115,14 +115,14 @@ def test_leaning_stays_within_limits_that_the_shorter_way_would_pass(raw):
     assert n_shorter >= 1
 
 
-def test_without_rounds_a_path_is_only_pulled_taut(raw):
+def test_without_rounds_a_path_gets_shortcuts_only(raw):
     world, paths = raw
     for path in paths:
         taut = shortened(world, path, shortcut_path)
         assert np.array_equal(shortened(world, path, shorten, 0), taut)
 
 
-def test_the_same_path_leans_the_same_way_every_time(raw):
+def test_the_band_of_the_same_path_is_the_same_every_time(raw):
     world, paths = raw
     for path in paths[:6]:
         once, again = (shortened(world, path, shorten, ROUNDS) for _ in range(2))

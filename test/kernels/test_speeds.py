@@ -99,7 +99,7 @@ def test_without_a_limit_of_jerk_the_time_is_that_of_toppra():
         _, pace, _ = solver.compute_parameterization(0.0, 0.0)
         best = np.sum(2.0 * np.diff(grid) / (pace[1:] + pace[:-1]))
         ratios.append(parameterize(path, blends, bounds).duration / best)
-    # The grid of the oracle costs it a little.
+    # The grid of the reference checker costs it a little.
     assert min(ratios) > 0.99
     assert np.mean(ratios) < 1.03
 

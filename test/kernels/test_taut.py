@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Paths pulled taut: never longer, the same ends, every edge proven."""
+"""Shortcut paths: never longer, the same ends, every edge proven."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def taut(world, waypoints, spacing=0.01, room=64, enough=LEAST_GAIN):
     return path[:n]
 
 
-def test_pulling_taut_never_lengthens_and_keeps_both_ends(raw):
+def test_shortcuts_never_lengthens_and_keeps_both_ends(raw):
     world, arm, scene = wearer_world(), table_1_arm(), wearer()
     for path in raw:
         for spacing in (0.3, 0.01):
@@ -47,7 +47,7 @@ def test_pulling_taut_never_lengthens_and_keeps_both_ends(raw):
                 assert world.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
 
 
-def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
+def test_shortcutting_a_path_again_gains_next_to_nothing(raw):
     world = wearer_world()
     for path in raw:
         once = taut(world, path)
@@ -56,14 +56,14 @@ def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
         assert gain <= 2e-3 * path_length(once, len(once))
 
 
-def test_pulling_loosely_is_a_beginning_of_pulling_taut(raw):
+def test_coarse_shortcuts_are_a_beginning_of_fine_ones(raw):
     world, n_looser = wearer_world(), 0
     for path in raw:
         loose, tight = taut(world, path, enough=0.5), taut(world, path)
         lengths = [path_length(p, len(p)) for p in (path, loose, tight)]
         assert lengths[0] * (1 + 1e-12) >= lengths[1] >= lengths[2] * (1 - 1e-12)
         n_looser += lengths[1] > lengths[2] * (1 + 1e-6)
-        # Going on where it stopped ends where pulling taut at once ends.
+        # Going on where it stopped ends where fine shortcuts end.
         assert np.array_equal(taut(world, loose), tight)
     assert n_looser > 2
 

@@ -104,7 +104,7 @@ def test_the_picture_is_not_blank():
 
 
 @pytest.mark.parametrize('n', [2, 3, 40])
-def test_a_way_is_drawn_by_as_many_postures_as_are_given(n):
+def test_a_motion_is_drawn_by_as_many_configurations_as_are_given(n):
     axes = Figure().add_subplot(projection='3d')
     q = np.linspace(FOLDED, FOLDED - 0.4, n)
     draw_configurations(axes, ARM, Scene(()), q, q, None, 1.0, towards=np.array([0.6, -0.6, 0.5]))

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer's model without a browser: what is asked last is answered, and refusals are said."""
+"""The viewer's model without a browser: the last request is answered, and rejections are shown."""
 
 from argparse import Namespace
 from dataclasses import replace
@@ -200,7 +200,7 @@ def test_another_target_shows_where_the_arm_comes_to():
     opened = Player().loaded(2.0)
     aimed = opened.aimed()
     assert (opened.time, aimed.time, aimed.loaded(3.0).time) == (0.0, 2.0, 3.0)
-    # Also after a refusal, which has no motion.
+    # Also after a rejection, which has no motion.
     assert aimed.loaded(0.0).aimed().loaded(3.0).time == 3.0
     assert Player().aimed().loaded(3.0).time == 3.0
     halfway = opened.moved(1.0)
