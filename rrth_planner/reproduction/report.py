@@ -151,8 +151,8 @@ the way round the body demand is left, which is why joint 2, which hardly has to
 it gives no number.
 
 RRT-H with its edges checked in three ways, its paths judged every 0.002 rad by exact clipping
-against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A taut
-path leans on the body, so what a test does not see between two checks is where it touches. On
+against the boxes grown by the same {100 * MARGIN:.0f} cm, and again without that margin. A short
+path is in contact with the body; a test that misses contacts between checks lets it collide. On
 maps the judge is exact, and RRT-H as printed is shown with check points every {SPARSE:g} and every
 {DENSE:g} map units.
 

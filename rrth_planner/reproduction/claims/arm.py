@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper says of the arm (Table 1, section 6.2) and of its collision test."""
+"""The claims of the paper about the arm (Table 1, section 6.2) and its collision test."""
 
 import numpy as np
 from rrth_planner.io.map_file import load_map
@@ -70,7 +70,7 @@ def arm_table(rows: Rows, extent: Extent) -> str:
 
 
 def target_table(rows: Rows, extent: Extent) -> str:
-    """Return what RRT and RRT-H brought for each target."""
+    """Return the results of RRT and RRT-H for each target."""
     lines = []
     for target in extent.targets:
         for name in (RRT, RRT_H):
@@ -102,7 +102,7 @@ def mean_travel_of(rows: Rows) -> Array:
 
 
 def mode_table(rows: Rows, extent: Extent) -> str:
-    """Return how many paths each way to check collisions lets through that touch."""
+    """Return how many colliding paths each collision check accepts."""
     lines = []
     names = (
         (CERTIFIED, 'certified (ours, default)'),
@@ -125,9 +125,9 @@ def mode_table(rows: Rows, extent: Extent) -> str:
     for problem in extent.maps:
         for name in (RRT_H, PRINTED, PRINTED_FINE):
             some = rows.where(problem=problem, algorithm=name)
-            touch = percent(1 - some.share('is_valid'), 1)
-            lines.append([problem, name, str(some.n_solved()), touch, 'no margin'])
-    header = ('problem', 'planner or check', 'paths', 'touch', 'touch without the margin')
+            collide = percent(1 - some.share('is_valid'), 1)
+            lines.append([problem, name, str(some.n_solved()), collide, 'no margin'])
+    header = ('problem', 'planner or check', 'paths', 'collide', 'collide without the margin')
     return markdown_table(header, lines)
 
 

@@ -24,7 +24,7 @@ def convergence_figure(rows: Rows, maps: Sequence[str], axis: str, n: int) -> Fi
     """
     Return the cost of the best path against draws or time, medians and quartiles over runs.
 
-    RRT and RRT-H stop at their first path: a point each, joined by how far shortening brings it.
+    RRT and RRT-H stop at their first path: a point each, joined to the result of shortening.
 
     Parameters
     ----------
