@@ -11,7 +11,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.io.resources import resource_path
@@ -61,10 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except (RrthError, OSError) as problem:
-        tell('plan', one_line(str(problem)))
+        say('plan', one_line(str(problem)))
         return WRONG
     except KeyboardInterrupt:
-        tell('plan', 'interrupted')
+        say('plan', 'interrupted')
         return INTERRUPTED
 
 
@@ -81,7 +81,7 @@ def _run(options: argparse.Namespace) -> int:
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'plan'))
+    prepare_kernels(partial(say, 'plan'))
     from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
     # Compiling and loading do not count as planning time.
@@ -112,7 +112,7 @@ def _run(options: argparse.Namespace) -> int:
         print('\n'.join(_lines(figures, options.output)))
     if plan.status is PlanStatus.SOLVED:
         return SOLVED
-    tell('plan', f'{plan.status.value}: {plan.sentence}')
+    say('plan', f'{plan.status.value}: {plan.sentence}')
     return REJECTED
 
 

@@ -10,7 +10,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
@@ -48,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 f'{options.output}: {problem.strerror}, expected a writable file'
             ) from problem
     except (RrthError, OSError) as problem:
-        tell('plot', one_line(' '.join(str(problem).split())))
+        say('plot', one_line(' '.join(str(problem).split())))
         return 1
     except KeyboardInterrupt:
-        tell('plot', 'interrupted')
+        say('plot', 'interrupted')
         return 130
     print(options.output)
     return 0
@@ -72,7 +72,7 @@ def _draw_plan(options: argparse.Namespace) -> 'Figure':
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'plot'))
+    prepare_kernels(partial(say, 'plot'))
     from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
     from rrth_planner.visualization.motion_figure import Motion, motion_figure
 
@@ -113,7 +113,7 @@ def _draw_recording(options: argparse.Namespace) -> 'Figure':
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
     for topic, sentence in reader.refused.items():
-        tell('plot', one_line(f'{topic}: malformed messages skipped: {sentence}'))
+        say('plot', one_line(f'{topic}: malformed messages skipped: {sentence}'))
     if options.begin is not None or options.end is not None:
         last = float(recording.times[-1])
         begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)
@@ -135,7 +135,7 @@ def _arm_and_settings(options: argparse.Namespace) -> tuple[ArmModel, PlanSettin
 
 
 def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:
-    """Return where the arm starts, (dof,) [rad]: as told, or as the playback does."""
+    """Return the start configuration, (dof,) [rad]: the given one, or that of the playback."""
     if given is not None:
         return frozen_array(given, (arm.dof,), '--from', 'rad', OptionsError)
     data = load_yaml(resource_path('config/playback.yaml'))

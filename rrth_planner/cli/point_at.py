@@ -18,7 +18,7 @@ from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rrth_planner.cli.point_at_options import parser
-from rrth_planner.cli.program import tell
+from rrth_planner.cli.program import say
 from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, RrthError
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
-        tell('point_at', _of_ros_args(problem))
+        say('point_at', _of_ros_args(problem))
         return USAGE
     report = Report(arrived=None if options.no_move else False)
     try:
@@ -184,7 +184,7 @@ def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> Ma
 
 def _print(report: Report) -> None:
     if report.name is None or report.exit_code in (NOT_HEARD, NOT_ARRIVED, INTERRUPTED):
-        tell('point_at', report.sentence)
+        say('point_at', report.sentence)
         return
     stream = sys.stdout if report.exit_code == DONE else sys.stderr
     print(f'{report.name} ({report.code}): {report.sentence}', file=stream)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the command point_at is told, and what it tells about itself."""
+"""Command-line arguments of point_at."""
 
 import argparse
 import math
@@ -48,8 +48,8 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    for axis, way in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
-        command.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{way} [m]')
+    for axis, direction in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
+        command.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{direction} [m]')
     command.add_argument(
         '--frame', metavar='NAME', help="frame of the target (the planner's base_frame: torso)"
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.chain import RAYS, read_chain
 from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
@@ -48,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _import(options)
     except (RrthError, OSError) as problem:
-        tell('read_urdf', one_line(str(problem)))
+        say('read_urdf', one_line(str(problem)))
         return 2
     except KeyboardInterrupt:
-        tell('read_urdf', 'interrupted')
+        say('read_urdf', 'interrupted')
         return 130
     return 0
 

@@ -20,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
-from rrth_planner.cli.program import tell
+from rrth_planner.cli.program import say
 from rrth_planner.cli.record_options import parser, TOPICS
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (RrthError, OSError, RuntimeError, InvalidTopicNameException) as problem:
         # Errors of ROS name lines of its own sources.
         sentence = SOURCE_LINES.sub('', ' '.join(str(problem).split()))
-        tell('record', one_line(sentence))
+        say('record', one_line(sentence))
         return 1
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the command record is told, and what it tells about itself."""
+"""Command-line arguments of record."""
 
 import argparse
 import math
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rrth_planner.cli.program import program
 
-# All that a planner and an arm say and hear.
+# All topics of a planner and an arm.
 TOPICS = (
     'body_boxes',
     'target',

@@ -12,7 +12,7 @@ import traceback
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.errors import RrthError
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         incident = read_incident(options.file)
     except RrthError as problem:
-        tell('replay', ' '.join(str(problem).split()))
+        say('replay', ' '.join(str(problem).split()))
         return 2
     return replay(incident)
 
@@ -111,7 +111,7 @@ def plan_again(incident: Incident) -> Replanned:
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'replay'))
+    prepare_kernels(partial(say, 'replay'))
     from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
     question = incident.question

@@ -12,7 +12,7 @@ import platform
 import sys
 from typing import TYPE_CHECKING
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import NotInstalledError, OptionsError, RrthError
 
@@ -29,12 +29,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require('campaign', *LIBRARIES)
     except NotInstalledError as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 2
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'reproduce'))
+    prepare_kernels(partial(say, 'reproduce'))
     from rrth_planner.reproduction.cluster import cluster_client, run_campaign
     from rrth_planner.reproduction.experiments import spread_runs, timed_runs
     from rrth_planner.reproduction.figures.all import draw_pictures
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         extent = _extent(options)
     except OptionsError as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 2
     output = options.output or Path('build/reproduction' if options.quick else 'docs')
     data = options.data or output / 'reproduction.parquet'
@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'interrupted; the next start continues from {data}', file=sys.stderr)
         return 130
     except (RrthError, OSError) as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 1
     print(f'{target}: {len(rows)} runs of the sources {source_digest()}; rows in {data}')
     return 0

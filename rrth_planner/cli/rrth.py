@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 from rrth_planner import __version__
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.model.errors import NotInstalledError
@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require(command.extras, *command.needs)
     except NotInstalledError as problem:
-        tell(name, str(problem))
+        say(name, str(problem))
         return WRONG
     return int(_load(command.module).main(rest))
 

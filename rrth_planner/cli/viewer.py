@@ -15,7 +15,7 @@ import sys
 from typing import Any, NoReturn
 import webbrowser
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.settings import load_settings
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _run(options, ros_args)
     except (RrthError, OSError) as problem:
-        tell('viewer', ' '.join(str(problem).split()))
+        say('viewer', ' '.join(str(problem).split()))
         return 1
     except KeyboardInterrupt:
         pass
@@ -112,7 +112,7 @@ def _run_planning(options: argparse.Namespace) -> None:
     from rrth_planner.kernels.precompile import prepare_kernels
 
     question = _question(options)
-    prepare_kernels(partial(tell, 'viewer'))
+    prepare_kernels(partial(say, 'viewer'))
     from rrth_planner.pipeline.plan_motion import warm_up
     from rrth_planner.visualization.viewer.page import ViewerPage
 

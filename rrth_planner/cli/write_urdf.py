@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             _write(options.output, text)
     except RrthError as problem:
-        tell('write_urdf', str(problem))
+        say('write_urdf', str(problem))
         return 2
     return 0
 

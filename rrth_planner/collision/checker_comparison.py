@@ -157,7 +157,7 @@ def _closest(arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float) ->
     best = Violation(float(times[0]), math.inf, '', '')
     # Without a box there is nothing to be close to.
     for time, one in zip(times.tolist(), q if scene.boxes else (), strict=False):
-        seen = nearest(arm, scene, one, ray)
-        if seen.distance < best.distance:
-            best = Violation(time, seen.distance, seen.bar, seen.box)
+        found = nearest(arm, scene, one, ray)
+        if found.distance < best.distance:
+            best = Violation(time, found.distance, found.bar, found.box)
     return best

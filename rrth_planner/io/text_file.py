@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from rrth_planner.model.errors import ModelError
 import yaml
 
-# The largest files that are written here are incidents round 10,000 boxes, seen twice: 600,000
+# The largest files that are written here are incidents with 10,000 boxes, stored twice: 600,000
 # values in 8 MiB, read in two seconds.
 MOST_BYTES, MOST_VALUES = 16 * 2**20, 700_000
 DEEPEST, MOST_ELEMENTS = 20, 50_000
@@ -206,7 +206,7 @@ class _Tree(ElementTree.TreeBuilder):
         return super().end(tag)
 
     def doctype(self, *_: Any) -> None:
-        """Refuse what would declare entities, which may stand for gigabytes or for other files."""
+        """Reject declarations of entities, which may expand to gigabytes or to other files."""
         raise ValueError('a document type')
 
 

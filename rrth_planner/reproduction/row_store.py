@@ -60,7 +60,7 @@ def append_rows(path: Path, rows: Sequence[Row]) -> None:
 
 
 def unite_parts(path: Path) -> None:
-    """Bring all rows of a campaign into its one file."""
+    """Merge all rows of a campaign into its file."""
     parts = _parts(path)
     if not parts:
         return

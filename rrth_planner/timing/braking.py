@@ -41,7 +41,7 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.
         return stop
-    # Compiled code rounds the last digit of the first state in another way.
+    # Compiled code rounds the last digit of the first state differently.
     return Trajectory(
         times=stop.times,
         positions=np.concatenate([q, stop.positions[1:]]),

@@ -19,7 +19,7 @@ from rrth_planner.visualization.occlusion import best_view, cut, is_hidden
 START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'
 CLOTH, SKIN = '#8fa3bf', '#e3b898'
 # Behind the wearer's boxes, between, and in front of them.
-HIDDEN, BODY, SEEN = 1.0, 2.0, 3.0
+HIDDEN, BODY, VISIBLE = 1.0, 2.0, 3.0
 LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 N_DRAWN = 16
 # A ray that passes a target by no more than that points at it [m].
@@ -132,7 +132,7 @@ def draw_configurations(
     stops = [(arm_points(arm, row), STOP, '', 0.0) for row in q_stops]
     for outline, colour, name, offset in (*stops, *ends):
         _draw_line(axes, scene, towards, outline, colour, 5.0, 1.0)
-        axes.plot(*outline.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=SEEN)
+        axes.plot(*outline.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=VISIBLE)
         axes.text(*outline[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
     if target is None:
         return
@@ -160,7 +160,7 @@ def _draw_line(
 ) -> None:
     pieces = cut(points)
     hidden = is_hidden(scene, pieces.mean(axis=1), towards)
-    for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], SEEN)):
+    for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], VISIBLE)):
         if len(part):
             lines = Line3DCollection(
                 part, colors=[colour], linewidths=width, alpha=alpha, zorder=depth

@@ -181,7 +181,7 @@ def _load(path: Path) -> Any:
 
 
 def _check_origin(origin: ElementTree.Element, label: str) -> None:
-    """Refuse other than three numbers: of more, of one or of infinite ones others are made."""
+    """Reject anything but three finite numbers: the parser would accept and change others."""
     for name in ('xyz', 'rpy'):
         given = origin.get(name, '0 0 0')
         try:

@@ -230,10 +230,10 @@ def _sooner(rows: Rows, problem: str, n: int) -> str:
         is_sooner = mine.aligned('time_total') < theirs.aligned('time_total')
         ratio = theirs.median('time_total') / mine.median('time_total')
         holds = holds and float(np.mean(is_shorter & is_sooner)) > 0.5
-        told = f'takes {ratio:.1f} times as long'
+        text = f'takes {ratio:.1f} times as long'
         if not theirs.n_solved():
-            told += ' and finds no path'
-        parts.append(f'against {name}, which {told}: {share_of(is_shorter & is_sooner)}')
+            text += ' and finds no path'
+        parts.append(f'against {name}, which {text}: {share_of(is_shorter & is_sooner)}')
     return f'{verdict(holds)} ' + '; '.join(parts)
 
 
