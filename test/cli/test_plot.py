@@ -117,7 +117,7 @@ def test_a_run_is_drawn_with_its_stop_its_distance_and_the_guard():
     assert distance.get_ylabel().endswith('[m]')
     assert guard.get_xlabel() == 'time [s]'
     names = [text.get_text() for text in guard.get_legend().get_texts()]
-    assert names == ['watches the motion', 'brakes', 'holds', 'the wearer is seen anew']
+    assert names == ['watches the motion', 'brakes', 'holds', 'update of the wearer']
     # A band where the arm was stopped, in each of the three curves; the stages of the guard.
     for axes in (position, velocity, distance):
         (band,) = axes.patches

@@ -100,5 +100,5 @@ def test_the_margin_is_kept():
 
 
 def test_a_target_behind_the_tool_is_not_pointed_at():
-    with pytest.raises(UnsafeMotionError, match='by the target'):
+    with pytest.raises(UnsafeMotionError, match='misses the target by'):
         inspect(motion(), target=TOOL[:3, 3] - 2.0 * TOOL[:3, 2])
