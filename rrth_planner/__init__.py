@@ -1,7 +1,7 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Motion planning for body-mounted pointing arms that never touch their wearer.
+Motion planning for body-mounted pointing arms that keep clear of their wearer.
 
 The public names are imported when they are first used: the kernels behind the planner take a
 second to load, and what needs only an arm or a trajectory shall not wait for them.

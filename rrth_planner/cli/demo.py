@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo: planner and playback as processes, targets, a wearer who moves; judged and drawn."""
+"""The demo: planner and playback nodes, targets, a moving wearer; checked and drawn."""
 
 import argparse
 from collections.abc import Sequence
@@ -34,11 +34,11 @@ from visualization_msgs.msg import MarkerArray
 
 POINTING_TOLERANCE = 1e-3
 DOTS_PER_INCH = 110
-# On the way to the last of these targets, so long after the arm set off, the wearer moves [s]. Up
-# to 1.1 s the arm can still stop before it.
-RAISED, RAISED_ON_THE_WAY, RAISED_AFTER = 'body_arm_raised', ('left', 'low'), 0.4
+# The wearer raises an arm during the motion to the last of these targets, so long after its start
+# [s]. Up to 1.1 s the arm can still stop before it.
+RAISED, RAISED_TARGETS, RAISED_AFTER = 'body_arm_raised', ('left', 'low'), 0.4
 HEADER = (
-    f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"aims past":>12}'
+    f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
 
 
@@ -61,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> None:
     if not options.output.absolute().parent.is_dir():
         raise DemoError(f'--output {options.output}: its folder does not exist')
-    # Neither other robots nor other demos shall hear this one.
+    # Isolated from other robots and other demos.
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     planner_file = resource_path('config/planner.yaml')
@@ -71,7 +71,7 @@ def _run(options: argparse.Namespace) -> None:
 
     domain = os.environ['ROS_DOMAIN_ID']
     print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
-    print('Only the first time, compiling the planner may take a minute or two.', flush=True)
+    print('The first start compiles the planner, which may take a minute or two.', flush=True)
     with ExitStack() as stack:
         children = [
             stack.enter_context(
@@ -99,10 +99,10 @@ def _run(options: argparse.Namespace) -> None:
         client.publish_body(body)
         lines, figure = _visit(client, settings, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
-        went_round = _raise_arm(client, settings)
+        avoided = _raise_arm(client, settings)
     print('\n' + '\n'.join([HEADER, *lines]))
-    print(went_round)
-    print(f'\nEvery motion was judged safe by an independent check. Picture: {options.output}')
+    print(avoided)
+    print(f'\nEvery motion passed an independent collision check. Picture: {options.output}')
 
 
 def _visit(
@@ -111,7 +111,7 @@ def _visit(
     body: MarkerArray,
     targets: dict[str, PointStamped],
 ) -> tuple[list[str], Any]:
-    """Return a line of the table for each target, and the figure of all motions."""
+    """Return one table row per target, and the figure of all motions."""
     frame, margin = settings['base_frame'], settings['margin']
     arm, scene = load_arm(settings.get('arm')), scene_of(WearerBody().apply(body, 0.0, frame))
     ray_guard_length = settings['ray_guard_length']
@@ -139,7 +139,7 @@ def _visit(
         client.wait_for_arrival(trajectory)
         error = pointing_error(arm, client.present(), target)
         if not error <= POINTING_TOLERANCE:
-            raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
+            raise DemoError(f'target {name}: the ray misses it by {1e3 * error:.2f} mm')
         lines.append(
             f'{name:10}{planning_time:9.1f} ms{found.length:7.2f} rad{found.duration:9.2f} s'
             f'{found.clearance:10.3f} m{1e3 * error:9.3f} mm'
@@ -150,35 +150,37 @@ def _visit(
                 trajectory=trajectory,
                 target=target,
                 caption=f'{found.length:.2f} rad in {found.duration:.2f} s, '
-                f'{1e3 * found.clearance:.0f} mm clear, planned in {planning_time:.0f} ms',
+                f'{1e3 * found.clearance:.0f} mm clearance, planned in {planning_time:.0f} ms',
             )
         )
     return lines, motion_figure(arm, scene, motions, limits, ray_guard_length)
 
 
 def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
-    """Have the wearer raise an arm into the way of a motion; return what came of it."""
+    """Have the wearer raise an arm across a running motion; return the result in a sentence."""
     frame, arm = settings['base_frame'], load_arm(settings.get('arm'))
     raised = _example(RAISED, MarkerArray)
     scene = scene_of(WearerBody().apply(raised, 0.0, frame))
-    for name in RAISED_ON_THE_WAY:
+    for name in RAISED_TARGETS:
         message = _example(f'target_{name}', PointStamped)
         client.publish_target(message)
         trajectory, _ = client.ask_for_motion()
-        if name != RAISED_ON_THE_WAY[-1]:
+        if name != RAISED_TARGETS[-1]:
             client.wait_for_arrival(trajectory)
-    print('The wearer raises an arm in mid-motion.', flush=True)
+    print('The wearer raises an arm during the motion.', flush=True)
     q = client.raise_arm(raised, trajectory.positions[0], RAISED_AFTER)
     contact = first_contact(arm, scene, q, settings['ray_guard_length'], 0.0)
     if contact is not None:
-        raise DemoError(f'bar {contact.bar} of the arm touched {contact.box} after it was raised')
+        raise DemoError(
+            f'bar {contact.bar} of the arm was in contact with {contact.box} after it was raised'
+        )
     clearance = least_clearance(arm, scene, q, settings['ray_guard_length'])
     error = pointing_error(arm, client.present(), goal_from_msg(message, frame).target)
     if not error <= POINTING_TOLERANCE:
-        raise DemoError(f'target {name}: the arm points {1e3 * error:.2f} mm past it')
+        raise DemoError(f'target {name}: the ray misses it by {1e3 * error:.2f} mm')
     return (
-        f'{name:10} the wearer raised an arm in mid-motion: the arm stopped, went round it at '
-        f'{clearance:.3f} m, and aims {1e3 * error:.3f} mm past the target'
+        f'{name:10} the wearer raised an arm during the motion: the arm stopped, avoided it with '
+        f'{clearance:.3f} m clearance, and its ray misses the target by {1e3 * error:.3f} mm'
     )
 
 
@@ -191,7 +193,7 @@ def _example(name: str, message_type: Any) -> Any:
 
 
 def _end(*_: Any) -> NoReturn:
-    """Turn a signal into an interrupt, so that the processes are ended."""
+    """Turn a signal into an interrupt, so that the child processes are ended."""
     raise KeyboardInterrupt
 
 

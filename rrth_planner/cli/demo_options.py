@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the demo is told, and what it tells about itself."""
+"""Command-line arguments of the demo."""
 
 import argparse
 from pathlib import Path
@@ -12,14 +12,16 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of all arguments."""
     command = argparse.ArgumentParser(
         prog=program('demo'),
-        description='Plan and play motions round a wearer, check them independently, draw them.',
+        description='Plan and play motions around a wearer, check and draw them.',
     )
     command.add_argument(
-        '--output', type=Path, default=Path('demo.png'), help='picture to write (%(default)s)'
+        '--output', type=Path, default=Path('demo.png'), help='picture file (%(default)s)'
     )
-    command.add_argument('--seed', type=int, default=1, help='of the planner; -1: fresh')
     command.add_argument(
-        '--timeout', type=float, default=180.0, help='longest wait for anything [s] (%(default)s)'
+        '--seed', type=int, default=1, help='random seed of the planner; -1: a new one'
+    )
+    command.add_argument(
+        '--timeout', type=float, default=180.0, help='timeout of every wait [s] (%(default)s)'
     )
     command.add_argument(
         '--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)'

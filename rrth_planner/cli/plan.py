@@ -11,7 +11,7 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.io.resources import resource_path
@@ -27,26 +27,27 @@ from rrth_planner.model.status import PlanStatus
 if TYPE_CHECKING:
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
-SOLVED, REFUSED, WRONG, INTERRUPTED = 0, 1, 2, 130
+SOLVED, REJECTED, WRONG, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 2**31
 DESCRIPTION = """\
-Plan one motion that ends with the arm's pointing ray on a target and touches the wearer nowhere,
-from files, without ROS: as the node plans it, with the same proof and the same second opinion.
+Plan one motion after which the arm's pointing ray meets a target, and which keeps the margin from
+the wearer throughout. Reads files and needs no ROS; the motion is planned and checked as by the
+node: certificate and python-fcl.
 Lengths in metres, angles in radians, in the wearer's base frame: x forward, y left, z up.
 """
 EPILOG = """\
 exit codes: 0  solved: figures on standard output, the motion in the file of --output
-            1  refused: why, in one sentence on standard error
-            2  wrong usage or input: what, on standard error
+            1  rejected: the reason, in one sentence on standard error
+            2  wrong usage or input: the error on standard error
           130  interrupted
 
-`ray from` is where the pointing ray begins, the origin of the arm's `tool` row; the tool may be
-further out on the same line, as `read_urdf` says of an arm that it has read.
+`ray from` is the origin of the pointing ray, that of the arm's `tool` row; the tool itself may be
+further out on the same line (`read_urdf` reports where).
 
-A motion is points in time [s] with position, velocity and acceleration of each joint; between two
-of them each joint follows the quintic that fits both. A file whose name ends in .csv has a header
-and a line a point, .yaml says the same as YAML. Without --period there are as few points as fix
-the motion exactly.
+A motion is a list of points: time [s], and position, velocity and acceleration of each joint.
+Between two points each joint follows the quintic polynomial that fits both. A .csv file has a
+header and one line per point; a .yaml file holds the same data. Without --period the file has the
+fewest points that define the motion exactly.
 
 example:    %(prog)s --target 1.5 0.8 0.6 --output motion.csv --period 0.01
             %(prog)s --arm config/examples/chest_arm.yaml \\
@@ -60,10 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(options)
     except (RrthError, OSError) as problem:
-        tell('plan', one_line(str(problem)))
+        say('plan', one_line(str(problem)))
         return WRONG
     except KeyboardInterrupt:
-        tell('plan', 'interrupted')
+        say('plan', 'interrupted')
         return INTERRUPTED
 
 
@@ -71,17 +72,19 @@ def _run(options: argparse.Namespace) -> int:
     if options.output is not None:
         check_suffix(options.output)
     elif options.period is not None:
-        raise OptionsError('--period: without --output, expected a file to write the points to')
+        raise OptionsError(
+            '--period: given without --output, expected a file to write the points to'
+        )
     arm, scene = load_arm(options.arm), load_wearer(options.body)
     settings = _settings(options, arm)
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'plan'))
+    prepare_kernels(partial(say, 'plan'))
     from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
-    # What compiling and loading takes is not planning time.
+    # Compiling and loading do not count as planning time.
     warm_up(arm, settings.options)
     seed = settings.seed if settings.seed >= 0 else int(np.random.default_rng().integers(SEEDS))
     plan = plan_motion(
@@ -109,8 +112,8 @@ def _run(options: argparse.Namespace) -> int:
         print('\n'.join(_lines(figures, options.output)))
     if plan.status is PlanStatus.SOLVED:
         return SOLVED
-    tell('plan', f'{plan.status.value}: {plan.sentence}')
-    return REFUSED
+    say('plan', f'{plan.status.value}: {plan.sentence}')
+    return REJECTED
 
 
 def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
@@ -126,7 +129,7 @@ def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
 
 
 def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
-    """Return where the motion begins, (dof,) [rad or m]."""
+    """Return the start configuration, (dof,) [rad or m]."""
     if options.q_from is not None:
         if len(options.q_from) != arm.dof:
             raise OptionsError(
@@ -141,7 +144,7 @@ def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
 
 
 def _figures(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any]:
-    """Return what there is to say of a plan; a unit ends its name."""
+    """Return the figures of a plan; the names end with their units."""
     figures: dict[str, Any] = {
         'status': plan.status.value,
         'sentence': plan.sentence,
@@ -161,7 +164,7 @@ def _figures(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any
 
 
 def _ray(arm: ArmModel, q: Array) -> dict[str, list[float]]:
-    """Return a configuration, and where the pointing ray begins and leads there."""
+    """Return a configuration, and origin and direction of the pointing ray there."""
     T = tool_pose(arm, q)
     return {'q': q.tolist(), 'ray_from_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
 
@@ -182,7 +185,7 @@ def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
             f'  ray from     {_listed(found["ray_from_m"])} m along {_listed(found["ray"])}',
         ]
     if figures['escape_time_s'] > 0.0:
-        lines.append(f'leaves boxes   until {figures["escape_time_s"]:.3f} s')
+        lines.append(f'escape         until {figures["escape_time_s"]:.3f} s')
     return lines if output is None else [*lines, f'written        {output}']
 
 
@@ -203,7 +206,7 @@ def _parser() -> argparse.ArgumentParser:
         nargs=3,
         required=True,
         metavar=('X', 'Y', 'Z'),
-        help='the point to point at [m]',
+        help='target of the pointing ray [m]',
     )
     parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm (config/arm.yaml)')
     parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
@@ -213,25 +216,25 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         nargs='+',
         metavar='Q',
-        help='where the arm is, a value a joint [rad or m] (folded; with --arm, 0 each)',
+        help='start configuration, one value per joint [rad or m] (folded; with --arm, all 0)',
     )
     parser.add_argument(
         '--settings',
         type=Path,
         metavar='FILE',
-        help='parameters of the node; what it does not say is as in config/planner.yaml',
+        help='parameters of the node; defaults are those of config/planner.yaml',
     )
     parser.add_argument(
-        '--margin', type=float, metavar='M', help='clearance kept from every box [m]'
+        '--margin', type=float, metavar='M', help='clearance demanded from every box [m]'
     )
     parser.add_argument(
-        '--seed', type=int, metavar='N', help='of the random draws; -1: fresh each time'
+        '--seed', type=int, metavar='N', help='random seed; -1: a new one each time'
     )
     parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='motion to write, .yaml or .csv'
+        '--output', type=Path, metavar='FILE', help='file of the motion, .yaml or .csv'
     )
     parser.add_argument(
-        '--period', type=float, metavar='S', help='a point every so often [s] in that file'
+        '--period', type=float, metavar='S', help='time between two points in that file [s]'
     )
     parser.add_argument('--json', action='store_true', help='print the figures as JSON')
     return parser

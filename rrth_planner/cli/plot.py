@@ -10,7 +10,7 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
@@ -45,13 +45,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             figure.savefig(options.output, dpi=DOTS_PER_INCH)
         except OSError as problem:
             raise OptionsError(
-                f'{options.output}: {problem.strerror}, expected to write there'
+                f'{options.output}: {problem.strerror}, expected a writable file'
             ) from problem
     except (RrthError, OSError) as problem:
-        tell('plot', one_line(' '.join(str(problem).split())))
+        say('plot', one_line(' '.join(str(problem).split())))
         return 1
     except KeyboardInterrupt:
-        tell('plot', 'interrupted')
+        say('plot', 'interrupted')
         return 130
     print(options.output)
     return 0
@@ -72,7 +72,7 @@ def _draw_plan(options: argparse.Namespace) -> 'Figure':
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'plot'))
+    prepare_kernels(partial(say, 'plot'))
     from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
     from rrth_planner.visualization.motion_figure import Motion, motion_figure
 
@@ -97,7 +97,7 @@ def _draw_plan(options: argparse.Namespace) -> 'Figure':
         trajectory=plan.trajectory,
         target=goal.target,
         caption=f'{plan.path.length:.2f} rad in {plan.trajectory.duration:.2f} s, '
-        f'{1e3 * plan.clearance:.0f} mm clear, seed {plan.seed}',
+        f'{1e3 * plan.clearance:.0f} mm clearance, seed {plan.seed}',
     )
     return motion_figure(arm, scene, [motion], settings.limits, settings.ray_guard_length)
 
@@ -113,7 +113,7 @@ def _draw_recording(options: argparse.Namespace) -> 'Figure':
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
     for topic, sentence in reader.rejected.items():
-        tell('plot', one_line(f'{topic}: bad messages are left out: {sentence}'))
+        say('plot', one_line(f'{topic}: malformed messages skipped: {sentence}'))
     if options.begin is not None or options.end is not None:
         last = float(recording.times[-1])
         begin, end = _time(options.begin, -np.inf, last), _time(options.end, np.inf, last)
@@ -135,7 +135,7 @@ def _arm_and_settings(options: argparse.Namespace) -> tuple[ArmModel, PlanSettin
 
 
 def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:
-    """Return where the arm starts, (dof,) [rad]: as told, or as the playback does."""
+    """Return the start configuration, (dof,) [rad]: the given one, or that of the playback."""
     if given is not None:
         return frozen_array(given, (arm.dof,), '--from', 'rad', OptionsError)
     data = load_yaml(resource_path('config/playback.yaml'))
@@ -150,14 +150,14 @@ def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:
 
 def _seed(given: int) -> int:
     if given < -1 or given >= 2**31:
-        raise OptionsError(f'seed: {given}, expected 0 to 2147483647, or -1 for a fresh one')
+        raise OptionsError(f'seed: {given}, expected 0 to 2147483647, or -1 for a new one')
     return int(np.random.default_rng().integers(2**31)) if given == -1 else given
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=program('plot'),
-        description='Draw a plan or a recorded run: PNG, SVG or PDF by the ending of the file.',
+        description='Draw a plan or a recorded run as PNG, SVG or PDF, chosen by the file name.',
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -170,7 +170,7 @@ def _parser() -> argparse.ArgumentParser:
         nargs=3,
         required=True,
         metavar=('X', 'Y', 'Z'),
-        help='the point to point at, in the base frame [m]',
+        help='target of the pointing ray, in the base frame [m]',
     )
     plan.add_argument('--body', metavar='FILE', help=WEARER_HELP)
     plan.add_argument(
@@ -181,8 +181,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar='Q',
         help='joint positions at the start [rad] (as in config/playback.yaml)',
     )
-    plan.add_argument('--seed', type=int, help='of the draws; -1: fresh (as in the settings)')
-    recording = commands.add_parser('recording', help='draw a run that `record` has recorded')
+    plan.add_argument('--seed', type=int, help='random seed; -1: a new one (as in the settings)')
+    recording = commands.add_parser('recording', help='draw a run recorded by `record`')
     recording.set_defaults(draw=_draw_recording)
     recording.add_argument('file', type=Path, metavar='FILE', help='MCAP')
     for name in ('begin', 'end'):
@@ -190,11 +190,14 @@ def _parser() -> argparse.ArgumentParser:
             f'--{name}',
             type=float,
             metavar='S',
-            help=f'{name} of what is drawn [s]; below 0: so long before the last of it',
+            help=f'{name} of the drawn interval [s]; < 0: relative to the end of the run',
         )
-    recording.add_argument('--namespace', metavar='NAME', help='of the run, if there are several')
+    recording.add_argument('--namespace', metavar='NAME', help='namespace, if there are several')
     recording.add_argument(
-        '--base-frame', default='torso', metavar='NAME', help='of the planner (%(default)s)'
+        '--base-frame',
+        default='torso',
+        metavar='NAME',
+        help='base frame of the planner (%(default)s)',
     )
     for command in (plan, recording):
         command.add_argument(

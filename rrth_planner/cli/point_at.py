@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command point_at: have the planner point the arm at a place, and wait until it does."""
+"""The command point_at: request a motion to a target, and wait until the arm has arrived."""
 
 import argparse
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rrth_planner.cli.point_at_options import parser
-from rrth_planner.cli.program import tell
+from rrth_planner.cli.program import say
 from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, RrthError
@@ -32,14 +32,14 @@ from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from visualization_msgs.msg import MarkerArray
 
-DONE, REFUSED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
-# A planner that has just been told everything may need a moment [s].
+DONE, REJECTED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+# Time for the planner to process the messages just published [s].
 PATIENCE = 2.0
 
 
 @dataclass
 class Report:
-    """How a run ended, as --json says it."""
+    """Result of a run, as printed by --json."""
 
     exit_code: int = DONE
     code: int | None = None
@@ -50,19 +50,19 @@ class Report:
     pointing_error: float | None = None
 
     def take(self, answer: Answer) -> None:
-        """Keep an answer of the planner."""
+        """Store the response of the planner."""
         self.code, self.name = int(answer.code), answer.code.name
         self.sentence, self.figures = answer.sentence, answer.figures
         if answer.code is not ErrorCode.SUCCESS:
-            self.exit_code = REFUSED
+            self.exit_code = REJECTED
 
     def end(self, exit_code: int, sentence: str) -> None:
-        """Keep why there is no more to report."""
+        """Store why the run ended early."""
         self.exit_code, self.sentence = exit_code, sentence
 
 
 class UsageError(RrthError):
-    """Something on the command line that cannot be meant."""
+    """An invalid argument on the command line."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
-        tell('point_at', _of_ros_args(problem))
+        say('point_at', _of_ros_args(problem))
         return USAGE
     report = Report(arrived=None if options.no_move else False)
     try:
@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NotInTimeError as problem:
         report.end(NOT_HEARD, str(problem))
     except RrthError as problem:
-        # Of the planner's arm, which may be described by a file that is not here.
+        # E.g. the planner's arm file, which may not exist on this machine.
         report.end(USAGE, str(problem))
     except (KeyboardInterrupt, ROSInterruptException):
         report.end(INTERRUPTED, 'interrupted')
@@ -95,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace, given: list[str], report: Report, stack: ExitStack) -> None:
     require('tools', 'tqdm')
-    # A bad file is said before anything is waited for.
+    # Report a bad file before waiting for anything.
     if options.body is not None:
         _body(options.body, '')
     try:
@@ -115,7 +115,7 @@ def _run(options: argparse.Namespace, given: list[str], report: Report, stack: E
     target.header.frame_id = options.frame or parameters.base_frame
     target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
     if options.no_move:
-        # It needs the planner itself, which takes seconds to load.
+        # Loads the planner itself, which takes seconds.
         from rrth_planner.ros.client.dry_run import plan_without_moving
 
         answer, report.pointing_error = plan_without_moving(client, parameters, target, body)
@@ -132,8 +132,8 @@ def _move(
     tolerance: float,
     report: Report,
 ) -> None:
-    """Have the arm point at a target, and wait until it does."""
-    # Not before it is known that its progress bar is there.
+    """Move the arm to a target, and wait until it has arrived."""
+    # Imported here: needs tqdm, which `require` has checked.
     from rrth_planner.ros.client.follow_motion import announced_motion, follow
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
@@ -146,7 +146,7 @@ def _move(
     motion = announced_motion(client, arm, report.figures['duration'])
     point = None
     with suppress(MessageError):
-        # A frame that the planner knows may not be known here.
+        # The planner may know a frame that is unknown here.
         point = goal_from_msg(target, parameters.base_frame, frames.lookup).target
     try:
         follow(client, arm, motion, point, tolerance)
@@ -169,8 +169,8 @@ def _body(path: Path, frame: str) -> MarkerArray:
 
 
 def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
-    """Return a body that the planner will take: it would go on with the one before, else."""
-    # It loads kernels, which takes seconds that an arm need not wait for without --body.
+    """Return a body that the planner accepts; it would keep its previous one otherwise."""
+    # Imported here: loads kernels, which takes seconds and is only needed with --body.
     from rrth_planner.ros.messages.body import WearerBody
 
     try:
@@ -184,17 +184,17 @@ def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> Ma
 
 def _print(report: Report) -> None:
     if report.name is None or report.exit_code in (NOT_HEARD, NOT_ARRIVED, INTERRUPTED):
-        tell('point_at', report.sentence)
+        say('point_at', report.sentence)
         return
     stream = sys.stdout if report.exit_code == DONE else sys.stderr
     print(f'{report.name} ({report.code}): {report.sentence}', file=stream)
     if report.pointing_error is not None:
-        verb = 'points' if report.arrived else 'would point'
-        print(f'the arm {verb} {1e3 * report.pointing_error:.2f} mm past the target')
+        verb = 'misses' if report.arrived else 'would miss'
+        print(f'the ray {verb} the target by {1e3 * report.pointing_error:.2f} mm')
 
 
 def _end(*_: Any) -> NoReturn:
-    """Turn a signal into an interrupt, so that everything is left in order."""
+    """Turn a signal into an interrupt, so that everything is cleaned up."""
     raise KeyboardInterrupt
 
 

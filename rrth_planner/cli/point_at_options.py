@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the command point_at is told, and what it tells about itself."""
+"""Command-line arguments of point_at."""
 
 import argparse
 import math
@@ -9,35 +9,35 @@ from pathlib import Path
 from rrth_planner.cli.program import program
 
 DESCRIPTION = """\
-Have the planner turn the arm so that it points at X Y Z [m], and wait until it does. A planner
-node and an arm (playback_node, or a controller) have to run in the same ROS domain."""
+Request a motion that points the arm at X Y Z [m], and wait until the arm has arrived. A planner
+node and an arm (playback_node, or a controller) must run in the same ROS domain."""
 EPILOG = """\
 examples:
   %(prog)s 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
   %(prog)s 0.2 1.4 -0.1                     to the left, a little down
   %(prog)s 1.5 0.1 0.3 --body config/body.yaml
-                                            tell the planner the wearer's body first
-  %(prog)s 1.5 0.1 0.3 --no-move            say how the arm would move, and let it stand
+                                            publish the wearer's body first
+  %(prog)s 1.5 0.1 0.3 --no-move            plan only; the arm does not move
   %(prog)s 1.5 0.1 0.3 --json | jq .figures.duration
   %(prog)s 1.5 0.1 0.3 --timeout 5 || echo "not there: $?"
   %(prog)s 1.5 0.1 0.3 --ros-args -r __ns:=/left
 
 exit codes:
   0    the arm has arrived; with --no-move: there is a motion
-  1    the planner refused: its code and its sentence say why
+  1    rejected by the planner; its code and sentence say why
   2    wrong usage: an argument, a file, a name
-  3    no planner, no answer, no joint positions or no body within the timeout
-  4    the arm did not arrive: it does not follow, or was stopped on its way
-  130  interrupted; the arm goes on with what it was told
+  3    no planner, no response, no joint positions or no body within the timeout
+  4    the arm did not arrive: it does not follow the motion, or was stopped
+  130  interrupted; the arm continues its commanded motion
 
---json prints one object: exit_code, code and name (of the planner; null without an answer),
+--json prints one object: exit_code, code and name (of the planner; null without a response),
 sentence, figures (waypoints, duration [s], path_length [rad], least_clearance [m],
-planning_time_ms, seed), arrived (null with --no-move) and pointing_error, by how much the ray
-passes the target [m] (null where it is not known).
+planning_time_ms, seed), arrived (null with --no-move) and pointing_error, the distance of
+the ray from the target [m] (null if unknown).
 
---no-move publishes nothing, neither body nor target: it plans by itself as the planner would, with
-the planner's parameters, from the present joint positions, round the body of --body or the one
-that is heard on body_boxes: a publisher that neither latches nor repeats it is not heard."""
+--no-move publishes neither body nor target. It plans in its own process with the planner's
+parameters, from the present joint positions, and with the body of --body or the one received on
+body_boxes (whose publisher must be latched, or repeat it)."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -48,10 +48,10 @@ def parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    for axis, way in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
-        command.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{way} [m]')
+    for axis, direction in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
+        command.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{direction} [m]')
     command.add_argument(
-        '--frame', metavar='NAME', help="of the target (the planner's base_frame: torso)"
+        '--frame', metavar='NAME', help="frame of the target (the planner's base_frame: torso)"
     )
     command.add_argument(
         '--body',
@@ -60,14 +60,16 @@ def parser() -> argparse.ArgumentParser:
         help='the wearer: a YAML file of boxes (config/body.yaml) or markers '
         '(msg_examples/body.yaml), which replaces the body that the planner has',
     )
-    command.add_argument('--json', action='store_true', help='one JSON object on standard output')
+    command.add_argument(
+        '--json', action='store_true', help='print one JSON object on standard output'
+    )
     command.add_argument('--no-move', action='store_true', help='plan only, and publish nothing')
     command.add_argument(
         '--timeout',
         type=_positive,
         default=30.0,
         metavar='S',
-        help='longest wait for anything, and for the arm after the end of its motion [s] '
+        help='timeout of every wait, and of the arrival after the end of the motion [s] '
         '(%(default)g)',
     )
     command.add_argument(
@@ -75,12 +77,12 @@ def parser() -> argparse.ArgumentParser:
         type=_positive,
         default=0.01,
         metavar='RAD',
-        help='how close each joint has to come to the end of the motion [rad] (%(default)g)',
+        help='tolerance of each joint at the end of the motion [rad] (%(default)g)',
     )
     command.add_argument(
         '--ros-args',
         action='store_true',
-        help='everything after it is for ROS, as for any node: namespace, remaps, parameters',
+        help='everything after it is passed to ROS: namespace, remaps, parameters',
     )
     return command
 

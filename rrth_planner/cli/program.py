@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a command is called by whoever started it."""
+"""Name and output of a command."""
 
 from pathlib import Path
 import sys
@@ -11,6 +11,6 @@ def program(name: str) -> str:
     return f'rrth {name}' if Path(sys.argv[0]).stem == 'rrth' else name
 
 
-def tell(name: str, sentence: str) -> None:
+def say(name: str, sentence: str) -> None:
     """Print a sentence of a command to standard error, at once."""
     print(f'{program(name)}: {sentence}', file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.chain import RAYS, read_chain
 from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
@@ -20,17 +20,16 @@ from rrth_planner.model.rotation import pose_matrix
 LONG = 2.0
 DESCRIPTION = """\
 Read the joints between two links of a URDF and write them as an arm of the planner, laid out as
-config/arm.yaml: modified Denavit-Hartenberg rows, limits, radii, mount and tool. Meshes are not
-looked at: the planner takes every link as a bar, from joint to joint, of the radius given here.
+config/arm.yaml: modified Denavit-Hartenberg rows, limits, radii, mount and tool. Meshes are
+ignored: the planner models every link as a bar from joint to joint, with the radius given here.
 """
 EPILOG = """\
-The conversion is exact for any chain of revolute, continuous and prismatic joints, with fixed ones
-between; what is written is compared with the URDF at many configurations, and the difference is
-printed. Continuous joints get limits of half a turn either way. Branches beside the chain, such as
-fingers, are left out.
+The conversion is exact for any chain of revolute, continuous, prismatic and fixed joints. The
+result is compared with the URDF at many configurations, and the difference is printed. Continuous
+joints get limits of +-pi. Branches beside the chain, such as fingers, are left out.
 
 exit codes: 0  the file has been written
-            2  wrong usage, or a URDF without such a chain (why, is printed)
+            2  wrong usage, or a URDF without such a chain (the reason is printed)
           130  interrupted
 
 example:    %(prog)s config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
@@ -49,10 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _import(options)
     except (RrthError, OSError) as problem:
-        tell('read_urdf', one_line(str(problem)))
+        say('read_urdf', one_line(str(problem)))
         return 2
     except KeyboardInterrupt:
-        tell('read_urdf', 'interrupted')
+        say('read_urdf', 'interrupted')
         return 130
     return 0
 
@@ -93,40 +92,40 @@ def _mount(numbers: Sequence[float] | None) -> Array:
 
 
 def _report(found: ImportedArm) -> list[str]:
-    """Return what there is to say of an arm, in lines."""
+    """Return a description of an arm, in lines."""
     arm, chain = found.arm, found.chain
     lines = [f'arm "{chain.name}" of {arm.dof} joints, from {chain.base} to {chain.tool}']
     for k, name in enumerate(arm.joint_names):
         unit = 'm' if arm.is_prismatic[k] else 'rad'
         low, high = arm.bounds[:, k]
-        note = ', half a turn either way: it is continuous' if name in chain.endless else ''
+        note = ', +-pi for a continuous joint' if name in chain.endless else ''
         lines.append(
             f'  {name}: {low:.4f} to {high:.4f} {unit}, radius {arm.radii[k]:.4f} m{note}'
         )
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')
     if arm.radii.max() > found.radius:
         lines.append(
-            f'radii: more than {found.radius:g} m where a link leaves the straight bars of its row'
+            f'radii: more than {found.radius:g} m where a link deviates from its straight bars'
         )
     longest = np.abs(arm.dh[:, [1, 3]]).max()
     size = np.linalg.norm(np.diff(chain.points, axis=0), axis=1).sum()
     if longest > LONG * size:
         lines.append(
-            f'bars: up to {longest:.2f} m long in an arm of {size:.2f} m, since two axes next to '
-            'parallel have their common normal far away; make them parallel in the URDF'
+            f'bars: up to {longest:.2f} m long in an arm of {size:.2f} m: the common normal of '
+            'two nearly parallel axes is far away; make them parallel in the URDF'
         )
     if found.ray_lead != 0.0:
         where = 'before' if found.ray_lead > 0.0 else 'beyond'
         lines.append(
-            f"ray: begins {abs(found.ray_lead):.4f} m {where} the tool's origin, on the same line"
+            f"ray: starts {abs(found.ray_lead):.4f} m {where} the tool's origin, on the same line"
         )
     given = np.isfinite(chain.velocities)
     if given.any():
         speeds = ', '.join(f'{v:g}' if v < np.inf else '?' for v in chain.velocities)
-        unsaid = ', '.join(
+        missing = ', '.join(
             name for name, has in zip(arm.joint_names, given, strict=True) if not has
         )
-        note = f'; it gives none for {unsaid}: write one in place of each ?' if unsaid else ''
+        note = f'; none given for {missing}: replace each ? by a value' if missing else ''
         lines.append(f'max_velocity of the URDF, for the settings: [{speeds}]{note}')
     far, tilt = found.deviation()
     lines.append(f'differs from the URDF by at most {far:.1e} m and {tilt:.1e} rad')
@@ -134,7 +133,7 @@ def _report(found: ImportedArm) -> list[str]:
 
 
 def _report_ray(found: ImportedArm, q: Array) -> list[str]:
-    """Return where the tool is and where it points, by the arm and by the URDF."""
+    """Return position and ray of the tool, by the arm and by the URDF."""
     lines = [f'at {" ".join(f"{value:g}" for value in q)}, in the base frame:']
     for what, (p, z) in (('arm', found.ray_at(q)), ('URDF', found.urdf_ray_at(q))):
         position, ray = (
@@ -158,7 +157,7 @@ def _parser() -> argparse.ArgumentParser:
         '--ray',
         default='+z',
         metavar='AXIS',
-        help="axis of the tool's link that points: +x -x +y -y +z -z (%(default)s)",
+        help='axis of the tool link that is the pointing ray: +x -x +y -y +z -z (%(default)s)',
     )
     parser.add_argument(
         '--mount',
@@ -172,7 +171,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         default=0.03,
         metavar='M',
-        help='half of the thickness of the links [m] (%(default)s)',
+        help='radius of the links [m] (%(default)s)',
     )
     parser.add_argument(
         '--output', type=Path, required=True, metavar='FILE', help='arm file to write'
@@ -182,7 +181,7 @@ def _parser() -> argparse.ArgumentParser:
         type=float,
         nargs='+',
         metavar='Q',
-        help='print where the tool is at these joint positions [rad or m]',
+        help='print the tool pose at these joint positions [rad or m]',
     )
     return parser
 

@@ -20,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
-from rrth_planner.cli.program import tell
+from rrth_planner.cli.program import say
 from rrth_planner.cli.record_options import parser, TOPICS
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
@@ -42,32 +42,32 @@ SOURCE_LINES = re.compile(r', at /\S+\.c:\d+')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Record until told to end, and return the exit code."""
+    """Record until a signal or the end of the duration, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         options = parser().parse_args(remove_ros_args(['record', *given])[1:])
         return _record(options, given)
     except (RrthError, OSError, RuntimeError, InvalidTopicNameException) as problem:
-        # ROS says in which lines of its sources it found what is wrong.
+        # Errors of ROS name lines of its own sources.
         sentence = SOURCE_LINES.sub('', ' '.join(str(problem).split()))
-        tell('record', one_line(sentence))
+        say('record', one_line(sentence))
         return 1
 
 
 def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
     require('tools', 'mcap', 'tqdm')
-    # Not before it is known that they are there.
+    # Imported here: `require` has checked that they are installed.
     from rrth_planner.ros.client.recorder import Recorder, RecordingFile, since
     from tqdm import tqdm  # type: ignore[import-untyped]
 
     types = dict(zip(TOPICS, TYPES, strict=True))
     for topic in options.topics or ():
         validate_topic_name(topic)
-    told: list[int] = []
+    signals: list[int] = []
     known: set[str] = set()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        # Only noted, so that no message is cut in the middle.
-        signal.signal(number, lambda number, _: told.append(number))
+        # Only stored, so that no message is truncated.
+        signal.signal(number, lambda number, _: signals.append(number))
     file = options.output or Path(time.strftime('run-%Y%m%d-%H%M%S.mcap'))
     begin = time.monotonic()
     with ExitStack() as stack:
@@ -80,23 +80,23 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
         executor.add_node(recorder)
         print(f'recording to {file}; Ctrl-C ends it', flush=True)
         bar = stack.enter_context(tqdm(unit=' messages', disable=None, dynamic_ncols=True))
-        while not told and since(begin) < options.duration:
+        while not signals and since(begin) < options.duration:
             executor.spin_once(timeout_sec=min(0.1, max(0.0, options.duration - since(begin))))
             recorder.check()
-            heard = {topic: n for topic, n in recording.counts.items() if n}
-            for topic in heard.keys() - known:
-                tqdm.write(f'hears {topic}')
+            received = {topic: n for topic, n in recording.counts.items() if n}
+            for topic in received.keys() - known:
+                tqdm.write(f'receiving {topic}')
                 sys.stdout.flush()
-            known |= heard.keys()
-            bar.set_postfix({k.rsplit('/', 1)[-1]: n for k, n in heard.items()}, refresh=False)
+            known |= received.keys()
+            bar.set_postfix({k.rsplit('/', 1)[-1]: n for k, n in received.items()}, refresh=False)
             bar.update(sum(recording.counts.values()) - bar.n)
     for topic, count in recording.counts.items():
         print(f'{count:8d}  {topic}')
     n = sum(recording.counts.values())
     if n == 0:
         raise OptionsError(
-            f'nothing was heard in {since(begin):.1f} s, so there is no {file}; expected nodes '
-            'that run with the same ROS_DOMAIN_ID'
+            f'no message received in {since(begin):.1f} s, {file} not written; expected nodes '
+            'running with the same ROS_DOMAIN_ID'
         )
     print(f'{n} messages in {since(begin):.1f} s: {file}')
     return 0

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the command record is told, and what it tells about itself."""
+"""Command-line arguments of record."""
 
 import argparse
 import math
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rrth_planner.cli.program import program
 
-# All that a planner and an arm say and hear.
+# All topics of a planner and an arm.
 TOPICS = (
     'body_boxes',
     'target',
@@ -20,12 +20,12 @@ TOPICS = (
     'arm_playback/tool_pose',
 )
 DESCRIPTION = """\
-Record a run of the nodes in an MCAP file until Ctrl-C: every message once, as it came from the
-wire, whether its publisher is reliable, best effort, or latched it before. Foxglove opens the
-file, `plot recording` draws it. Names are relative; namespaces and remaps go behind --ros-args.
+Record a run of the nodes in an MCAP file until Ctrl-C: every message once, serialized as received,
+from reliable, best-effort and latched publishers. Foxglove opens the file, `plot recording` draws
+it. Names are relative; namespaces and remaps go after --ros-args.
 """
 EPILOG = """\
-topics, unless others are named:
+default topics:
   {}
 
 example:    %(prog)s -o run.mcap --duration 30 --ros-args -r __ns:=/left
@@ -33,7 +33,7 @@ example:    %(prog)s -o run.mcap --duration 30 --ros-args -r __ns:=/left
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return the parser of everything but the words for ROS."""
+    """Return the parser of all arguments but those of ROS."""
     command = argparse.ArgumentParser(
         prog=program('record'),
         description=DESCRIPTION,
@@ -45,20 +45,20 @@ def parser() -> argparse.ArgumentParser:
         '--output',
         type=Path,
         metavar='FILE',
-        help='a new file (run-DATE-TIME.mcap)',
+        help='new file to write (run-DATE-TIME.mcap)',
     )
     command.add_argument(
         '--duration',
         type=_seconds,
         default=math.inf,
         metavar='S',
-        help='end by itself after so long [s]',
+        help='stop after this time [s]',
     )
     command.add_argument(
         '--topics',
         nargs='+',
         metavar='NAME',
-        help='record these instead, of any installed type',
+        help='record these topics instead, of any installed type',
     )
     return command
 

@@ -12,7 +12,7 @@ import platform
 import sys
 from typing import TYPE_CHECKING
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import NotInstalledError, OptionsError, RrthError
 
@@ -29,12 +29,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require('campaign', *LIBRARIES)
     except NotInstalledError as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 2
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    prepare_kernels(partial(tell, 'reproduce'))
+    prepare_kernels(partial(say, 'reproduce'))
     from rrth_planner.reproduction.cluster import cluster_client, run_campaign
     from rrth_planner.reproduction.experiments import spread_runs, timed_runs
     from rrth_planner.reproduction.figures.all import draw_pictures
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         extent = _extent(options)
     except OptionsError as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 2
     output = options.output or Path('build/reproduction' if options.quick else 'docs')
     data = options.data or output / 'reproduction.parquet'
@@ -68,10 +68,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         target = output / 'reproduction.md'
         replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     except KeyboardInterrupt:
-        print(f'interrupted; the next start goes on from {data}', file=sys.stderr)
+        print(f'interrupted; the next start continues from {data}', file=sys.stderr)
         return 130
     except (RrthError, OSError) as problem:
-        tell('reproduce', str(problem))
+        say('reproduce', str(problem))
         return 1
     print(f'{target}: {len(rows)} runs of the sources {source_digest()}; rows in {data}')
     return 0
@@ -121,10 +121,13 @@ def _parser() -> argparse.ArgumentParser:
         type=_positive,
         nargs='+',
         metavar='N',
-        help='timed runs of each planner on each map: fewest and most are told (10 100)',
+        help='timed runs per planner and map; the fewest and most are reported (10 100)',
     )
     parser.add_argument(
-        '--seeds', type=_positive, metavar='N', help='runs behind each share and draw (1000)'
+        '--seeds',
+        type=_positive,
+        metavar='N',
+        help='runs for each share and number of draws (1000)',
     )
     parser.add_argument('--maps', nargs='+', metavar='NAME', help='only these maps')
     parser.add_argument(
@@ -132,9 +135,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
-        '--scheduler', metavar='tcp://HOST:PORT', help='a dask scheduler (a local cluster)'
+        '--scheduler',
+        metavar='tcp://HOST:PORT',
+        help='address of a dask scheduler (default: a local cluster)',
     )
-    where.add_argument('--serial', action='store_true', help='all runs here, one after another')
+    where.add_argument('--serial', action='store_true', help='run all in this process, one by one')
     return parser
 
 

@@ -10,7 +10,7 @@ import sys
 from typing import Any
 
 from rrth_planner import __version__
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.model.errors import NotInstalledError
@@ -18,8 +18,8 @@ from rrth_planner.model.errors import NotInstalledError
 HELP = ('-h', '--help')
 WRONG = 2
 NODE_HELP = """\
-What follows --ros-args is for ROS: parameters (-p seed:=1, --params-file FILE), remaps, the
-namespace. All parameters, with units, ranges and defaults, are in
+Arguments after --ros-args are passed to ROS: parameters (-p seed:=1, --params-file FILE), remaps,
+the namespace. All parameters, with units, ranges and defaults, are in
   {}
 """
 
@@ -27,7 +27,7 @@ namespace. All parameters, with units, ranges and defaults, are in
 @dataclass(frozen=True, slots=True)
 class Command:
     """
-    A command and what loading it takes.
+    A command and its requirements.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ class Command:
     settings : str
         The parameters of a node, which has no arguments of its own.
     needs : tuple of str
-        Libraries that it does not start without.
+        Libraries that it requires.
     extras : str
-        What brings these.
+        Extras of the package that install these.
 
     """
 
@@ -55,22 +55,22 @@ class Command:
 
 
 COMMANDS = {
-    'plan': Command('plan from files to files', 'cli.plan'),
+    'plan': Command('plan a motion from files, without ROS', 'cli.plan'),
     'plot': Command('draw a motion or a recording', 'cli.plot'),
-    'viewer': Command('the planner in the browser', 'cli.viewer'),
-    'read_urdf': Command('take over an arm from a URDF', 'cli.read_urdf'),
+    'viewer': Command('show the planner in the browser', 'cli.viewer'),
+    'read_urdf': Command('import an arm from a URDF', 'cli.read_urdf'),
     'write_urdf': Command('write the arm as a URDF', 'cli.write_urdf'),
-    'replay': Command('plan again what ended in an incident', 'cli.replay'),
+    'replay': Command('replay an incident', 'cli.replay'),
     'reproduce': Command("regenerate the paper's comparison", 'cli.reproduce'),
     'planner_node': Command(
-        'the planner as a node',
+        'run the planner as a ROS node',
         'ros.planner_node',
         settings='config/planner.yaml',
         needs=(ROS,),
         extras='ros',
     ),
     'playback_node': Command(
-        'a kinematic arm as a node',
+        'run a kinematic arm as a ROS node',
         'ros.playback_node',
         settings='config/playback.yaml',
         needs=(ROS,),
@@ -84,14 +84,14 @@ COMMANDS = {
         extras='ros,tools',
     ),
     'record': Command(
-        'record a run of the nodes as MCAP',
+        'record a run of the nodes in an MCAP file',
         'cli.record',
         parser='cli.record_options',
         needs=(ROS, 'mcap', 'tqdm'),
         extras='ros,tools',
     ),
     'demo': Command(
-        'both nodes, motions, a wearer who moves; judged and drawn',
+        'run both nodes with a moving wearer; check and draw the motions',
         'cli.demo',
         parser='cli.demo_options',
         needs=(ROS, 'matplotlib'),
@@ -104,7 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] not in COMMANDS:
-        # It ends here: by --help, --version or what is wrong.
+        # Exits here: --help, --version or a usage error.
         _parser().parse_args(given[:1] or ['--help'])
     name, rest = given[0], given[1:]
     command = COMMANDS[name]
@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         require(command.extras, *command.needs)
     except NotInstalledError as problem:
-        tell(name, str(problem))
+        say(name, str(problem))
         return WRONG
     return int(_load(command.module).main(rest))
 
@@ -125,7 +125,7 @@ def _load(module: str) -> Any:
 
 
 def _parser_of(name: str) -> argparse.ArgumentParser:
-    """Return what a command that needs ROS says of itself where there is none."""
+    """Return the parser of a command that needs ROS, without loading ROS."""
     command = COMMANDS[name]
     if command.parser:
         found = _load(command.parser).parser()
@@ -154,7 +154,7 @@ def _parser() -> argparse.ArgumentParser:
         usage='%(prog)s COMMAND ...',
         description='Motion planner for a body-worn pointing arm.',
         epilog='\n\n'.join(f'{title}:\n{text}' for title, text in lists.items())
-        + '\n\nrrth COMMAND --help says more of each.',
+        + '\n\nrrth COMMAND --help describes each command.',
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer in the browser: plan by dragging the target, or follow the nodes that run."""
+"""The viewer in the browser: plan by dragging the target, or show the running nodes."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ import sys
 from typing import Any, NoReturn
 import webbrowser
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.settings import load_settings
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _run(options, ros_args)
     except (RrthError, OSError) as problem:
-        tell('viewer', ' '.join(str(problem).split()))
+        say('viewer', ' '.join(str(problem).split()))
         return 1
     except KeyboardInterrupt:
         pass
@@ -51,43 +51,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog=program('viewer'),
-        description='Show the planner in the browser: drag the target, and it plans anew. '
+        description='Show the planner in the browser; it replans when the target is dragged. '
         'Ctrl-C ends it.',
-        epilog=f'With --live, what follows {ROS_ARGS} is for ROS: remaps, parameters.',
+        epilog=f'With --live, arguments after {ROS_ARGS} are passed to ROS: remaps, parameters.',
     )
-    parser.add_argument('--arm', type=Path, metavar='FILE', help='laid out as config/arm.yaml')
+    parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm, as config/arm.yaml')
     parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
     parser.add_argument(
         '--settings', type=Path, metavar='FILE', help='parameters, laid out as config/planner.yaml'
     )
     parser.add_argument(
-        '--target', type=float, nargs=3, metavar=('X', 'Y', 'Z'), help='at first [m] (1.5 0.1 0.3)'
+        '--target',
+        type=float,
+        nargs=3,
+        metavar=('X', 'Y', 'Z'),
+        help='initially [m] (1.5 0.1 0.3)',
     )
     parser.add_argument(
         '--set',
         action='append',
         default=[],
         metavar='NAME=VALUE',
-        help='a parameter of config/planner.yaml, as seed=3; any number of times',
+        help='a parameter of config/planner.yaml, e.g. seed=3; may be repeated',
     )
-    parser.add_argument('--host', default='127.0.0.1', help='to listen on (%(default)s)')
+    parser.add_argument('--host', default='127.0.0.1', help='address to listen on (%(default)s)')
     parser.add_argument(
-        '--port', type=int, default=PORT, help='to listen on; 0: any that is free (%(default)s)'
+        '--port', type=int, default=PORT, help='port to listen on; 0: any free one (%(default)s)'
     )
     parser.add_argument(
         '--open',
         action=argparse.BooleanOptionalAction,
         default=None,
-        help='open the page in the browser (where there is a display)',
+        help='open the page in the browser (default: if there is a display)',
     )
     parser.add_argument(
-        '--live', action='store_true', help='follow the running nodes instead of planning'
+        '--live', action='store_true', help='show the running nodes instead of planning'
     )
     parser.add_argument(
         '--screenshot',
         type=Path,
         metavar='FILE',
-        help='save a picture of the page, the arm where it comes to, and end',
+        help='save a picture of the page with the arm at the goal, and exit',
     )
     return parser.parse_args(arguments)
 
@@ -108,7 +112,7 @@ def _run_planning(options: argparse.Namespace) -> None:
     from rrth_planner.kernels.precompile import prepare_kernels
 
     question = _question(options)
-    prepare_kernels(partial(tell, 'viewer'))
+    prepare_kernels(partial(say, 'viewer'))
     from rrth_planner.pipeline.plan_motion import warm_up
     from rrth_planner.visualization.viewer.page import ViewerPage
 
@@ -133,7 +137,7 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
     if options.screenshot or options.body or options.target or options.set:
         raise OptionsError(
             '--live: given with --screenshot, --body, --target or --set, expected without: the '
-            'nodes say what is shown'
+            'nodes determine what is shown'
         )
     from rrth_planner.ros.client.viewer_feed import following
     from rrth_planner.visualization.viewer.live_page import LivePage

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.cli.program import program, tell
+from rrth_planner.cli.program import program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
@@ -16,16 +16,16 @@ from rrth_planner.io.urdf.export import arm_to_urdf
 from rrth_planner.model.errors import ModelError, RrthError
 
 DESCRIPTION = """\
-Write an arm as a URDF, from the same DH rows that the planner plans with: a link for each frame,
+Write an arm as a URDF, from the DH rows that the planner uses: a link for each frame,
 joints with their limits, the bars as cylinders, and a link "tool" whose +z axis is the pointing
 ray. It needs no ROS.
 """
 EPILOG = """\
-The velocities are max_velocity of the settings. URDF asks for an effort too, of which neither file
-says anything: it is written as 0, and has to be filled in for a simulation of forces.
+The velocities are max_velocity of the settings. URDF also requires an effort, which neither file
+gives: it is written as 0, and must be filled in to simulate forces.
 
 exit codes: 0  written
-            2  not written (why, is printed)
+            2  not written (the reason is printed)
 
 example:    %(prog)s --arm my_arm.yaml --output my_arm.urdf
 """
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             _write(options.output, text)
     except RrthError as problem:
-        tell('write_urdf', str(problem))
+        say('write_urdf', str(problem))
         return 2
     return 0
 
@@ -94,14 +94,14 @@ def _parser() -> argparse.ArgumentParser:
         help='parameters of the node, as config/planner.yaml (default: those)',
     )
     parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='where to write (default: standard output)'
+        '--output', type=Path, metavar='FILE', help='file to write (default: standard output)'
     )
     parser.add_argument(
         '--radius',
         type=float,
         default=0.015,
         metavar='M',
-        help='of bars without a thickness of their own [m] (default: %(default)s)',
+        help='radius of bars that have none of their own [m] (default: %(default)s)',
     )
     parser.add_argument(
         '--base-frame',

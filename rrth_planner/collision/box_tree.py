@@ -28,7 +28,7 @@ def pack_boxes(rows: Array) -> tuple[Array, Indices]:
     -------
     groups : ndarray, shape (n_groups, 8 * 15)
         Layout as in `kernels.jit`: a full tree of groups, each lane of an inner one the bound of
-        a group below. Unused lanes can not be touched.
+        a group below. Unused lanes never collide.
     lanes : ndarray, shape (m,)
         Which lane of the last level holds box i.
 
@@ -61,7 +61,7 @@ def grown_groups(groups: Array, by: float) -> Array:
     half = grown[first:, BOX_HALF:]
     half += by
     if ((half <= 0.0) & np.isfinite(half)).any():
-        raise SceneError(f'growth: {by}, expected no box to vanish [m]')
+        raise SceneError(f'growth: {by}, expected a value that leaves every box a size > 0 [m]')
     # A box grows by as much along its own axes, its corners by up to the diagonal of a cube.
     grown[:first, BOX_HALF:] += max(0.0, math.sqrt(3.0) * by)
     return grown.reshape(groups.shape)

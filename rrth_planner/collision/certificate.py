@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The proof that a timed curve, as a controller will run it, never touches the wearer."""
+"""The certificate: a continuous collision check of a timed curve, as a controller runs it."""
 
 from dataclasses import dataclass
 import functools
@@ -15,9 +15,9 @@ from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.bernstein import to_bernstein
 from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 
-# Instants at which the least clearance is looked for; a figure for people, not the proof [s].
+# Sampling period of the least clearance: a figure for people, not part of the certificate [s].
 CLEARANCE_PERIOD = 0.01
-# Share of the resolution of edges that the proof of a curve goes down to.
+# Finest interval of a curve, as a share of the resolution of edges [-].
 FINENESS = 0.2
 
 
@@ -31,14 +31,14 @@ class Certificate:
     is_proven : bool
     piece : int
         Index of the first piece that is not proven; -1 where all are.
-    touches : bool
-        Whether that piece was seen to touch, rather than left undecided.
+    is_violated : bool
+        Whether a clearance violation was found in that piece; otherwise it is undecided.
 
     """
 
     is_proven: bool
     piece: int = -1
-    touches: bool = False
+    is_violated: bool = False
 
 
 BERNSTEIN_4, BERNSTEIN_3 = to_bernstein(4), to_bernstein(3)
@@ -62,33 +62,32 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
 
     """
     n, _, dof = coefficients.shape
-    speed, bend = np.empty((2, n, dof))
-    bound(np.ascontiguousarray(coefficients), BERNSTEIN_4, BERNSTEIN_3, speed, bend)
-    return speed, bend
+    speed, curvature = np.empty((2, n, dof))
+    bound(np.ascontiguousarray(coefficients), BERNSTEIN_4, BERNSTEIN_3, speed, curvature)
+    return speed, curvature
 
 
 def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certificate:
     """
-    Return the proof that a quintic-interpolated trajectory is free of the world's boxes.
+    Return the certificate of a quintic-interpolated trajectory against the world's boxes.
 
-    Each piece is proven by the second-order certificate of
-    `kernels.collision.arm_validity.prove_curve`,
-    from the very numbers that the trajectory holds.
+    Each piece is checked continuously by `kernels.collision.arm_validity.prove_curve`, with
+    second-order bounds and the numbers that the trajectory holds.
 
     Parameters
     ----------
     trajectory : Trajectory
     world : World
     begin : float
-        What comes before this time is over [s].
+        Start of the part that is checked [s].
 
     """
     check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         is_free = world.is_valid(trajectory.positions[-1])
-        return Certificate(is_proven=is_free, piece=-1 if is_free else 0, touches=not is_free)
+        return Certificate(is_proven=is_free, piece=-1 if is_free else 0, is_violated=not is_free)
     coefficients = piece_coefficients(trajectory)
-    speed, bend = bounds_of(trajectory)
+    speed, curvature = bounds_of(trajectory)
     first, share = 0, 0.0
     if begin > 0.0:
         times = trajectory.times
@@ -97,7 +96,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     found = prove_pieces(
         coefficients,
         speed,
-        bend,
+        curvature,
         first,
         share,
         FINENESS * world.resolution,
@@ -107,12 +106,12 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     )
     if found < 0:
         return Certificate(is_proven=True)
-    return Certificate(is_proven=False, piece=found // 2, touches=bool(found % 2))
+    return Certificate(is_proven=False, piece=found // 2, is_violated=bool(found % 2))
 
 
 @functools.lru_cache(maxsize=8)
 def bounds_of(trajectory: Trajectory) -> tuple[Array, Array]:
-    """Return `derivative_bounds` of a trajectory's pieces; a running motion is asked often."""
+    """Return `derivative_bounds` of a trajectory's pieces; cached for a running motion."""
     return derivative_bounds(piece_coefficients(trajectory))
 
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What each judge says of a motion, piece by piece: certificate, python-fcl, numpy oracle."""
+"""Certificate, python-fcl and reference checker compared on each piece of a motion."""
 
 from dataclasses import dataclass
 import math
 
 import numpy as np
-from rrth_planner.collision import reference_checker as oracle
+from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.fcl_checker import nearest
 from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
@@ -18,25 +18,25 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import positions_at, Trajectory
 
-# How often python-fcl's distance and the oracle's are looked at: figures for people [s].
+# Sampling period of the distances of python-fcl and the reference checker [s].
 PERIOD = 0.002
 
 
 @dataclass(frozen=True, slots=True)
-class Opinion:
+class PieceComparison:
     """
-    What the judges say of one piece of a motion.
+    The results of the three checkers for one piece of a motion.
 
     Parameters
     ----------
     begin, end : float
-        [s]; the same for the posture at the end, with the ray out to the target.
+        [s]; equal for the final configuration, whose ray extends to the target.
     certificate : str
-        `proven`, `touches` or `undecided`.
+        `proven`, `violated` or `undecided`.
     fcl : Violation
-        Where python-fcl sees the arm closest to the wearer, at some instants.
-    oracle : float
-        The least clearance that the numpy oracle sees at such instants [m].
+        Where python-fcl finds the arm closest to the wearer, sampled.
+    reference : float
+        Least clearance by the reference checker, sampled [m].
 
     """
 
@@ -44,39 +44,39 @@ class Opinion:
     end: float
     certificate: str
     fcl: Violation
-    oracle: float
+    reference: float
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class MotionComparison:
     """
-    What the judges say of a whole motion.
+    The results of the three checkers for a whole motion.
 
     Parameters
     ----------
     is_proven : bool
         By the certificate.
-    touch : Violation or None
-        What python-fcl sees first.
+    violation : Violation or None
+        The first one that python-fcl finds.
     clearance : float
-        The least that the numpy oracle sees [m].
-    opinions : tuple of Opinion
-        One a piece, and that of the posture at the end.
+        Least clearance by the reference checker [m].
+    pieces : tuple of PieceComparison
+        One for each piece, and one for the final configuration.
 
     """
 
     is_proven: bool
-    touch: Violation | None
+    violation: Violation | None
     clearance: float
-    opinions: tuple[Opinion, ...]
+    pieces: tuple[PieceComparison, ...]
 
     @property
     def is_disagreement(self) -> bool:
-        """Whether the motion is proven and touches all the same."""
-        return self.is_proven and self.touch is not None
+        """Whether the motion is certified although python-fcl finds a violation."""
+        return self.is_proven and self.violation is not None
 
 
-def verdict_of(
+def compare_checkers(
     arm: ArmModel,
     scene: Scene,
     goal: PointingGoal,
@@ -84,9 +84,9 @@ def verdict_of(
     margin: float,
     ray_guard_length: float,
     escape_time: float = 0.0,
-) -> Verdict:
+) -> MotionComparison:
     """
-    Return what the judges say of a motion.
+    Return the results of the three checkers for a motion.
 
     Parameters
     ----------
@@ -94,39 +94,41 @@ def verdict_of(
     scene : Scene
         The wearer in the base frame.
     goal : PointingGoal
-        The ray is to be clear out to it at the end.
+        The final ray must be clear as far as the target.
     trajectory : Trajectory
     margin, ray_guard_length : float
         [m].
     escape_time : float
-        Until then the motion leads out of boxes that the arm was in: its pieces touch [s].
+        Until then the motion escapes from boxes, so its pieces violate the margin [s].
 
     """
     world = arm_world(arm, scene, margin, ray_guard_length)
     q_end: Array = trajectory.positions[-1]
     reach = reach_to(arm, goal.target, q_end)
-    opinions = tuple(
+    pieces = tuple(
         _of_piece(arm, scene, world, trajectory, i) for i in range(len(trajectory.times) - 1)
     )
     end = trajectory.duration
-    last = Opinion(
+    last = PieceComparison(
         begin=end,
         end=end,
-        certificate='proven' if world.is_valid(q_end, reach) else 'touches',
+        certificate='proven' if world.is_valid(q_end, reach) else 'violated',
         fcl=_closest(arm, scene, q_end[None], np.array([end]), reach),
-        oracle=oracle.least_clearance(arm, scene, q_end[None], reach),
+        reference=reference_checker.least_clearance(arm, scene, q_end[None], reach),
     )
-    return Verdict(
+    return MotionComparison(
         is_proven=is_proven_free(world, trajectory, reach, escape_time),
-        touch=violation_seen(arm, scene, trajectory, margin, ray_guard_length, reach, escape_time),
-        clearance=min(opinion.oracle for opinion in (*opinions, last)),
-        opinions=(*opinions, last),
+        violation=violation_seen(
+            arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
+        ),
+        clearance=min(piece.reference for piece in (*pieces, last)),
+        pieces=(*pieces, last),
     )
 
 
 def _of_piece(
     arm: ArmModel, scene: Scene, world: World, trajectory: Trajectory, i: int
-) -> Opinion:
+) -> PieceComparison:
     begin, end = (float(time) for time in trajectory.times[i : i + 2])
     piece = Trajectory(
         times=np.array([0.0, end - begin]),
@@ -136,26 +138,26 @@ def _of_piece(
     )
     certificate = certify(piece, world)
     times = np.linspace(0.0, end - begin, 2 + math.ceil((end - begin) / PERIOD))
-    # The oracle solves for the curve by itself.
-    _, q, _, _ = oracle.quintic_states(
+    # The reference checker solves for the curve by itself.
+    _, q, _, _ = reference_checker.quintic_states(
         piece.times, piece.positions, piece.velocities, piece.accelerations, PERIOD
     )
-    found = 'touches' if certificate.touches else 'undecided'
-    return Opinion(
+    found = 'violated' if certificate.is_violated else 'undecided'
+    return PieceComparison(
         begin=begin,
         end=end,
         certificate='proven' if certificate.is_proven else found,
         fcl=_closest(arm, scene, positions_at(piece, times), begin + times, world.ray_length),
-        oracle=oracle.least_clearance(arm, scene, q, world.ray_length),
+        reference=reference_checker.least_clearance(arm, scene, q, world.ray_length),
     )
 
 
 def _closest(arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float) -> Violation:
-    """Return where python-fcl sees the arm closest at instants, q (n, dof), times (n,) [s]."""
+    """Return where python-fcl finds the arm closest at instants, q (n, dof), times (n,) [s]."""
     best = Violation(float(times[0]), math.inf, '', '')
     # Without a box there is nothing to be close to.
     for time, one in zip(times.tolist(), q if scene.boxes else (), strict=False):
-        seen = nearest(arm, scene, one, ray)
-        if seen.distance < best.distance:
-            best = Violation(time, seen.distance, seen.bar, seen.box)
+        found = nearest(arm, scene, one, ray)
+        if found.distance < best.distance:
+            best = Violation(time, found.distance, found.bar, found.box)
     return best

@@ -16,13 +16,13 @@ from rrth_planner.model.scene import Box, Scene
 
 # Bars become capsules this thin, and their radius is taken off the distance: of thick ones the
 # library overestimates it by up to half a millimetre. Then it is good to a few micrometres, rarely
-# worse; with this it is safe [m].
+# worse; this bound covers it [m].
 THINNEST, DOUBT = 1e-6, 1e-3
 
 
 class _Shape:
     """
-    A shape and its object, which are used again by whoever needs one next.
+    A shape and its object, pooled for reuse.
 
     python-fcl 0.7 does not free an object wholly: the counter of its shared pointer stays.
     """
@@ -32,7 +32,7 @@ class _Shape:
 
 
 def _taken(spare: list[_Shape], make: Callable[[], fcl.CollisionGeometry]) -> _Shape:
-    """Return a spare shape, or a new one; to append and to pop are whole steps for all threads."""
+    """Return a spare shape, or a new one; append and pop are atomic for all threads."""
     try:
         return spare.pop()
     except IndexError:
@@ -64,8 +64,8 @@ class Boxes:
         """
         Return the distance of an object from the nearest box [m], and the index of that box.
 
-        bounds (m,): the boxes are no nearer than this [m]; where a box was looked at, replaced by
-        its distance.
+        bounds (m,): lower bounds of the distances [m]; replaced by the distance of each box that
+        is checked.
         """
         least, nearest = math.inf, -1
         for j in np.argsort(bounds).tolist():
@@ -77,14 +77,14 @@ class Boxes:
         return least, nearest
 
 
-# Nothing is nearer than this result, so the library does not lose time with filling it in.
+# No distance is less than this result, so the library does not spend time filling it in.
 _REQUEST, _RESULT = fcl.DistanceRequest(), fcl.DistanceResult(-math.inf)
 # A wearer who holds still is the same scene from plan to plan; nothing moves its objects.
 boxes_of = functools.lru_cache(maxsize=8)(Boxes)
 
 
 class Bar:
-    """One bar of an arm as a capsule, which a look puts in its place."""
+    """One bar of an arm as a capsule, placed by each distance query."""
 
     _spare: ClassVar[list[_Shape]] = []
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A second opinion on a motion before it is executed, from nothing that planned it."""
+"""An independent check of a motion before it is executed; shares nothing with the planner."""
 
 from dataclasses import dataclass
 
@@ -17,9 +17,9 @@ from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
-# Time between two instants at which a controller's states are looked at [s].
+# Sampling period of a controller's states [s].
 PERIOD = 0.0005
-# Only every so many of them are asked for their clearance, which costs more.
+# Clearance costs more, so only every so many samples are checked for it.
 CLEARANCE_STRIDE = 8
 CONTACT_SLACK = 1e-6
 LIMIT_EXCESS = 0.01
@@ -30,7 +30,7 @@ BOUND_TOLERANCE = 1e-6
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inspection:
     """
-    The figures of a motion that was found safe.
+    The figures of a motion that passed the inspection.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Inspection:
     duration : float
         [s].
     clearance : float
-        Least distance of the arm and its guarded ray from the wearer [m].
+        Least distance of the arm and its ray up to `ray_guard_length` from the wearer [m].
     pointing_error : float
-        How far the ray passes by the target at the end [m].
+        Distance of the final ray from the target [m].
 
     """
 
@@ -78,26 +78,28 @@ def inspect_motion(
         The wearer in the base frame.
     trajectory : Trajectory
     limits : MotionLimits
-        Velocities and accelerations are held to them, with 1 % of grace.
+        Velocities and accelerations must keep them, with a tolerance of 1 %.
     q_present : ndarray, shape (dof,)
-        Where the arm is now [rad].
+        Present configuration [rad].
     target : ndarray, shape (3,)
         In the base frame [m].
     margin, ray_guard_length : float
         Clearance from every box, and how much of the ray keeps it in motion [m]; at the end the
         ray keeps it as far as the target.
     start_tolerance, pointing_tolerance : float
-        Greatest distance from the present state [rad], and from the target [m].
+        Greatest distance from the present configuration [rad], and from the target [m].
 
     Raises
     ------
     UnsafeMotionError
-        The first thing that is wrong, with figures and units.
+        The first failed check, with figures and units.
 
     """
     gap = float(np.abs(trajectory.positions[0] - q_present).max())
     if not gap <= start_tolerance:
-        raise UnsafeMotionError(f'the motion begins {gap:.2e} away from the arm [rad]')
+        raise UnsafeMotionError(
+            f'the motion starts {gap:.2e} from the present configuration [rad]'
+        )
     times, q, v, a = quintic_states(
         trajectory.times,
         trajectory.positions,
@@ -109,19 +111,19 @@ def inspect_motion(
         for end in (0, -1):
             if not np.abs(value[end]).max() <= REST:
                 raise UnsafeMotionError(
-                    f'{what} {value[end].tolist()} at an end, expected 0 [{unit}]'
+                    f'{what} {value[end].tolist()} at start or end, expected 0 [{unit}]'
                 )
         limit = (1.0 + LIMIT_EXCESS) * getattr(limits, what)
         if not (np.abs(value) <= limit).all():
             worst = float((np.abs(value) / getattr(limits, what)).max())
             raise UnsafeMotionError(f'{what} reaches {worst:.3f} times its limit, expected 1 [-]')
     if not ((q >= arm.bounds[0] - BOUND_TOLERANCE) & (q <= arm.bounds[1] + BOUND_TOLERANCE)).all():
-        raise UnsafeMotionError('a joint leaves its range')
+        raise UnsafeMotionError('a joint exceeds its position limits')
     tool = frames(arm, q[-1:])[0, -1]
     reach = float(np.linalg.norm(target - tool[:3, 3]))
     error = float(np.linalg.norm(tool[:3, 3] + reach * tool[:3, 2] - target))
     if not error <= pointing_tolerance:
-        raise UnsafeMotionError(f'the ray passes {1e3 * error:.2f} mm by the target')
+        raise UnsafeMotionError(f'the ray misses the target by {1e3 * error:.2f} mm')
     for instants, ray in ((q, ray_guard_length), (q[-1:], reach)):
         contact = first_contact(arm, scene, instants, ray, margin - CONTACT_SLACK)
         if contact is not None:

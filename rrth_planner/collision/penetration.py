@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How deep the arm is in the boxes, and the proof that a motion leads out of them."""
+"""Penetration depths of the arm in the boxes, and the proof that a motion escapes from them."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -13,18 +13,18 @@ from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
 
-# Stretches of time in each of which the arm gets no deeper than it is at the beginning.
-STRETCHES = 12
-# What it may get deeper all the same: the proof needs a gap, however small [m].
+# Time intervals, within each of which the arm gets no deeper than at its start.
+INTERVALS = 12
+# Tolerance of that depth: the certificate needs a gap, however small [m].
 GAP = 1e-6
 
 
 def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Array:
     """
-    Return how deep the bars are in the grown boxes, (n_bars, m) [m]; < 0: apart.
+    Return the penetration depths of the bars in the grown boxes, (n_bars, m) [m]; < 0: apart.
 
-    The depth is by how much a box would have to be smaller on every side for the bar to be clear
-    of it: that much less of a margin would do. Separating axes, as the proof of an edge.
+    The depth is by how much a box would have to shrink on every side for the bar to be clear of
+    it, or the margin with it. Found by separating axes, as in the edge check.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
     q : ndarray, shape (n, dof) or (dof,)
         Of n configurations the result is (n, n_bars, m) [rad].
     ray_lengths : ndarray, shape (n,), optional
-        Of the pointing ray in each of them; without, the world's [m].
+        Length of the pointing ray in each; default: the world's [m].
 
     """
     rows = world.obstacles[(len(world.obstacles) - 1) // LANES :].reshape(-1, BOX_ROWS, LANES)
@@ -48,10 +48,10 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
 
 
 def relaxed(world: World, by: Array) -> World | None:
-    """Return the world with each box smaller on every side, (m,) [m]; None where one vanishes."""
+    """Return the world with boxes shrunk on every side, (m,) [m]; None where one vanishes."""
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES).copy()
     lanes = np.asarray(world.lanes, np.int64)
-    # The groups above bound what was larger, and so what is smaller.
+    # The groups above bound the larger boxes, hence the smaller ones too.
     rows = (len(obstacles) - 1) // LANES + lanes // LANES
     for side in range(BOX_HALF, BOX_ROWS):
         obstacles[rows, side, lanes % LANES] -= by
@@ -62,13 +62,13 @@ def relaxed(world: World, by: Array) -> World | None:
 
 def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0.0) -> bool:
     """
-    Return whether a motion is proven to lead out of the boxes that the arm is in.
+    Return whether a motion is proven to escape from the boxes that the arm is in.
 
-    The time is cut into stretches, and from one to the next the arm may get no deeper in any box.
-    Within a stretch it is proven free of the boxes as much smaller as the arm was deep in them at
-    its beginning; of a box that it is not in, or not any more, of all of it. At the end the arm
-    is out. So the arm enters no box that it is not in, and is in none deeper, by more than `GAP`,
-    than it was at the beginning of the stretch.
+    The time is cut into intervals; from one to the next the penetration depth may increase in no
+    box. Within an interval the motion is proven free of the boxes shrunk by the depth at its
+    start; a box that the arm is not in, or has left, is not shrunk. At the end the arm is clear.
+    So the arm enters no other box, and nowhere gets deeper by more than `GAP` than at the start
+    of the interval.
 
     Parameters
     ----------
@@ -76,12 +76,12 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
     world : World
         Its boxes grown by the whole margin.
     end : float
-        When the arm is to be out [s].
+        When the arm has to be clear [s].
     begin : float
-        What comes before this time is over [s].
+        Start of the part that is checked [s].
 
     """
-    times = np.linspace(min(max(begin, 0.0), end), end, STRETCHES + 1)
+    times = np.linspace(min(max(begin, 0.0), end), end, INTERVALS + 1)
     deep = box_depths(world, positions_at(trajectory, times)).max(axis=1, initial=-np.inf)
     if deep.size == 0:
         return True
@@ -97,7 +97,7 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
         smaller = relaxed(world, by)
         if smaller is None:
             return False
-        # Once it is out of all boxes, the rest of the way is one stretch.
+        # Once the arm is clear of all boxes, the remaining time is one interval.
         is_out = not by.any()
         if not certify(
             part_of(trajectory, 0.0, end if is_out else stop), smaller, start

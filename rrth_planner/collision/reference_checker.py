@@ -1,10 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Slow and obvious answers in plain numpy, to judge what the kernels and planners say.
+The reference checker: slow and simple numpy code to validate kernels and planners.
 
-Nothing here is shared with them: kinematics are products of matrices, contact is clipping the bar
-against the slabs of the box, and a motion is looked at instant by instant.
+It shares nothing with them: kinematics are products of matrices, contact is clipping the bar
+against the slabs of the box, and a motion is checked instant by instant.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from rrth_planner.model.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A bar of the arm that touches a box at an instant of a motion."""
+    """A bar of the arm in contact with a box at an instant of a motion."""
 
     index: int
     bar: int
@@ -69,7 +69,7 @@ def bars(arm: ArmModel, q: Array, ray_length: float) -> Array:
     return np.stack(result, axis=1)
 
 
-def bar_box_touch(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
+def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
     local = (ends - center) @ rotation
     a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
@@ -109,7 +109,7 @@ def first_contact(
     for box in scene.boxes:
         for k, radius in enumerate(radii):
             half = 0.5 * box.size + margin + radius
-            hit = np.flatnonzero(bar_box_touch(ends[:, k], box.center, box.rotation, half))
+            hit = np.flatnonzero(bar_box_contact(ends[:, k], box.center, box.rotation, half))
             if len(hit) and (found is None or hit[0] < found.index):
                 found = Contact(int(hit[0]), k, box.name)
     return found
@@ -129,7 +129,7 @@ def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) ->
     """
     Return the least distance of the arm from the boxes over the instants q, (n, dof) [m].
 
-    Each bar is cut at its closest point by golden section: its distance from a box is convex.
+    The closest point of each bar is found by golden section: its distance from a box is convex.
     """
     ends = bars(arm, q, ray_length)
     radii = np.array(_bar_radii(arm))

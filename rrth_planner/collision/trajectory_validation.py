@@ -1,11 +1,11 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two judges of a whole motion: the certificate, and python-fcl, who knows nothing of it."""
+"""The two independent checks of a whole motion: the certificate and python-fcl."""
 
 from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.fcl_checker import first_violation, touch_on_way_out
+from rrth_planner.collision.fcl_checker import first_escape_violation, first_violation
 from rrth_planner.collision.penetration import box_depths, leads_out
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
@@ -18,7 +18,7 @@ def is_proven_free(
     world: World, trajectory: Trajectory, reach: float, escape_time: float = 0.0
 ) -> bool:
     """
-    Return whether a motion is proven free, and its end with the ray out to the target.
+    Return whether a motion is certified, and its end with the ray out to the target.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def is_proven_free(
     reach : float
         How far the target is from the tool at the end [m].
     escape_time : float
-        Until then the motion leads out of boxes that the arm was in [s].
+        Until then the motion escapes from boxes that the arm was in [s].
 
     """
     return (
@@ -47,7 +47,7 @@ def violation_seen(
     escape_time: float = 0.0,
 ) -> Violation | None:
     """
-    Return where python-fcl sees a motion first come nearer than it may, or None.
+    Return the first clearance violation of a motion by python-fcl, or None.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def violation_seen(
     margin : float
         Distance to keep from every box [m].
     ray_guard_length : float
-        How much of the ray is guarded in motion [m].
+        How much of the ray must stay clear in motion [m].
     reach, escape_time : float
         As in `is_proven_free`.
 
@@ -67,8 +67,12 @@ def violation_seen(
     if escape_time > 0.0:
         world = arm_world(arm, scene, margin, ray)
         depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-        touch = touch_on_way_out(arm, scene, depths, trajectory, escape_time, margin, ray)
-        if touch is not None:
-            return touch
-    touch = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
-    return None if touch is None else replace(touch, time=escape_time + touch.time)
+        violation = first_escape_violation(
+            arm, scene, depths, trajectory, escape_time, margin, ray
+        )
+        if violation is not None:
+            return violation
+    violation = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
+    if violation is None:
+        return None
+    return replace(violation, time=escape_time + violation.time)

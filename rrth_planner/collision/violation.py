@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the second judge may say against a motion that the first one has proven."""
+"""A clearance violation, and the disagreement of the two collision checks about a motion."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from rrth_planner.model.trajectory import Trajectory
 @dataclass(frozen=True, slots=True)
 class Violation:
     """
-    Where a trajectory comes nearer to the wearer than the margin.
+    Where a trajectory comes closer to the wearer than the margin.
 
     Parameters
     ----------
@@ -32,30 +32,30 @@ class Violation:
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """
-    A motion that is proven free by the certificate and touches for python-fcl.
+    A certified motion in which python-fcl finds a clearance violation.
 
     Parameters
     ----------
     trajectory : Trajectory
         Never published.
-    touch : Violation
-        What python-fcl saw first.
+    violation : Violation
+        The first one that python-fcl found.
     escape_time : float
-        Until then the motion leads out of boxes that the arm was in [s].
+        Until then the motion escapes from boxes that the arm was in [s].
 
     """
 
     trajectory: Trajectory
-    touch: Violation
+    violation: Violation
     escape_time: float = 0.0
 
     def sentence(self, margin: float) -> str:
-        """Return what to say of it, for the margin that was to be kept [m]."""
-        touch = self.touch
+        """Return a sentence about it, for the demanded margin [m]."""
+        violation = self.violation
         expected = f'expected at least {margin:g} m'
-        if touch.time < self.escape_time:
-            expected = 'on the way out of the wearer; expected no part deeper than at the start'
+        if violation.time < self.escape_time:
+            expected = 'during the escape, expected no penetration deeper than at the start'
         return (
-            f'the two collision checks disagree: {touch.bar} is {touch.distance:.4f} m from box '
-            f'"{touch.box}" at {touch.time:.3f} s, {expected}'
+            f'the two collision checks disagree: {violation.bar} is {violation.distance:.4f} m '
+            f'from box "{violation.box}" at {violation.time:.3f} s, {expected}'
         )

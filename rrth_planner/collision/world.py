@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the arm may be: its rows, the wearer's rows, and the edge check between them."""
+"""The world of the planners: rows of the arm and the boxes, and the edge check between them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -25,16 +25,16 @@ SLACK = 1e-9
 EDGE_CHECK = jit.first_class(arm_validity.is_edge_free)
 CONTACTS = jit.first_class(contacts.edge_contacts)
 FREE_RADIUS = jit.first_class(arm_clearance.free_radius)
-# Shortest interval that the proof of an edge looks at before it gives up [rad].
+# Shortest interval that the edge check bisects to before it gives up [rad].
 RESOLUTION = 2e-5
-# Between finer ones the parts of a bar, and the checks along an edge, would be too many to count.
+# A finer resolution would overflow the number of checks along an edge.
 FINEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class World:
     """
-    What planners and certificates need to know, packed for the kernels.
+    What planners and certificates need, packed for the kernels.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class World:
     resolution : float
         Third argument of the edge check [rad], at least `FINEST`.
     bar_names, box_names : tuple of str
-        What messages call the arm's bars and the boxes.
+        Names of the arm's bars and the boxes in messages.
     lanes : ndarray, shape (m,)
         Which lane of the last level of groups holds box i.
 
@@ -92,7 +92,7 @@ class World:
 
     @property
     def ray_length(self) -> float:
-        """Length of the pointing ray that is guarded in motion [m]."""
+        """Length of the pointing ray that must stay clear in motion [m]."""
         return float(self.robot[-1, jit.D])
 
     def is_in_bounds(self, q: Array) -> bool:
@@ -127,7 +127,7 @@ class World:
         """
         Return the least signed distances of the bars from the grown boxes, (n_bars, m) [m].
 
-        Contact is < 0: the depth by which a bar enters a box. q has the shape (dof,), or (n, dof)
+        < 0: contact, minus the penetration depth. q has the shape (dof,), or (n, dof)
         for the least over n configurations.
         """
         check_dof(q, self.bounds.shape[1], 'q')
@@ -155,7 +155,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     Raises
     ------
     OptionsError
-        A margin or a guard length that is negative, no number or beyond 1e4 m.
+        A margin or a guard length that is negative, not a number or beyond 1e4 m.
 
     """
     for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):
@@ -178,7 +178,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     )
 
 
-# A wearer who holds still makes the same worlds from plan to plan.
+# While the wearer does not move, plans share the same worlds.
 @functools.lru_cache(maxsize=32)
 def grown(world: World, by: float) -> World:
     """Return the same world with every box grown by that much more on every side [m]."""

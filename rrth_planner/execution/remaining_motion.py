@@ -174,7 +174,7 @@ def _is_certified(
         )
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
-        trajectory_check.is_rest_free(
+        trajectory_check.is_remaining_motion_free(
             trajectory.times,
             trajectory.positions,
             trajectory.velocities,

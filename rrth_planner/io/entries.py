@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Entries of what a file says: each of the one type that it is of, or refused in a sentence."""
+"""Validation of the entries of files: each has the expected type, or is rejected."""
 
 from collections.abc import Collection, Mapping
 import sys
@@ -17,14 +17,14 @@ def mapping(
     optional: Collection[str] = (),
 ) -> dict[str, Any]:
     """
-    Return a mapping that has all entries that are wanted, maybe optional ones, and no others.
+    Return a mapping with all wanted entries, optional ones, and no others.
 
     Parameters
     ----------
     value : Any
         What was given.
     name : str
-        How sentences call it, as of the functions below.
+        Its name in errors; likewise for the functions below.
     wanted, optional : collection of str
     error : type
         Raised for anything else.
@@ -36,7 +36,7 @@ def mapping(
     if missing:
         raise error(f'{name}: no {", ".join(missing)}, expected {", ".join(wanted)}')
     known = [*wanted, *optional]
-    # One under a name that nobody reads, a misspelt radius say, would be overlooked.
+    # An unknown key, e.g. a misspelt radius, must not be ignored silently.
     unknown = [str(key) for key in value if key not in known]
     if unknown:
         raise error(f'{name}: {", ".join(unknown)}, expected only {", ".join(known)}')
@@ -51,7 +51,7 @@ def sequence(value: Any, name: str, error: type[RrthError]) -> list[Any]:
 
 
 def number(value: Any, name: str, unit: str, error: type[RrthError]) -> float:
-    """Return a finite number, or raise: true, and "1", are none."""
+    """Return a finite number, or raise; true and "1" are none."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not abs(value) <= sys.float_info.max:
         raise error(f'{name}: {shown(value)}, expected a number [{unit}]')

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Libraries that only some installations have, and the extra of the package that brings them."""
+"""Optional libraries, and the extras of the package that install them."""
 
 from importlib.util import find_spec
 
@@ -16,14 +16,14 @@ def require(extras: str, *libraries: str) -> None:
     Parameters
     ----------
     extras : str
-        The extras of the package that bring them, as `ros,tools`.
+        The extras of the package that install them, as `ros,tools`.
     libraries : str
         As they are imported.
 
     Raises
     ------
     NotInstalledError
-        Some are not: which, and what installs them.
+        Some are missing; names them and what installs them.
 
     """
     missing = [name for name in libraries if find_spec(name) is None]

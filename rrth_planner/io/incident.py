@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What must never happen and did: a record with everything that is needed to replay it."""
+"""Incidents: plans that failed unexpectedly, recorded with everything to replay them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,21 +20,21 @@ from rrth_planner.io.serialization import (
     plain,
     question_from_mapping,
     scene_from_mapping,
-    touch_from_mapping,
     trajectory_from_mapping,
+    violation_from_mapping,
 )
 from rrth_planner.model.errors import one_line, RecordError, shown
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Of the layout of a record; another one is refused.
+# Version of the record's layout; others are rejected.
 FORMAT = 1
 PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 
 
 class IncidentKind(Enum):
-    """What happened."""
+    """Kinds of incidents."""
 
     DISAGREEMENT = 'disagreement'
     ERROR = 'error'
@@ -43,36 +43,36 @@ class IncidentKind(Enum):
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Incident:
     """
-    A plan that went wrong in a way that it never should.
+    A plan that failed in a way that must never happen.
 
     Parameters
     ----------
     kind : IncidentKind
-        The two judges disagree, or an error that nobody expected.
+        A disagreement of the two collision checks, or an unexpected error.
     sentence : str
-        What was said of it, in one line.
+        Description, in one line.
     time : str
-        When, ISO 8601.
+        ISO 8601.
     question : PlanQuestion
-        What the plan began with.
+        The request of the plan.
     trajectory : Trajectory or None
-        The motion in question, if there was one already.
+        The motion concerned, if there was one already.
     touch : Violation or None
-        What python-fcl saw of it.
+        The clearance violation that python-fcl found.
     present : Scene or None
-        The wearer that the motion was judged for, where that is not the one it was planned for:
-        he moved meanwhile.
+        The wearer that the motion was checked against, where that is not the one it was planned
+        for, since the wearer moved meanwhile.
     escape_time : float
-        Until then the motion leads out of boxes that the arm was in [s].
+        Until then the motion escapes from boxes that the arm was in [s].
     error, traceback : str
-        The name of the error's type, and where it came from; empty for a disagreement.
+        Type and traceback of the error; empty for a disagreement.
     versions : mapping
-        Of what took part.
+        Of the packages involved.
 
     Raises
     ------
     RecordError
-        A disagreement without a motion, or one of another number of joints than the arm's.
+        A disagreement without a motion, or a motion whose number of joints is not the arm's.
 
     """
 
@@ -95,22 +95,20 @@ class Incident:
         if self.trajectory is not None:
             width, dof = self.trajectory.positions.shape[1], self.question.arm.dof
             if width != dof:
-                raise RecordError(
-                    f'trajectory: of {width} joints, expected those of the arm, {dof}'
-                )
+                raise RecordError(f'trajectory: {width} joints, expected {dof}, as the arm')
 
 
 def disagreement_incident(
     question: PlanQuestion, found: Disagreement, present: Scene | None = None
 ) -> Incident:
-    """Return the record of a disagreement of now; `present` as in `Incident`."""
+    """Return a new incident of a disagreement; `present` as in `Incident`."""
     return Incident(
         kind=IncidentKind.DISAGREEMENT,
         sentence=found.sentence(question.margin),
         time=_now(),
         question=question,
         trajectory=found.trajectory,
-        touch=found.touch,
+        touch=found.violation,
         present=present,
         escape_time=found.escape_time,
         versions=versions(),
@@ -120,7 +118,7 @@ def disagreement_incident(
 def error_incident(
     question: PlanQuestion, problem: BaseException, where: str, trajectory: Trajectory | None
 ) -> Incident:
-    """Return the record of an error of now; where: its traceback."""
+    """Return a new incident of an error; where: its traceback."""
     return Incident(
         kind=IncidentKind.ERROR,
         sentence=one_line(str(problem)),
@@ -145,7 +143,7 @@ def incident_from_mapping(data: Any) -> Incident:
     Raises
     ------
     RrthError
-        What is missing, unknown or out of its range.
+        An entry that is missing, unknown or out of its range.
 
     """
     if isinstance(data, Mapping) and data.get('format') != FORMAT:
@@ -163,7 +161,7 @@ def incident_from_mapping(data: Any) -> Incident:
         trajectory=(
             None if trajectory is None else trajectory_from_mapping(trajectory, 'trajectory')
         ),
-        touch=None if touch is None else touch_from_mapping(touch),
+        touch=None if touch is None else violation_from_mapping(touch),
         present=None if present is None else scene_from_mapping(present, 'present'),
         escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
         traceback=text(given['traceback'], 'traceback', RecordError),

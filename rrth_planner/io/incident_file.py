@@ -25,7 +25,7 @@ def write_incident(incident: Incident, folder: Path) -> Path:
     """
     Write an incident to a new file of a folder, and remove the oldest beyond a hundred.
 
-    The folder is made if need be; the file is there at once or not at all.
+    Creates the folder if needed; the file is written atomically.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def write_incident(incident: Incident, folder: Path) -> Path:
 
 
 def read_incident(path: Path) -> Incident:
-    """Return the incident of a file, or raise RrthError with what is wrong with it."""
+    """Return the incident of a file, or raise RrthError."""
     data = load_yaml(path)
     try:
         return incident_from_mapping(data)
@@ -57,7 +57,7 @@ def read_incident(path: Path) -> Incident:
 
 
 def _remove_oldest(folder: Path, newest: Path) -> None:
-    """Remove the oldest files; the newest stays, whatever the clock says."""
+    """Remove the oldest files; the newest stays, whatever its time stamp."""
     others = [file for file in folder.glob(PATTERN) if file != newest]
     others.sort(key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
     for file in others[MOST_FILES - 1 :]:

@@ -13,7 +13,7 @@ from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
 from rrth_planner.planning.box_map import BoxMap
 
-# What a mapping that describes a map may say.
+# Keys of a mapping that describes a map.
 ENTRIES = ('name', 'bounds', 'rectangles', 'boxes', 'start', 'goal')
 EXPECTED = 'bounds, rectangles or boxes, start and goal, and a name or none'
 
@@ -53,7 +53,7 @@ def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:
     label = f'map "{printable(name, "name of a map", SceneError)}"'
     if not isinstance(data, Mapping):
         raise SceneError(f'{label}: {shown(data)}, expected a mapping with {EXPECTED}')
-    # A wall under a name that nobody reads would be no wall.
+    # A wall under an unknown key must not be ignored silently.
     unknown = [str(key) for key in data if key not in ENTRIES]
     if unknown:
         raise SceneError(f'{label}: {", ".join(unknown)} unknown, expected only {EXPECTED}')

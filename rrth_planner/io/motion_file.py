@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Motions as files: YAML, or CSV with a line a point; both are read to the bit."""
+"""Motion files: YAML, or CSV with one line per point; both are exact to the bit."""
 
 from collections.abc import Sequence
 import csv
@@ -32,7 +32,7 @@ HEADER = """\
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointMotion:
     """
-    A trajectory and whose it is.
+    A trajectory with the names and units of its joints.
 
     Parameters
     ----------
@@ -44,8 +44,8 @@ class JointMotion:
     Raises
     ------
     RecordError
-        Another number of names or units than of joints, a name that is not printable, or a unit
-        that is neither.
+        Numbers of names, units and joints that differ, a name that is not printable, or another
+        unit.
 
     """
 
@@ -68,17 +68,17 @@ class JointMotion:
 
 
 def motion_of(arm: ArmModel, trajectory: Trajectory) -> JointMotion:
-    """Return the motion that an arm makes of a trajectory."""
+    """Return the motion of an arm along a trajectory."""
     units = tuple('m' if slides else 'rad' for slides in arm.is_prismatic)
     return JointMotion(joint_names=arm.joint_names, units=units, trajectory=trajectory)
 
 
 def sampled(motion: JointMotion, period: float) -> JointMotion:
-    """Return a motion with a point every so often, > 0 [s], and one at the end."""
+    """Return a motion sampled at a period > 0 [s], and at its end."""
     if not 1e-5 <= period < np.inf:
         raise RecordError(f'period: {period}, expected at least 1e-05 [s]')
     end = motion.trajectory.duration
-    # No point so near to the end that the two would be one.
+    # No sample that would coincide with the end.
     times = np.arange(0.0, end - 1e-3 * period, period)
     times = np.append(times, end) if end > 0.0 else np.zeros(1)
     positions, velocities, accelerations = sample(motion.trajectory, times)
@@ -92,21 +92,21 @@ def sampled(motion: JointMotion, period: float) -> JointMotion:
 
 
 def check_suffix(path: Path) -> None:
-    """Raise RecordError if the name of a file does not say how to write it."""
+    """Raise RecordError if the suffix of a file is not supported."""
     if path.suffix.lower() not in SUFFIXES:
         raise RecordError(f'file {path}: expected a name that ends in .yaml or .csv')
 
 
 def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) -> None:
     """
-    Write a motion as its name ends, .yaml or .csv.
+    Write a motion as .yaml or .csv, by the suffix of the file.
 
-    Comments stand at the head of a YAML file; a CSV file, which has none, goes without.
+    Comments are written at the head of a YAML file; a CSV file has none.
 
     Raises
     ------
     RecordError
-        Another ending.
+        Another suffix.
     OSError
         The file cannot be written.
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Values of this package as plain numbers, lists and mappings, and back, to the bit."""
+"""Conversion of values to plain numbers, lists and mappings, and back, to the bit."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import fields, is_dataclass
@@ -22,7 +22,7 @@ from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 
 def plain(value: Any) -> Any:
-    """Return a value as what YAML knows; of a dataclass a mapping of its fields."""
+    """Return a value in the types of YAML; a dataclass as a mapping of its fields."""
     if isinstance(value, TreeOptions):
         names = {kind: name for name, kind in ALGORITHMS.items()}
         if type(value) not in names:
@@ -41,7 +41,7 @@ def plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, str):
-        # Half a character, which no file can hold.
+        # Lone surrogates cannot be encoded.
         return value.encode('utf-8', 'replace').decode('utf-8')
     return value
 
@@ -51,7 +51,7 @@ def _plain_fields(value: Any) -> dict[str, Any]:
 
 
 def question_from_mapping(data: Any) -> PlanQuestion:
-    """Return the question that `plain` wrote, or raise RrthError."""
+    """Return the request that `plain` wrote, or raise RrthError."""
     given = fields_of(data, PlanQuestion, 'question')
     arm = arm_from_mapping(given['arm'])
     lengths = {
@@ -66,13 +66,13 @@ def question_from_mapping(data: Any) -> PlanQuestion:
         limits=MotionLimits(**fields_of(given['limits'], MotionLimits, 'limits')),
         options=_options(given['options']),
         seed=whole(given['seed'], 'seed', RecordError),
-        moving=None if given['moving'] is None else _takeover(given['moving'], arm.dof),
+        moving=None if given['moving'] is None else _start_state(given['moving'], arm.dof),
         **lengths,
     )
 
 
 def arm_from_mapping(data: Any) -> ArmModel:
-    """Return the arm that `plain` wrote; `arm_file.arm_from_mapping` reads what people write."""
+    """Return the arm that `plain` wrote; `arm_file.arm_from_mapping` reads arm files."""
     given = fields_of(data, ArmModel, 'arm')
     for name, kind in (('joint_names', str), ('is_prismatic', bool)):
         values = given[name]
@@ -94,8 +94,8 @@ def trajectory_from_mapping(data: Any, name: str) -> Trajectory:
     return Trajectory(**fields_of(data, Trajectory, name))
 
 
-def touch_from_mapping(data: Any) -> Violation:
-    """Return the touch that `plain` wrote, or raise RrthError."""
+def violation_from_mapping(data: Any) -> Violation:
+    """Return the violation that `plain` wrote, or raise RrthError."""
     given = fields_of(data, Violation, 'touch')
     return Violation(
         time=number(given['time'], 'touch: time', 's', RecordError),
@@ -106,7 +106,7 @@ def touch_from_mapping(data: Any) -> Violation:
 
 
 def fields_of(data: Any, kind: Any, name: str, more: Collection[str] = ()) -> dict[str, Any]:
-    """Return the entries of a mapping that has those of a dataclass, and more, and no others."""
+    """Return the entries of a mapping with exactly the fields of a dataclass, and `more`."""
     wanted = [*(field.name for field in fields(kind) if field.init), *more]
     return mapping(data, name, wanted, RecordError)
 
@@ -123,7 +123,7 @@ def _options(data: Any) -> TreeOptions:
     return kind(**given)
 
 
-def _takeover(data: Any, dof: int) -> StartState:
+def _start_state(data: Any, dof: int) -> StartState:
     given = fields_of(data, StartState, 'moving')
     state = fields_of(given['state'], MotionState, 'moving: state')
     running = given['running']

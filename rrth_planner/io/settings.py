@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How to plan, as a file says it: the parameters of the node that decide about a plan."""
+"""Planning settings from a file: the parameters of the node that determine a plan."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -24,12 +24,12 @@ LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanSettings:
     """
-    How to plan.
+    Settings of a plan.
 
     Parameters
     ----------
     seed : int
-        -1: fresh each time.
+        -1: a new one each time.
     margin, ray_guard_length, escape_depth : float
         [m].
     limits : MotionLimits
@@ -53,7 +53,7 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
     Raises
     ------
     OptionsError
-        The first value that is refused: its name, what was given, what is expected, the unit.
+        The first invalid value: its name, what was given, what was expected, the unit.
 
     """
     if values['algorithm'] not in ALGORITHMS:
@@ -78,24 +78,24 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
 
 def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -> PlanSettings:
     """
-    Return the settings of a parameter file of the node, for an arm of so many joints.
+    Return the settings of a parameter file of the node, for an arm with `dof` joints.
 
     Parameters
     ----------
     dof : int
     path : str or Path, optional
-        What it does not say is taken from `config/planner.yaml`.
+        Missing parameters are taken from `config/planner.yaml`.
     **changes
-        Values that count instead of those of the files.
+        Values that override those of the files.
 
     Raises
     ------
     OptionsError
-        A value that is refused, or a name that is none.
+        An invalid value, or an unknown name.
 
     """
     packaged = _parameters(resource_path('config/planner.yaml'))
-    # A value a joint of the packaged arm is the same for each.
+    # Limits of the packaged arm are equal for all joints.
     values = {**packaged, **{name: packaged[name][:1] for name in LIMIT_UNITS}}
     if path is not None:
         given = _parameters(path)
@@ -110,10 +110,10 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
 def _typed_settings(
     values: Mapping[str, Any], changes: Mapping[str, Any], dof: int
 ) -> PlanSettings:
-    """Return the settings of values of which some are changed, whatever these are."""
+    """Return the settings of values with some changes, of any type."""
     for name in changes:
         if name not in values:
-            raise OptionsError(f'{name}: no parameter, expected one of {", ".join(values)}')
+            raise OptionsError(f'{name}: unknown parameter, expected one of {", ".join(values)}')
     changed = {**values, **changes}
     text(changed['algorithm'], 'algorithm', OptionsError)
     whole(changed['seed'], 'seed', OptionsError)

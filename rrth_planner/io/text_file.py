@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 from rrth_planner.model.errors import ModelError
 import yaml
 
-# The largest files that are written here are incidents round 10,000 boxes, seen twice: 600,000
+# The largest files that are written here are incidents with 10,000 boxes, stored twice: 600,000
 # values in 8 MiB, read in two seconds.
 MOST_BYTES, MOST_VALUES = 16 * 2**20, 700_000
 DEEPEST, MOST_ELEMENTS = 20, 50_000
@@ -143,30 +143,30 @@ def _parsed(text: str) -> Any:
             open_items.append([])
             begins.append(event)
         elif kind is yaml.AliasEvent:
-            raise _refusal(event, 'an alias')
+            raise _rejection(event, 'an alias')
         elif kind is yaml.DocumentStartEvent and open_items[0]:
-            raise _refusal(event, 'a second document')
+            raise _rejection(event, 'a second document')
         elif kind is yaml.StreamEndEvent:
             return open_items[0][0] if open_items[0] else None
         else:
             continue
         if event.anchor or event.tag:
-            raise _refusal(event, f'an anchor or a tag, {event.anchor or event.tag}')
+            raise _rejection(event, f'an anchor or a tag, {event.anchor or event.tag}')
         n_values += 1
         if n_values > MOST_VALUES or len(open_items) > DEEPEST + 1:
-            raise _refusal(event, f'more than {MOST_VALUES} values, or {DEEPEST} in one another')
+            raise _rejection(event, f'more than {MOST_VALUES} values, or {DEEPEST} in one another')
 
 
 def _mapping(event: Any, items: list[Any]) -> dict[str, Any]:
     """Return a mapping from its keys and values in turn."""
     keys = items[::2]
     if not all(type(key) is str for key in keys):
-        raise _refusal(event, 'a key that is no text')
+        raise _rejection(event, 'a key that is no text')
     mapping = dict(zip(keys, items[1::2], strict=True))
     if len(mapping) < len(keys):
         # Of two, the first would be dropped without a word.
         twice = next(key for key, n in Counter(keys).items() if n > 1)
-        raise _refusal(event, f'{twice} twice')
+        raise _rejection(event, f'{twice} twice')
     return mapping
 
 
@@ -182,7 +182,7 @@ def _plain(text: str) -> Any:
     return text
 
 
-def _refusal(event: Any, what: str) -> yaml.MarkedYAMLError:
+def _rejection(event: Any, what: str) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=what, problem_mark=event.start_mark)
 
 
@@ -206,7 +206,7 @@ class _Tree(ElementTree.TreeBuilder):
         return super().end(tag)
 
     def doctype(self, *_: Any) -> None:
-        """Refuse what would declare entities, which may stand for gigabytes or for other files."""
+        """Reject declarations of entities, which may expand to gigabytes or to other files."""
         raise ValueError('a document type')
 
 

@@ -55,7 +55,7 @@ def load_wearer(path: str | Path | None = None) -> Scene:
 
 
 def _boxes_after(markers: Any) -> list[dict[str, Any]]:
-    """Return the boxes that all markers leave, one after the other, as the nodes take them."""
+    """Return the boxes left after applying all markers in order, as the nodes do."""
     parts: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for index, marker in enumerate(sequence(markers, 'markers', SceneError)):
         label = f'marker {index}'

@@ -22,7 +22,7 @@ import numpy as np
 from rrth_planner.kernels.kept_code import KeptCode, private_folder
 from rrth_planner.kernels.slim_library import use_slim_libraries
 
-# Read-only types accept writable arrays too, and the compiler refuses to write through them:
+# Read-only types accept writable arrays too, and the compiler rejects writes to them:
 # a signature tells inputs (VEC, MAT) from outputs (OUT_...).
 VEC = types.Array(float64, 1, 'C', readonly=True)
 MAT = types.Array(float64, 2, 'C', readonly=True)
@@ -50,7 +50,7 @@ EDGE_CHECK = types.FunctionType(types.boolean(VEC, VEC, float64, CHAIN, MAT, MAT
 # free [rad].
 FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 
-# Where an edge leans on obstacles: (q_from, q_to, chain, robot, obstacles, contacts) -> how many
+# Contacts of an edge with obstacles: (q_from, q_to, chain, robot, obstacles, contacts) -> how many
 # rows of `contacts` were written (`edge_contacts.py`).
 CONTACTS = types.FunctionType(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 
@@ -92,11 +92,11 @@ NO_BAR = -1.0
 # rotation into the box's own axes (9), the position of the arm's base in them (3), the half
 # extents grown by margin and slack (3). The groups form a tree: lane l of group g bounds the whole
 # group LANES g + l + 1, if there is such a row; the last ones hold the boxes themselves. Unused
-# lanes have half extents of minus infinity: nothing touches them.
+# lanes have half extents of minus infinity: they never collide.
 LANES = 8
 BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
 
-# The file that says that all kernels of the planner are there.
+# The file that marks the cache of all kernels of the planner as complete.
 COMPLETE = 'complete'
 
 FOLDER = Path(__file__).parent
@@ -134,7 +134,7 @@ def _warn_once(folder: Path | None, problem: Exception) -> None:
         )
 
 
-_has_warned = _has_told = False
+_has_warned = _has_announced = False
 _folder = _cache_folder()
 use_slim_libraries()
 
@@ -170,15 +170,15 @@ def compiling_notice() -> str:
     Who says it, a node or a command, says it in its own way; otherwise the logger `rrth_planner`
     warns of it when it begins, since its caller is about to wait.
     """
-    global _has_told
-    if _has_told:
+    global _has_announced
+    if _has_announced:
         return ''
-    _has_told = True
+    _has_announced = True
     how_often = 'at every start' if _folder is None else 'once for this machine'
     return f'compiling kernels, {how_often}: takes up to two minutes'
 
 
-def _tell(function: Callable[..., Any]) -> None:
+def _announce(function: Callable[..., Any]) -> None:
     """Log that kernels are compiled; that of a new arm, or of a test, is no matter of minutes."""
     if FOLDER in Path(function.__code__.co_filename).parents and (notice := compiling_notice()):
         _LOGGER.warning(notice)
@@ -206,9 +206,9 @@ def kernel(
         compiled = njit(**options)(function)
         if not config.DISABLE_JIT:
             if _folder is None:
-                _tell(function)
+                _announce(function)
             else:
-                compiled._cache = KeptCode(function, _folder, _tell, _give_up)
+                compiled._cache = KeptCode(function, _folder, _announce, _give_up)
             compiled.compile(signature)
             compiled.disable_compile()
         return compiled

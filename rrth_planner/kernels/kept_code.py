@@ -93,8 +93,8 @@ class KeptCode(NullCache):
     """
     The file with the code of one kernel, by numba's protocol of a cache.
 
-    numba's own cache takes whatever lies there for code: a cut file ends the program, a changed
-    one changes what it does.
+    numba's own cache trusts its files: a truncated one crashes the program, a changed one changes
+    what it does.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ class KeptCode(NullCache):
         Private, and another one for each state of the sources of all kernels: that a kernel of
         another file has changed is not seen here.
     miss : callable
-        Told of the function whose code is not there, before it is compiled.
+        Called with a function whose code is missing, before it is compiled.
     give_up : callable
-        Told of an OSError that kept the code from being written.
+        Called with an OSError that prevented the code from being written.
 
     """
 
@@ -153,7 +153,7 @@ class KeptCode(NullCache):
 
 
 def _source(function: Callable[..., Any]) -> tuple[Any, ...]:
-    """Return what tells a function from others, and from what it was before it was edited."""
+    """Return a key of a function and of the state of its source."""
     code = function.__code__
     generated = (code.co_code, code.co_consts, code.co_names)
     return code.co_firstlineno, _digest(code.co_filename) or generated

@@ -11,7 +11,7 @@ from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
 
-# What the rows of an arm's file say, and their units.
+# Keys of the rows of an arm's file, and their units.
 ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}
 
 
@@ -39,8 +39,7 @@ class ArmModel:
     Raises
     ------
     ModelError
-        Rows, names and limits that do not describe one arm, or angles or an arm beyond 1e4 rad
-        or m.
+        Inconsistent rows, names or limits, or an angle or extent beyond 1e4 rad or m.
 
     """
 
@@ -91,7 +90,7 @@ class ArmModel:
         r = self.T_base_mount[:3, :3]
         if np.abs(r @ r.T - np.eye(3)).max() > 1e-6 or np.linalg.det(r) < 0.0:
             raise ModelError(f'mount: rotation {r.tolist()}, expected a rotation matrix [-]')
-        # Wherever the joints are, no frame of the arm is farther out.
+        # Upper bound of the distance of any frame of the arm, in all configurations.
         slides = np.array(prismatic)
         extent = (
             np.linalg.norm(self.T_base_mount[:3, 3])
@@ -116,7 +115,7 @@ def bars_of(dh: Array, is_prismatic: tuple[bool, ...]) -> tuple[tuple[int, str],
     Return the offsets of a chain that are bars, (row, 'a' or 'd'), from the mount outwards.
 
     Offsets of length zero are no bars. Those that no joint moves belong to the mount, which is
-    worn on the body and so cannot keep clear of it.
+    worn on the body and therefore not checked against it.
     """
     bars = []
     dof = len(is_prismatic)
@@ -194,7 +193,7 @@ def reach_to(arm: ArmModel, target: Array, q: Array) -> float:
 
 
 def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:
-    """Return how far the pointing ray passes by a target of the base frame [m]."""
+    """Return the distance of the pointing ray from a target of the base frame [m]."""
     T = tool_pose(arm, q)
     v = target - T[:3, 3]
     reach = max(0.0, float(v @ T[:3, 2]))

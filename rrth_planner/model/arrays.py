@@ -34,10 +34,10 @@ def frozen_array(
     shape : tuple
         Expected shape; `None` stands for any length.
     name, unit : str
-        How the array is called in the sentence of the error.
+        Name and unit of the array in the error.
     error : type
-        Raised when the shape differs, or an element is not a finite number, as true and "1" are
-        not, or too large.
+        Raised when the shape differs, or an element is not a finite number (true and "1" are
+        none) or too large.
     largest : float, optional
         Greatest magnitude of an element.
 

@@ -1,13 +1,13 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Bounds of polynomials that hold at every instant: a curve stays in the hull of its control."""
+"""Bounds of polynomials over an interval: a curve stays in the hull of its control points."""
 
 from math import comb
 
 import numpy as np
 from rrth_planner.model.arrays import Array
 
-# After so many halvings a range is called left: the piece is shorter than a rounding error.
+# Most halvings; then the range counts as left: the piece is shorter than a rounding error.
 DEEPEST = 40
 
 
@@ -38,8 +38,8 @@ def first_outside(control: Array, low: Array, high: Array) -> tuple[int, float, 
     Returns
     -------
     tuple or None
-        Index of a polynomial, where in [0, 1], and its value there; of those places that were
-        looked at first, the one that is furthest outside.
+        Index of a polynomial, where in [0, 1], and its value there; of the
+        places checked first, the one furthest outside.
 
     """
     left, right = _halving(len(control) - 1)

@@ -1,14 +1,14 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a broken contract raises: what was given, what was expected, the unit."""
+"""Errors of broken contracts; each says what was given, what was expected, and the unit."""
 
 import reprlib
 from typing import Any
 
-# Of what messages and pictures call things [characters].
+# Longest name in messages and pictures [characters].
 LONGEST_NAME = 256
 
-# Whatever was given may be as long as it likes; what is said of it may not [characters].
+# Longest sentence of an error, however long the input is [characters].
 LONGEST_SENTENCE = 1000
 
 
@@ -59,11 +59,11 @@ class NotInstalledError(RrthError):
 
 
 class MessageError(RrthError):
-    """Input from the wire that is refused."""
+    """A message that is rejected."""
 
 
 class RecordError(RrthError):
-    """A record of an incident that says too little, too much or nothing."""
+    """An incomplete or invalid record."""
 
 
 def printable(value: Any, name: str, error: type[RrthError]) -> str:

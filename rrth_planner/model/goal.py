@@ -11,7 +11,7 @@ from rrth_planner.model.errors import SceneError
 @dataclass(frozen=True, slots=True, eq=False)
 class PointingGoal:
     """
-    A point that the pointing ray shall meet.
+    A point that the pointing ray has to meet.
 
     Parameters
     ----------

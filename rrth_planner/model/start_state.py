@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How an arm moves where a motion begins."""
+"""State of a moving arm at the start of a motion."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from rrth_planner.model.trajectory import Trajectory
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MotionState:
     """
-    Where the arm is and how it moves.
+    Positions, velocities and accelerations of the joints.
 
     Parameters
     ----------
@@ -28,16 +28,16 @@ class MotionState:
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StartState:
     """
-    What an arm that moves does when a motion takes over from its present one.
+    State of a moving arm at the handover to a new motion.
 
     Parameters
     ----------
     state : MotionState
-        At that time.
+        At the handover.
     running : Trajectory or None
-        The motion that it follows until then; None where that is not known.
+        The motion that it executes until then; None where that is unknown.
     time : float
-        Within that motion [s].
+        Of the handover, within that motion [s].
 
     """
 

@@ -1,12 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a plan may end."""
+"""Results of planning."""
 
 from enum import Enum
 
 
 class PlanStatus(Enum):
-    """The ends of a plan that are no error; each comes with a sentence."""
+    """Results of planning that are not errors; each comes with a sentence."""
 
     SOLVED = 'solved'
     TIMEOUT = 'timeout'

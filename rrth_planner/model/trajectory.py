@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Geometry with time: quintic pieces from rest to rest, as a controller interpolates them."""
+"""Geometry with time: quintic pieces, as a controller interpolates them."""
 
 from dataclasses import dataclass
 import functools
@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import OptionsError, RrthError
 
-# An arm that moves no faster is at rest [rad/s].
+# Greatest speed of a joint at rest [rad/s].
 REST_SPEED = 0.01
 
-# A point so near to a cut gives way to it [s]: in a shorter piece the last digit of a position is
-# a jerk. The polynomial of the piece beyond the point goes on over that time; where the jerk jumps
+# A point so near to a cut is dropped [s]: in a shorter piece the rounding of a position is a jerk.
+# The polynomial of the piece beyond the point is extended over that time; where the jerk jumps
 # by 80 rad/s^3 at the point it is 1.3e-14 rad from that of the piece before.
 NEAR_POINT = 1e-5
 # Of a trajectory.
@@ -22,14 +22,14 @@ _FIELDS = ('times', 'positions', 'velocities', 'accelerations')
 
 
 def _are_all(flags: NDArray[np.bool_]) -> bool:
-    # As their `all` says, in half the time.
+    # Like `flags.all()`, in half the time.
     return bool(np.logical_and.reduce(flags, axis=None))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MotionLimits:
     """
-    What each joint may do.
+    Limits of each joint.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class MotionLimits:
     Raises
     ------
     OptionsError
-        A limit that is not a positive number, or another number of joints.
+        A limit that is not a positive number, or arrays of different lengths.
 
     """
 
@@ -96,9 +96,9 @@ class Trajectory:
             object.__setattr__(self, name, value)
 
     def _sound(self) -> list[Array] | None:
-        """Return copies of all fields where nothing is wrong with them: a brake waits for it."""
+        """Return copies of all fields if they are valid: the fast path of a stop."""
         given = [getattr(self, name) for name in _FIELDS]
-        # Of what else may be given, true and "1" would become numbers.
+        # Other types would be converted: true and "1" would become numbers.
         if not all(type(value) is np.ndarray and value.dtype == np.float64 for value in given):
             return None
         fields = [np.array(value, order='C') for value in given]
@@ -163,7 +163,7 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
     c[:, 0], c[:, 1] = p[:-1], v[:-1] * T
     a0 = a[:-1] * square
     c[:, 2] = 0.5 * a0
-    # What position, velocity and acceleration at u = 1 still lack after these three terms.
+    # Remainders of position, velocity and acceleration at u = 1 after these three terms.
     lacks = np.empty((len(T), 3, p.shape[1]))
     lacks[:, 0] = p[1:] - p[:-1] - c[:, 1] - c[:, 2]
     lacks[:, 1] = v[1:] * T - c[:, 1] - a0
@@ -183,7 +183,7 @@ def positions_at(trajectory: Trajectory, times: ArrayLike) -> Array:
 
 def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Array]:
     """
-    Return the state at some times; before the first and after the last point it stands still.
+    Return the state at some times; at rest before the first and after the last point.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def jerks_at(trajectory: Trajectory, times: ArrayLike) -> Array:
 
 def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     """
-    Return what a trajectory does between two times, which then begins at time 0.
+    Return the part of a trajectory between two times, shifted to begin at time 0.
 
     It is that trajectory to rounding: a part of a quintic is the quintic through its ends, and
     every point between the two times stays.
@@ -259,13 +259,13 @@ def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
 
 
 def near_point(trajectory: Trajectory, time: float) -> float:
-    """Return a time, or that of the point of the trajectory that is next to it [s]."""
+    """Return a time, replaced by that of a point of the trajectory within `NEAR_POINT` [s]."""
     near = float(trajectory.times[np.abs(trajectory.times - time).argmin()])
     return near if abs(near - time) <= NEAR_POINT else time
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
-    """Return two trajectories in one, the second from the last point of the first on."""
+    """Return two trajectories in one; the second begins at the last point of the first."""
     return Trajectory(
         times=np.concatenate([before.times, before.times[-1] + after.times[1:]]),
         positions=np.concatenate([before.positions, after.positions[1:]]),
@@ -276,7 +276,7 @@ def joined(before: Trajectory, after: Trajectory) -> Trajectory:
 
 def _state_by(trajectory: Trajectory, time: float, ahead: float) -> tuple[Array, Array, Array]:
     """
-    Return the state at a time, each (1, dof), by the polynomial that holds a little ahead [s].
+    Return the state at a time, each (1, dof), by the polynomial valid a little ahead [s].
 
     At one of its points the state is that of the point, to the bit.
     """
@@ -311,7 +311,7 @@ def _position(c: Array, u: Array) -> Array:
 
 
 def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
-    """Return what is left of a motion when the arm is out, at one of its points [s]."""
+    """Return the remaining motion after an escape, from the point nearest to that time [s]."""
     if escape_time == 0.0:
         return trajectory
     begin = trajectory.times[np.abs(trajectory.times - escape_time).argmin()]

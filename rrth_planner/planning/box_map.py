@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Maps of axis-aligned boxes, in the plane or in any dimension, for a point to move among."""
+"""Maps of axis-aligned boxes for a point robot, in any dimension."""
 
 from dataclasses import dataclass
 
@@ -23,14 +23,14 @@ FREE_RADIUS = jit.first_class(map_validity.free_radius)
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class BoxMap:
     """
-    A start, a goal and the boxes between them; touching a box is allowed, entering it is not.
+    A start, a goal and the boxes between them; a point may be on a face of a box, not inside.
 
     Parameters
     ----------
     name : str
     bounds : array_like, shape (2, dof)
-        Lower and upper corner of the map, in 1 to 64 dimensions. A box that touches it goes on
-        beyond: the border is no way round.
+        Lower and upper corner of the map, in 1 to 64 dimensions. A box at the border extends
+        beyond it, so no path passes there.
     obstacles : array_like, shape (m, 2, dof)
         Lower and upper corner of each box.
     start, goal : array_like, shape (dof,)
@@ -38,7 +38,7 @@ class BoxMap:
     Raises
     ------
     SceneError
-        Too many dimensions, a box without inside, a start or goal outside the map or inside a box,
+        Too many dimensions, a box without volume, a start or goal outside the map or inside a box,
         a coordinate beyond 1e4, a name that is not printable.
 
     """

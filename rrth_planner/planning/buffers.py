@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Room in which trees grow: made once for each thread, and used again from plan to plan."""
+"""Buffers in which trees grow: allocated once per thread, and reused from plan to plan."""
 
 import threading
 
@@ -18,7 +18,7 @@ _local = threading.local()
 
 class Workspace:
     """
-    Arrays for the kernels of one thread; what they hold ends with the plan.
+    Arrays for the kernels of one thread; their content is valid during one plan.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class Workspace:
     """
 
     def __init__(self, dof: int, capacity: int) -> None:
-        """Make the arrays; the system gives them memory where they are written to."""
+        """Allocate the arrays; memory is committed on first write."""
         self.dof, self.capacity = dof, capacity
-        # Two pairs of trees: the one at work, and the one that led to the best path.
+        # Two pairs of trees: the growing one, and the one that gave the best path.
         self.tree_q = np.empty((2, 2, capacity, dof))
         self.parents = np.empty((2, 2, capacity), dtype=np.int64)
         self.sizes = np.zeros((2, 4), dtype=np.int64)
@@ -43,7 +43,7 @@ class Workspace:
 
 
 def workspace(dof: int, capacity: int) -> Workspace:
-    """Return this thread's room for a plan, cleared."""
+    """Return the workspace of this thread, cleared."""
     kept: Workspace | None = getattr(_local, 'kept', None)
     if kept is None or kept.dof != dof or kept.capacity < capacity:
         kept = _local.kept = Workspace(dof, capacity)

@@ -10,14 +10,14 @@ from rrth_planner.model.status import PlanStatus
 
 class Deadline:
     """
-    Says how long a plan has been running, and when it must end.
+    Clock of a plan, and its end.
 
     Parameters
     ----------
     time_limit : float
         [s], from now.
     should_stop : callable
-        True cancels.
+        Returns True to cancel the plan.
 
     """
 

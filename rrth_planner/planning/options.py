@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The options of the planners, one class an algorithm: the class is the choice."""
+"""Options of the planners: one class per algorithm, which selects it."""
 
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -26,7 +26,7 @@ def _other_default(kind: Any, name: str, default: Any) -> Any:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TreeOptions:
     """
-    What all planners have in common; every field carries range, unit and meaning as metadata.
+    What all planners have in common; each field has range, unit and meaning as metadata.
 
     Raises
     ------
@@ -37,11 +37,11 @@ class TreeOptions:
 
     step_size: float = _option(1.5, 0.01, 1000.0, 'rad', 'longest extension of a tree')
     clearance_gain: float = _option(
-        0.0, 0.0, 1000.0, '-', 'step as a multiple of the free radius; 0: always step_size'
+        0.0, 0.0, 1000.0, '-', 'step size as a multiple of the free radius; 0: always step_size'
     )
-    goal_bias: float = _option(0.05, 0.0, 1.0, '-', 'chance that a draw is a goal posture')
-    is_bidirectional: bool = _option(True, 0, 1, '-', 'grow a tree from the goals too')
-    max_samples: int = _option(20000, 1, 10**7, '-', 'draws of one growth before it gives up')
+    goal_bias: float = _option(0.05, 0.0, 1.0, '-', 'probability of sampling a goal configuration')
+    is_bidirectional: bool = _option(True, 0, 1, '-', 'also grow a tree from the goals')
+    max_samples: int = _option(20000, 1, 10**7, '-', 'samples after which a growth fails')
     time_limit: float = _option(2.0, 1e-3, 3600.0, 's', 'planning fails after this time')
 
     def __post_init__(self) -> None:
@@ -71,7 +71,7 @@ class GrowthOptions(TreeOptions):
     """What RRT and RRT-H have in common: growth to a first path."""
 
     near_bias: float = _option(
-        0.9, 0.0, 1.0, '-', 'chance that a draw is near an end of the path, at first'
+        0.9, 0.0, 1.0, '-', 'initial probability of sampling near the start or a goal'
     )
 
 
@@ -85,10 +85,10 @@ class RRTStarOptions(TreeOptions):
     """RRT* (Karaman and Frazzoli 2011): the best path after `max_samples` draws."""
 
     improve_time: float = _option(
-        0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
+        0.5, 0.0, 3600.0, 's', 'longest time spent on improving a path; 0: return the first path'
     )
     rewire_factor: float = _option(
-        1.1, 0.01, 100.0, '-', 'radius of the neighbourhood over the least that is optimal'
+        1.1, 0.01, 100.0, '-', 'rewiring radius over the least one of optimality'
     )
 
 
@@ -101,35 +101,35 @@ class InformedRRTStarOptions(RRTStarOptions):
 class RRTStarSmartOptions(RRTStarOptions):
     """RRT*-Smart (Nasir et al. 2013)."""
 
-    biasing_ratio: int = _option(2, 1, 10**6, '-', 'every so many draws one is near a beacon')
+    biasing_ratio: int = _option(2, 1, 10**6, '-', 'one in this many samples is near a beacon')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RRTHOptions(GrowthOptions):
-    """RRT-H (Zou et al. 2024): grow to a first path, then pull it taut; again round other ways."""
+    """RRT-H (Zou et al. 2024): grow to a path and shortcut it, then avoid it and repeat."""
 
     corner_spacing: float = _option(
-        0.1, 1e-4, 100.0, 'rad', 'k of the paper: shortest cut of a corner that is still tried'
+        0.1, 1e-4, 100.0, 'rad', 'k of the paper: shortest corner cut that is tried'
     )
     corner_moves: int = _option(
-        10, 0, 10**4, '-', 'rounds at most in which corners move along what they lean on'
+        10, 0, 10**4, '-', 'most elastic band iterations, which move corners along contacts'
     )
     improve_time: float = _option(
-        0.5, 0.0, 3600.0, 's', 'at most so long a found path is improved; 0: the first path'
+        0.5, 0.0, 3600.0, 's', 'longest time spent on improving a path; 0: return the first path'
     )
     club_attempts: int = _option(
-        3, 0, 10**4, '-', 'further growths with the path club after the first path'
+        3, 0, 10**4, '-', 'further growths that avoid the path club, after the first path'
     )
-    club_radius: float = _option(0.5, 0.0, 1000.0, 'rad', 'range in which club points count')
-    club_count: int = _option(2, 0, 10**6, '-', 'a new point with more club points is rejected')
-    club_probability: float = _option(0.9, 0.0, 1.0, '-', 'chance of that rejection')
-    club_budget: int = _option(100, 1, 10**7, '-', 'draws of one growth with the path club')
+    club_radius: float = _option(0.5, 0.0, 1000.0, 'rad', 'radius within which club points count')
+    club_count: int = _option(2, 0, 10**6, '-', 'a sample with more club points near is rejected')
+    club_probability: float = _option(0.9, 0.0, 1.0, '-', 'probability of that rejection')
+    club_budget: int = _option(100, 1, 10**7, '-', 'samples of one growth avoiding the path club')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedRRTHOptions(RRTHOptions):
     """
-    RRT-H with the three steps as printed, to check the paper by; its paths may touch.
+    RRT-H with the three steps as printed, to reproduce the paper; its paths may collide.
 
     By default it grows as printed too: one tree, uniform draws. P_T and P_C are the points of
     section 2: along the segment, and along the lines to it.
@@ -138,12 +138,12 @@ class PrintedRRTHOptions(RRTHOptions):
     goal_bias: float = _other_default(RRTHOptions, 'goal_bias', 0.0)
     is_bidirectional: bool = _other_default(RRTHOptions, 'is_bidirectional', False)
     near_bias: float = _other_default(RRTHOptions, 'near_bias', 0.0)
-    corner_moves: int = _option(0, 0, 0, '-', 'none: the three steps are all there is')
+    corner_moves: int = _option(0, 0, 0, '-', '0: only the three steps')
     target_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_T')
     check_spacing: float = _option(0.05, 1e-4, 100.0, 'rad', 'distance between points P_C')
 
 
-# What files and parameters call the algorithms.
+# Names of the algorithms in files and parameters.
 ALGORITHMS: dict[str, type[TreeOptions]] = {
     'rrt_h': RRTHOptions,
     'rrt': RRTOptions,

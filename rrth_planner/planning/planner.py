@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The planner: a problem and options in, a result out, whatever the algorithm."""
+"""The planner: from a problem and options to a result, for all algorithms."""
 
 from collections.abc import Callable
 import functools
@@ -55,19 +55,19 @@ def plan(
     options : TreeOptions
         Its class is the choice of the algorithm.
     rng : numpy.random.Generator
-        The only source of chance.
+        The only random source.
     should_stop : callable
-        Polled between batches; True cancels.
+        Polled between batches; returns True to cancel.
     previous : PlanResult
-        Result of an earlier plan whose start and obstacles differed little: what is still free of
-        its trees is where growth begins.
+        Result of an earlier plan with a similar start and obstacles: growth begins with the
+        branches of its trees that are still free.
 
     Raises
     ------
     OptionsError
-        Options of no known algorithm.
+        Options of an unknown algorithm.
     RrthError
-        An earlier plan of another number of joints.
+        An earlier plan with another number of joints.
 
     """
     home = _SEARCH.get(type(options))

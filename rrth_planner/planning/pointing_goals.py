@@ -18,9 +18,9 @@ from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.planning.problem import PlanningProblem
 
-# Draws of joints: a few give good postures at once; many, before none is said to be free.
+# Samples of the joints: few are enough mostly; many before all are reported as not free.
 FEW, MANY = 176, 4096
-# Goals that are kept, and postures that touch.
+# Most goals that are kept, and most configurations in collision.
 MOST, MOST_BLOCKED = 256, 512
 # A joint that moves a point of the ray by less than this, in m per rad or m, does not move it.
 LEAST_MOVE = 1e-6
@@ -57,18 +57,18 @@ CLOSED_FORM = PointingKernels(
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GoalSet:
     """
-    Configurations that aim at a target, nearest first.
+    Goal configurations of a target, nearest first.
 
     Parameters
     ----------
     q_goals : ndarray, shape (n, dof)
         The free ones [rad].
     n_bent : int
-        So many of the first ones are not reached by a straight free edge.
+        Number of the first ones that no straight free edge reaches.
     n_aiming : int
-        How many aim at all, free or not.
+        Number of configurations that aim at the target, free or not.
     q_blocked : ndarray, shape (m, dof)
-        The others, up to a few hundred [rad].
+        Those in collision, up to a few hundred [rad].
     blocked_reaches : ndarray, shape (m,)
         Length of their rays out to the target [m].
 
@@ -84,7 +84,7 @@ class GoalSet:
 @functools.lru_cache(maxsize=16)
 def pointing_kernels(arm: ArmModel) -> PointingKernels:
     """
-    Return how an arm aims: in closed form if its last two joints are a pan and tilt unit.
+    Return the goal solver of an arm: closed form if its last two joints are a pan-tilt unit.
 
     That is revolute joints, square to each other and to the ray, without `a` offset. With more
     than a few other joints the search along the manifold of the closed form would take too long.
@@ -98,7 +98,7 @@ def pointing_kernels(arm: ArmModel) -> PointingKernels:
 
 @functools.cache
 def numerical() -> PointingKernels:
-    """Return how any arm aims; compiled when the first arm needs it."""
+    """Return the numerical goal solver; compiled when the first arm needs it."""
     kernels = import_module('rrth_planner.kernels.kinematics.numerical_ik')
     return PointingKernels(
         goal_candidates=jit.first_class(kernels.goal_candidates),
@@ -109,7 +109,7 @@ def numerical() -> PointingKernels:
 
 def check_pointing_arm(arm: ArmModel) -> None:
     """
-    Raise ModelError if the ray of an arm sweeps no more than a surface, whatever the joints do.
+    Raise ModelError if the joints can sweep the ray of an arm over a surface at most.
 
     To reach the targets beside it, the joints must move a point of the ray both ways across it.
     """
@@ -122,8 +122,8 @@ def check_pointing_arm(arm: ArmModel) -> None:
     n_directions = int((slopes.max(axis=0) > LEAST_MOVE).sum())
     if n_directions < 2:
         raise ModelError(
-            f'arm: its joints move the pointing ray across itself in {n_directions} direction(s), '
-            'expected 2: the ray sweeps a surface at most, and meets no target beside it'
+            f'arm: its joints move the pointing ray sideways in {n_directions} direction(s), '
+            'expected 2: the ray sweeps a surface at most, and misses all targets beside it'
         )
 
 
@@ -152,7 +152,7 @@ def goal_configurations(
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
-        Half of the number of candidates that are tried.
+        Half of the number of candidates.
 
     """
     kernels, dof = pointing_kernels(arm), arm.dof

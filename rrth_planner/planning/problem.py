@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a planner is asked: a world, where to start, and where it may end."""
+"""The planning problem: a world, a start configuration and goal configurations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class PlanningProblem:
     q_goals : array_like, shape (n, dof)
         Valid configurations, nearest to q_start first [rad].
     n_bent : int
-        So many of the first goals are known not to be reached by a straight free edge.
+        Number of the first goals that are known to have no straight free edge.
     slide_goal : compiled function
         The seam `kernels.jit.SLIDE`: moves the last waypoint along the goal manifold in place, by
         edges that the world allows. Default: the goals are points.

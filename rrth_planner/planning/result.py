@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What planning brought: a path or none, the trees, and how the cost fell."""
+"""Result of planning: the path, if any, the trees, and the cost history."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from rrth_planner.model.status import PlanStatus
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tree:
     """
-    Configurations and where each came from.
+    Configurations and their parents.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ class Tree:
         parents.setflags(write=False)
         # A parent that is out of place is greater than its own index, or as great.
         if len(parents) != len(nodes) or np.count_nonzero(parents >= np.arange(len(nodes))):
-            raise RrthError('parents: expected for every node one that comes before it, or -1')
+            raise RrthError('parents: expected for each node the index of an earlier one, or -1')
         object.__setattr__(self, 'nodes', nodes)
         object.__setattr__(self, 'parents', parents)
 
 
 class GrownTrees(Sequence[Tree]):
     """
-    Trees as a kernel left them, copied at once; each becomes a value when it is looked at.
+    Trees copied from the buffers of a kernel; each is converted on access.
 
     Where rewiring has left a parent behind its child the nodes are put in the order of depth.
 
@@ -112,8 +112,8 @@ class PlanResult:
     path : Path or None
         The best path; None unless solved.
     raw_path : Path or None
-        The first path that growth found, before any shortening; None where a straight edge did,
-        and for RRT* and its kin, which shorten nothing.
+        The first path found by growth, before any shortcut; None where a straight edge was one,
+        and for RRT* and its relatives.
     trees : sequence of Tree
         From the start and, with two trees, from the goals, as they were last.
     cost_history, sample_history, time_history : tuple of float, of int, of float
@@ -123,7 +123,7 @@ class PlanResult:
     planning_time : float
         [s].
     is_reproducible : bool
-        False where the clock ended the improvement: the seed alone does not fix the path then.
+        False where a time limit ended the improvement: the path then depends on timing.
 
     """
 

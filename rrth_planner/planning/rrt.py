@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Growth to a first path: RRT with one tree or two, and what RRT-H builds on."""
+"""Growth to a first path: RRT with one tree or two, the basis of RRT-H."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,16 +22,16 @@ from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Growth:
     """
-    What one growth brought.
+    Result of one growth.
 
     Parameters
     ----------
     waypoints : ndarray or None
         The first path, shape (n, dof) [rad].
     n_samples : int
-        Draws that it took.
+        Number of samples.
     stopped : PlanStatus or None
-        Why growth had to stop, if it had.
+        Why growth was stopped early, if it was.
     time : float
         When it ended, since the plan began [s].
     trees : sequence of Tree
@@ -52,7 +52,7 @@ def search(
     deadline: Deadline,
     previous: Sequence[Tree],
 ) -> PlanResult:
-    """Return the first path that RRT finds, unshortened."""
+    """Return the first path that RRT finds, without shortcuts."""
     grown = grow(problem, problem.q_goals, options, rng, deadline, previous=previous)
     if grown.waypoints is None:
         return PlanResult(
@@ -101,13 +101,13 @@ def grow(
     rng : numpy.random.Generator
     deadline : Deadline
     previous : sequence of Tree
-        Trees of an earlier plan: what is still free of them is where growth begins.
+        Trees of an earlier plan: growth begins with their branches that are still free.
     club : ndarray, shape (m, dof)
         Points to keep away from [rad]; the options are then RRTHOptions.
     best_cost : float
-        Only draws that could lead to a shorter path are made [rad].
+        Only samples that can lead to a shorter path are drawn [rad].
     budget : int
-        Draws at most; by default `max_samples`.
+        Most samples; default: `max_samples`.
 
     """
     world, dof = problem.world, len(problem.q_start)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
+"""RRT-H: grow, shortcut, and repeat while avoiding earlier paths (Zou et al. 2024)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.kernels import jit
 from rrth_planner.kernels.search import elastic_band, rrt_h
 from rrth_planner.kernels.search.random import random_state
-from rrth_planner.kernels.search.shortcut import TAUT
+from rrth_planner.kernels.search.shortcut import LEAST_GAIN
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
@@ -20,8 +20,8 @@ from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.result import PlanResult, Tree
 from rrth_planner.planning.rrt import grown_trees, plant, room_for
 
-TIGHTEN = jit.first_class(elastic_band.tighten)
-# Time between two looks at whether to stop [s].
+SHORTEN = jit.first_class(elastic_band.shorten)
+# Time between two checks of the deadline [s].
 SLICE = 0.005
 
 
@@ -31,10 +31,10 @@ def search(
     rng: np.random.Generator,
     deadline: Deadline,
     previous: Sequence[Tree],
-    shorten: Any = TIGHTEN,
+    shorten: Any = SHORTEN,
 ) -> PlanResult:
     """
-    Return the shortest path of some growths, each pulled taut.
+    Return the shortest path of some growths, each with shortcuts.
 
     The straight edges to the goals come first, nearest goal first: a length that no path to a
     later goal can beat ends the search. `shorten` is the seam `kernels.jit.SHORTEN`.
@@ -92,7 +92,7 @@ def search(
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
     """Return the entries of `settings` of the kernel."""
-    how = (options.corner_spacing, float(options.corner_moves), TAUT, 0.0, 0.0)
+    how = (options.corner_spacing, float(options.corner_moves), LEAST_GAIN, 0.0, 0.0)
     if isinstance(options, PrintedRRTHOptions):
         how = (options.corner_spacing, 0.0, 0.0, options.target_spacing, options.check_spacing)
     return np.array(

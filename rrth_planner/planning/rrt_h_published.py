@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H with its three steps as printed, to check the paper by; its paths may touch."""
+"""RRT-H with its three steps as printed, to reproduce the paper; its paths may collide."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -22,14 +22,14 @@ from rrth_planner.planning.options import (
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
 
-# Draws between two looks at the clock.
+# Samples between two checks of the clock.
 BATCH = 500
 # Pairs of nodes at which the two trees meet, at most.
 MAX_MEETINGS = 65536
 
 
 class _Trees:
-    """The buffers of the two trees, as the kernels see them."""
+    """The buffers of the two trees, laid out for the kernels."""
 
     def __init__(
         self, problem: PlanningProblem, options: RRTStarOptions, previous: Sequence[Tree]
@@ -51,12 +51,12 @@ class _Trees:
         self.shortened = np.empty((MAX_WAYPOINTS, dof))
         self.is_bidirectional = options.is_bidirectional
         for side, grown in enumerate(previous[: 2 if options.is_bidirectional else 1]):
-            self._take_over(problem, side, grown)
+            self._reuse(problem, side, grown)
         if previous:
             self._meet(problem, options)
 
-    def _take_over(self, problem: PlanningProblem, side: int, old: Tree) -> None:
-        """Begin with what is still free of an earlier tree."""
+    def _reuse(self, problem: PlanningProblem, side: int, old: Tree) -> None:
+        """Begin with the branches of an earlier tree that are still free."""
         check_dof(old.nodes, len(problem.q_start), 'previous')
         world, n_roots = problem.world, int(self.sizes[side])
         parents = np.full(self.tree_q.shape[1], -1, dtype=np.int64)
@@ -81,7 +81,7 @@ class _Trees:
         self.sizes[side] = n
 
     def _meet(self, problem: PlanningProblem, options: RRTStarOptions) -> None:
-        """Look for a first path in the trees that were taken over."""
+        """Search for a first path in the reused trees."""
         world, meeting = problem.world, np.full(2, -1, dtype=np.int64)
         tree_reuse.join(
             world.edge_check,
@@ -100,7 +100,7 @@ class _Trees:
             rrt_star.find_best(self.tree_q, self.costs, self.sizes, self.meetings, self.best)
 
     def path(self) -> Array | None:
-        """Return the waypoints of the best path of the trees, (n, dof); None: no room for it."""
+        """Return the waypoints of the best path of the trees, (n, dof); None: buffer too small."""
         a, b = self.meetings[int(self.best[1])]
         path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
         n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)

@@ -1,9 +1,9 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The exact shortest path on a map of rectangles, to judge what the planners bring.
+The exact shortest path on a map of rectangles, a reference for the planners.
 
-Nothing here is shared with their kernels: a visibility graph of the corners and Dijkstra's
+It shares nothing with their kernels: a visibility graph of the corners and Dijkstra's
 algorithm (Lozano-Perez and Wesley 1979).
 """
 
@@ -16,16 +16,16 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.planning.box_map import BoxMap
 
-# How far a line may enter a rectangle and still pass for touching it, as a share of the map.
-TOUCHING = 1e-9
+# Penetration of a rectangle by a line that still counts as contact, as a share of the map.
+CONTACT = 1e-9
 
 
 def shortest_path(box_map: BoxMap) -> tuple[float, Array]:
     """
     Return the length of the shortest path from start to goal, and its waypoints.
 
-    Touching a rectangle is allowed, entering it is not; one that touches the border of the map
-    goes on beyond it.
+    Contact with a rectangle is allowed, entering it is not; one at the border of the map extends
+    beyond it.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ def shortest_path(box_map: BoxMap) -> tuple[float, Array]:
     Returns
     -------
     length : float
-        [map units]; infinite where there is no way.
+        [map units]; infinite where there is no path.
     waypoints : ndarray, shape (n, 2)
-        From start to goal; empty where there is no way [map units].
+        From start to goal; empty where there is no path [map units].
 
     Raises
     ------
@@ -83,7 +83,7 @@ def enters(q_from: Array, q_to: Array, boxes: Array) -> NDArray[np.bool_]:
         Lower and upper corners [map units].
 
     """
-    slack = TOUCHING * max(1.0, float(np.ptp(boxes)) if boxes.size else 1.0)
+    slack = CONTACT * max(1.0, float(np.ptp(boxes)) if boxes.size else 1.0)
     lower, upper = boxes[None, :, 0] + slack, boxes[None, :, 1] - slack
     at, step = q_from[:, None, :], (q_to - q_from)[:, None, :]
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -99,7 +99,7 @@ def enters(q_from: Array, q_to: Array, boxes: Array) -> NDArray[np.bool_]:
 
 
 def _dijkstra(distances: Array, source: int, target: int) -> tuple[float, list[int]]:
-    """Return the least sum of distances from source to target, and the nodes on the way."""
+    """Return the least sum of distances from source to target, and the nodes of that path."""
     best = np.full(len(distances), math.inf)
     best[source] = 0.0
     previous: dict[int, int] = {}

@@ -3,8 +3,8 @@
 """
 Runs spread over cores or machines by dask.distributed, or done one after another.
 
-Times that are taken beside other runs are noisy: what a table says about time comes from a serial
-pass, what it says about many seeds from the cluster.
+Times of concurrent runs are noisy: tables take times from a serial pass, and results over many
+seeds from the cluster.
 """
 
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"

@@ -144,7 +144,7 @@ QUICK = Extent(few=10, many=20, seeds=50, long=3, arm=4, arm_modes=4)
 
 
 def timed_runs(extent: Extent) -> list[Run]:
-    """Return the runs whose times are told, to be done one after another."""
+    """Return the runs whose times are reported, to be done one after another."""
     wanted = [
         *(
             (problem, name, seed)
@@ -169,7 +169,7 @@ def timed_runs(extent: Extent) -> list[Run]:
 def spread_runs(extent: Extent) -> list[Run]:
     """Return the other runs, which may be done beside each other."""
     runs = [*_long_runs(extent), *_arm_runs(extent), *_club_runs(extent), *_map_runs(extent)]
-    # Long and short ones mixed: a progress bar tells the truth, and no worker is left with all
+    # Long and short ones mixed: the progress bar is realistic, and no worker is left with all
     # the long ones.
     return [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
 

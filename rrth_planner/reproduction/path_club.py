@@ -21,7 +21,7 @@ class ScatterOptions(RRTHOptions):
     RRT-H's growths alone, `club_attempts` after the first, each of `club_budget` draws at most.
 
     Each is kept away from the paths of those before it; with a `club_radius` of 0 they know
-    nothing of each other. Nothing is pulled taut.
+    nothing of each other. No shortcuts are applied.
     """
 
 
@@ -43,5 +43,5 @@ def scattered_growths(
 
 
 def goes_over_the_top(path: Array) -> bool:
-    """Return whether a path, shape (n, 2), takes the longer way of the map."""
+    """Return whether a path, shape (n, 2), is of the longer homotopy class of the map."""
     return bool(path[:, 1].max() > TOP)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The problems of a campaign by name, each with a judge that shares nothing with the planner."""
+"""The problems of a campaign by name, each with a reference checker independent of the planner."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,14 +41,14 @@ TARGETS = {
 FOLDED = np.array([0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi])
 # Growth of the wearer's boxes, and how much of the ray counts as arm [m].
 MARGIN, RAY = 0.02, 1.0
-# Spacing at which the judge looks at an arm's motion [rad].
+# Spacing at which the reference checker samples an arm's motion [rad].
 JUDGE_SPACING = 0.002
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NamedProblem:
     """
-    A planning problem, and who says whether a path of it is valid.
+    A planning problem with the reference check of its paths.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def load_wearer() -> Scene:
 
 
 def _arm_problem(name: str, collision: str) -> NamedProblem:
-    """Return the motion from the folded state to the nearest posture that aims at a target."""
+    """Return the problem from the folded configuration to the nearest goal configuration."""
     target = TARGETS.get(name.removeprefix('arm/'))
     if target is None:
         raise SceneError(f'problem "{name}": expected arm/ and one of {", ".join(TARGETS)}')
@@ -133,7 +133,7 @@ def _arm_problem(name: str, collision: str) -> NamedProblem:
     world = arm_world(arm, scene, MARGIN, RAY)
     goals = goal_configurations(arm, PointingGoal(np.array(target)), world, FOLDED, MANY)
     if len(goals.q_goals) == 0:
-        raise SceneError(f'problem "{name}": target {target}, expected one that a posture aims at')
+        raise SceneError(f'problem "{name}": target {target}, expected one with a free goal')
     problem = PlanningProblem(
         world=_checked(world, collision), q_start=FOLDED, q_goals=goals.q_goals[:1]
     )
@@ -152,7 +152,7 @@ def _arm_problem(name: str, collision: str) -> NamedProblem:
 
 
 def keeps_clear(arm: ArmModel, scene: Scene, waypoints: Array, margin: float) -> bool:
-    """Return whether a path, (n, dof) [rad], touches none of the boxes grown by a margin [m]."""
+    """Return whether a path, (n, dof) [rad], is clear of the boxes grown by a margin [m]."""
     for q_from, q_to in zip(waypoints[:-1], waypoints[1:], strict=True):
         n = int(np.linalg.norm(q_to - q_from) / JUDGE_SPACING) + 2
         q = q_from + np.linspace(0.0, 1.0, n)[:, None] * (q_to - q_from)

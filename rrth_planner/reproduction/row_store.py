@@ -34,7 +34,7 @@ SCHEMA = pa.schema(
         *((name, pa.string()) for name in _TEXT),
         *((name, pa.int64()) for name in _INTS),
         *((name, pa.float64()) for name in _FLOATS),
-        # By judges that share nothing with the planner; the second without the margin.
+        # By reference checkers independent of the planner; the second without the margin.
         ('is_valid', pa.bool_()),
         ('is_body_clear', pa.bool_()),
         # Sum of the changes of each joint along the path [rad].
@@ -60,7 +60,7 @@ def append_rows(path: Path, rows: Sequence[Row]) -> None:
 
 
 def unite_parts(path: Path) -> None:
-    """Bring all rows of a campaign into its one file."""
+    """Merge all rows of a campaign into its file."""
     parts = _parts(path)
     if not parts:
         return
@@ -94,7 +94,7 @@ def read_rows(path: Path) -> pa.Table:
         try:
             tables.append(pq.read_table(part).cast(SCHEMA))
         except (pa.ArrowException, ValueError, OSError):
-            # Cut short, by a full disk say: its runs are done again.
+            # Truncated, e.g. by a full disk: its runs are repeated.
             continue
     table = pa.concat_tables([SCHEMA.empty_table(), *tables])
     # An interruption while parts were united leaves rows twice.

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""One run of a planner and the flat row that it leaves."""
+"""One run of a planner, and its row of results."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -28,7 +28,7 @@ from rrth_planner.reproduction.path_club import (
 from rrth_planner.reproduction.problems import CERTIFIED, load_problem, NamedProblem
 
 Row = dict[str, Any]
-# What decides about a row besides the run itself.
+# Sources that determine a row, besides the run itself.
 _SOURCES = (
     *('kernels', 'planning', 'collision/world.py', 'collision/box_tree.py'),
     *('collision/reference_checker.py', 'model/reach.py', 'reproduction/problems.py'),
@@ -39,7 +39,7 @@ _SOURCES = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
     """
-    What is asked of a planner once.
+    One run of a planner on a problem.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def options_digest(options: TreeOptions) -> str:
 
 @cache
 def source_digest() -> str:
-    """Return a short digest of the sources that decide what a run brings."""
+    """Return a short digest of the sources that determine the result of a run."""
     root = pathlib.Path(__file__).parent.parent
     places = [root / name for name in _SOURCES]
     files = [f for p in places for f in ([p] if p.is_file() else sorted(p.rglob('*.py')))]
@@ -95,7 +95,7 @@ def provenance() -> Mapping[str, str | None]:
 
 
 def processor_name() -> str:
-    """Return the processor's own name where the system tells it."""
+    """Return the name of the processor, if the system provides it."""
     try:
         for line in pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
             if line.startswith('model name'):
@@ -140,7 +140,7 @@ def execute(run: Run, timing: str) -> Row:
 
 
 def _planned(named: NamedProblem, run: Run) -> Row:
-    """Return the columns that a plan brings."""
+    """Return the columns of a plan."""
     kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
     if kind not in _warm:
         # Kernels are loaded by the first plan that uses them: that is not its planning time.
@@ -149,13 +149,13 @@ def _planned(named: NamedProblem, run: Run) -> Row:
     result = plan(named.problem, run.options, np.random.default_rng(run.seed))
     waypoints = None if result.path is None else result.path.waypoints
     is_valid = None if waypoints is None else named.is_path_valid(waypoints)
-    # What keeps off the grown boxes keeps off the body too.
+    # A path clear of the grown boxes is clear of the body too.
     is_body_clear = is_valid or (None if waypoints is None else named.is_body_clear(waypoints))
     return {**_outcome(result), 'is_valid': is_valid, 'is_body_clear': is_body_clear}
 
 
 def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
-    """Return the columns that growths after each other bring; what is left out is null."""
+    """Return the columns of successive growths; omitted ones are null."""
     start = perf_counter()
     growths = scattered_growths(named.problem, options, seed)
     elapsed = perf_counter() - start
@@ -173,7 +173,7 @@ def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
 
 
 def _outcome(result: PlanResult) -> Row:
-    """Return the columns that tell how a plan ended."""
+    """Return the columns of the result of a plan."""
     path, is_improved = result.path, len(result.cost_history) > 0
     travel = None if path is None else np.abs(np.diff(path.waypoints, axis=0)).sum(axis=0)
     return {
@@ -206,7 +206,7 @@ def _version(package: str) -> str:
 
 def _commit() -> str | None:
     try:
-        told = subprocess.run(
+        found = subprocess.run(
             ['git', 'rev-parse', '--short', 'HEAD'],
             cwd=pathlib.Path(__file__).parent,
             capture_output=True,
@@ -216,7 +216,7 @@ def _commit() -> str | None:
         )
     except (OSError, subprocess.SubprocessError):
         return None
-    return told.stdout.strip() or None
+    return found.stdout.strip() or None
 
 
 def _first_cost(result: PlanResult) -> float | None:

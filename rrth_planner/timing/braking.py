@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Braking as a motion of its own, and the proof that it is safe."""
+"""Braking along a running trajectory, and its certificate."""
 
 import numpy as np
 from rrth_planner.collision.certificate import Certificate, certify
@@ -14,12 +14,12 @@ ROUNDING = 1e-9
 
 def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajectory:
     """
-    Return the motion from the state of a running trajectory to rest along its path.
+    Return the stop along the path of a running trajectory, from its state at some time.
 
     It begins with position, velocity and acceleration of that time. Between its points no
     joint is further than 1e-4 rad from the path, nor more than 1 % beyond its limits, or beyond
-    what the trajectory itself does up to there, where that is more; a jerk is told to rounding,
-    which in pieces below 0.1 ms is more than that.
+    what the trajectory itself does up to there, where that is more; jerks only up to rounding,
+    which in pieces below 0.1 ms exceeds that.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.
         return stop
-    # Compiled code rounds the last digit of the first state in another way.
+    # Compiled code rounds the last digit of the first state differently.
     return Trajectory(
         times=stop.times,
         positions=np.concatenate([q, stop.positions[1:]]),
@@ -54,7 +54,7 @@ def certify_braking(
     trajectory: Trajectory, time: float, world: World, limits: MotionLimits
 ) -> Certificate:
     """
-    Return the proof that a running trajectory can brake at some time without touching the world.
+    Return the certificate of the stop that a running trajectory makes if braked at some time.
 
     Parameters
     ----------
@@ -62,9 +62,9 @@ def certify_braking(
     time : float
         When it begins to brake [s].
     world : World
-        As it is then, not as it was when the trajectory was planned.
+        The present one, not the one that the trajectory was planned in.
     limits : MotionLimits
-        That it brakes within.
+        Limits of the stop.
 
     """
     return certify(brake(trajectory, time, limits), world)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Rounded corners: where a path may leave its waypoint to pass it without stopping."""
+"""Corner blends: curves that pass a waypoint without stopping."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from rrth_planner.model.arrays import Array, check_dof
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits
 
-# A blend takes at most this share of an edge, so that two neighbours leave a straight between.
+# Largest share of an edge for a blend, so that a straight part remains between two neighbours.
 SHARE = 0.45
 # Each try is this much smaller than the last, down to the smallest that still saves time [rad].
 SHRINK, SMALLEST = 0.6, 1e-3
-# A corner that hardly turns needs hardly a blend, but one it needs [rad].
+# Least half length of a blend, for corners that hardly turn [rad].
 ENOUGH = 0.01
-# What a length is divided by at least.
+# Least divisor of a length.
 TINY = 1e-300
 
 
@@ -77,21 +77,21 @@ class Blend:
 
 def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend, ...]:
     """
-    Return a blend for each inner waypoint, as large as its proof allows.
+    Return a blend for each inner waypoint, as large as can be certified.
 
     Parameters
     ----------
     path : Path
     world : World
-        Where the rounded curve itself is proven free.
+        Where each blend itself must be certified free.
     limits : MotionLimits
-        A blend is no larger than full speed through it needs.
+        A blend is no larger than needed to pass it at full speed.
 
     """
     q = path.waypoints
     check_dof(q, world.bounds.shape[1], 'path')
     lengths = np.linalg.norm(np.diff(q, axis=0), axis=1)
-    # An arm that stays where it is goes in no direction.
+    # An edge of length 0 has no direction.
     directions = np.diff(q, axis=0) / np.maximum(lengths, TINY)[:, None]
     blends = []
     for i in range(1, len(q) - 1):
@@ -116,11 +116,11 @@ def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
         blend = Blend(
             corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=half_length
         )
-        speed, bend = blend.derivative_bounds()
+        speed, curvature = blend.derivative_bounds()
         proof = arm_validity.prove_curve(
             blend.coefficients(),
             speed,
-            bend,
+            curvature,
             world.resolution,
             world.chain,
             world.robot,

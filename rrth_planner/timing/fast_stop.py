@@ -1,24 +1,24 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A stop along a running motion that is found within a millisecond."""
+"""The fail-safe stop along a running motion, computed within a millisecond."""
 
 import numpy as np
 from rrth_planner.kernels.trajectory.fast_stop import write_fast_stop
 from rrth_planner.kernels.trajectory.stop_trajectory import SPACINGS
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
-# A stop is not expected to reach the controller before [s].
-ON_ITS_WAY = 0.01
+# Assumed latency of the stop message to the controller [s].
+LATENCY = 0.01
 
 
 def fast_stop(
-    trajectory: Trajectory, time: float, limits: MotionLimits, lead: float = ON_ITS_WAY
+    trajectory: Trajectory, time: float, limits: MotionLimits, lead: float = LATENCY
 ) -> Trajectory:
     """
-    Return how an arm that is at a time within a motion comes to rest along it.
+    Return the fail-safe stop along a motion, from a time within it.
 
-    For as long as a message may be on its way the motion goes on as it is: a controller that gets
-    the stop a little late finds itself on it.
+    During `lead`, the latency of the message, the motion continues unchanged, so that a controller
+    that receives the stop a little late is still on it.
 
     Parameters
     ----------
@@ -27,15 +27,15 @@ def fast_stop(
         Within it [s].
     limits : MotionLimits
         The stop exceeds them by no more than the motion does up to there, or by less than 1 %;
-        a jerk is told to rounding, which in pieces below 0.1 ms is more than that.
+        jerks only up to rounding, which in pieces below 0.1 ms exceeds that.
     lead : float
-        For so long the motion goes on as it is [s].
+        Time for which the motion continues unchanged [s].
 
     Returns
     -------
     Trajectory
         From the state at that time to rest, no joint further than 1e-4 rad from the path, with
-        points no further apart than 50 ms once it slows down; the rest of the motion where that
+        points no further apart than 50 ms once it slows down; the remaining motion where that
         ends as soon.
 
     """

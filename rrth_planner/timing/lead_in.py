@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion that takes over from one that runs: from the present velocity, without a jerk."""
+"""The lead-in of a handover: from the present velocity to a straight line at constant speed."""
 
 from dataclasses import dataclass
 
@@ -12,18 +12,18 @@ from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.parameterization import peaks
 
-# What rounding leaves of a speed where a motion ends: it has no direction [rad/s].
+# Speed that counts as rest: rounding, without a direction [rad/s].
 RESIDUAL_SPEED = 1e-6
-# Accelerations die away in whole ticks, so that no two points are closer [s].
+# Accelerations decay in whole ticks, so that no two points are closer [s].
 TICK = 1e-3
-# The joints' limits less this, for the end of the lead-in to spend.
+# Share of the joints' limits for the lead-in; the rest is a reserve for its end.
 RESERVE = 0.99
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LeadIn:
     """
-    From a moving state to constant velocity, and where straight on leads to rest.
+    From a moving state to constant velocity, and the configuration where a straight stop ends.
 
     Parameters
     ----------
@@ -32,9 +32,10 @@ class LeadIn:
     speed : float
         Of the last point, along the line through all joints; 0: it rests there [rad/s].
     q_stop : ndarray, shape (dof,)
-        Where the arm comes to rest when it goes straight on and slows down [rad].
+        Configuration at rest after slowing down along that line [rad].
     allowed : MotionLimits
-        What it and the path after it may do: the limits, or what the arm does already.
+        Limits of it and of the path after it: the given ones, or the present motion where that
+        exceeds them.
 
     """
 
@@ -46,9 +47,9 @@ class LeadIn:
 
 def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     """
-    Return how an arm that moves gets onto a straight line.
+    Return the lead-in of a moving arm onto a straight line.
 
-    Each joint's acceleration dies away at constant jerk, a little less than its limit; from then
+    Each joint's acceleration decays at constant jerk, a little less than its limit; from then
     on the velocity is constant. Between two points every joint follows a cubic, which the quintic
     of a controller reproduces.
 
@@ -92,7 +93,7 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
 
 
 def reserved(limits: MotionLimits) -> MotionLimits:
-    """Return the limits that the path after a lead-in is timed with: those it was made for."""
+    """Return the limits for the path after a lead-in: those that the lead-in assumes."""
     return MotionLimits(
         velocity=limits.velocity,
         acceleration=RESERVE * limits.acceleration,
@@ -101,7 +102,7 @@ def reserved(limits: MotionLimits) -> MotionLimits:
 
 
 def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
-    """Return the lead that is a stop along the present motion; None where that is not known."""
+    """Return a lead-in that stops along the running motion; None where that is unknown."""
     if moving.running is None:
         return None
     stop = brake(moving.running, moving.time, limits)

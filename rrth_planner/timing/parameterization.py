@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a path to a trajectory: straight edges and rounded corners, within the joints' limits."""
+"""Time parameterization: straight edges and corner blends, within the joints' limits."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,21 +14,21 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 from rrth_planner.timing.corner_blends import Blend
 
-# A motion shorter than this is none: the arm holds still for HOLD seconds.
+# A path shorter than this is no motion: the arm holds still for HOLD seconds [rad, s].
 STILL, HOLD = 1e-9, 0.1
-# Messages carry whole nanoseconds; two points closer than this are one: in shorter pieces the last
-# digits of positions and times are a jerk worth speaking of [s].
+# Messages carry whole nanoseconds; two points closer than this are merged: in shorter pieces the
+# rounding of positions and times amounts to a considerable jerk [s].
 TICK, CLOSEST = 1e-9, 5e-5
-# Where blends are cut into cells, as shares of their length. At constant speed through all of it
-# a blend is one piece, or else it is passed slower in the middle where that is so much faster.
+# Cells of a blend, as shares of its length: one cell at constant speed, or several, slower in the
+# middle, where that is faster by `WORTH`.
 SUBDIVISIONS = ((0.0, 1.0), (0.0, 0.05, 0.12, 0.22, 0.35, 0.65, 0.78, 0.88, 0.95, 1.0))
 WORTH = 1.01
-# Excess of a limit that is rounding, or the bound between two looks at a piece.
+# Excess of a limit that is rounding, or the bound between two samples of a piece.
 ALLOWED = 2e-3
-# So often a motion is slowed down as a whole; what rounding then leaves.
+# Most attempts to slow a motion down as a whole; its rounding.
 ATTEMPTS, ROUNDING = 5, 1e-4
 
-# Where the limits are looked at within a piece: the powers of u in the first and the second
+# Samples of a piece at which limits are checked: the powers of u in the first and the second
 # derivative there.
 _U = np.linspace(0.0, 1.0, 33)[:, None]
 _BETWEEN = (1.0 / 32) ** 2 / 8
@@ -38,7 +38,7 @@ _THIRD = np.array([6.0, 24.0, 60.0]) * _U ** np.arange(3)
 
 
 class TooFastError(RrthError):
-    """A speed at the start from which the path leaves no room to slow down."""
+    """The path is too short to slow down from the speed at the start."""
 
 
 def parameterize(
@@ -47,7 +47,7 @@ def parameterize(
     """
     Return the trajectory that follows a path with rounded corners to rest.
 
-    Stretches get the fastest profile of constant jerk phases between speeds that
+    Cells get the fastest profile of constant jerk phases between the speeds that
     `kernels.trajectory.speed_profile` finds. On straight ones, and on blends at constant speed,
     every piece between two points is a polynomial of at most fourth degree: the quintic that a
     controller interpolates is the curve itself.
@@ -71,7 +71,7 @@ def parameterize(
     Raises
     ------
     TooFastError
-        A speed at the start from which the path leaves no room to slow down.
+        The path is too short to slow down from the speed at the start.
 
     """
     q = path.waypoints
@@ -86,22 +86,22 @@ def parameterize(
     best = whole if whole.duration <= WORTH * fine.duration else fine
     if best.duration == math.inf:
         raise TooFastError(
-            f'speed at the start: {v_start:.3g} rad/s, expected one from which the path leaves '
-            'room to slow down'
+            f'speed at the start: {v_start:.3g} rad/s, expected one from which the path is '
+            'long enough to slow down'
         )
     trajectory = _assemble(*_knots(segments, best))
-    # What begins in motion cannot be slowed down as a whole; who joins it to what comes before it
-    # holds both against the limits.
+    # A motion with a speed at its start cannot be slowed down as a whole; the caller checks it
+    # against the limits together with its lead-in.
     return trajectory if v_start > 0.0 else _within_limits(trajectory, limits)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Segments:
     """
-    Straight stretches and blends in turn, those of no length left out.
+    Straight parts and blends in turn, without those of length 0.
 
-    At the way s, q = origins + u s + turns width g(s / width) with g(x) = x^3 - x^4 / 2: the
-    direction turns from u to u + turns by the smooth step g'.
+    At the path parameter s, q = origins + u s + turns width g(s / width), g(x) = x^3 - x^4 / 2;
+    the direction turns from u to u + turns by the smooth step g'.
     """
 
     origins: Array
@@ -113,7 +113,7 @@ class _Segments:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Speeds:
-    """What `speed_profile.cell_speeds` says of the cells, each of them a row of a segment."""
+    """Result of `speed_profile.cell_speeds`; `rows` is the segment of each cell."""
 
     rows: list[int]
     places: Array
@@ -144,7 +144,7 @@ def _segments(path: Path, blends: tuple[Blend, ...]) -> _Segments:
 def _speeds(
     segments: _Segments, shares: tuple[float, ...], table: Array, v_start: float
 ) -> _Speeds:
-    """Return how fast a path may be followed where blends are cut into cells at some shares."""
+    """Return the speed profile of a path whose blends are cut into cells at some shares."""
     rows, places = [], []
     for row, width in enumerate(segments.widths.tolist()):
         is_blend = bool(segments.turns[row].any())
@@ -172,20 +172,20 @@ def _knots(segments: _Segments, found: _Speeds) -> tuple[Array, Array, Array, Ar
     v, a = ends[:, 3:4], ends[:, 4:5]
     x = s / width
     ahead = u + turn * (x * x * (3 - 2 * x))
-    bend = turn * (6 * x * (1 - x) / width)
+    curvature = turn * (6 * x * (1 - x) / width)
     q = segments.origins[at] + u * s + turn * (width * x**3 * (1 - 0.5 * x))
     q[-1] = segments.end
-    return ends[:, 0], q, ahead * v, ahead * a + bend * v * v
+    return ends[:, 0], q, ahead * v, ahead * a + curvature * v * v
 
 
 def _assemble(
     times: Array, positions: Array, velocities: Array, accelerations: Array
 ) -> Trajectory:
     """
-    Return the trajectory through knots at whole nanoseconds, twins merged.
+    Return the trajectory through knots at whole nanoseconds, close ones merged.
 
-    Each knot moves along its own motion to the rounded time: a knot that stayed while its time
-    moved by half a nanosecond would cost a short piece 1e-9 v / T^2 of acceleration.
+    Each knot moves along its own motion to the rounded time: a knot left in place while its time
+    moves by half a nanosecond would cost a short piece 1e-9 v / T^2 of acceleration.
     """
     kept = [0]
     for i in range(1, len(times)):
@@ -210,8 +210,8 @@ def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
     """
     Return the trajectory, slowed down as a whole where a piece exceeds a limit.
 
-    The quintic through scaled values is the same curve run slower. Merged twins and rounding are
-    all that can make this necessary.
+    The quintic through scaled values is the same curve run slower. Only merged knots and rounding
+    make this necessary.
     """
     ratio, enough = limit_ratio(trajectory, limits), 1.0
     for _ in range(ATTEMPTS):
@@ -225,7 +225,7 @@ def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
         )
         ratio, enough = limit_ratio(trajectory, limits), 1.0 + ROUNDING
     raise RrthError(
-        f'a motion {ratio:.6g} times too fast for the limits of the joints, expected at most 1'
+        f'motion: {ratio:.6g} times too fast for the limits of the joints, expected at most 1'
     )
 
 
@@ -233,7 +233,7 @@ def peaks(trajectory: Trajectory) -> tuple[Array, Array, Array]:
     """
     Return bounds of the velocity, acceleration and jerk of each joint, (dof,) each.
 
-    Each piece is looked at 33 times; between two of these instants, h apart, a function f is no
+    Each piece is sampled 33 times; between two of these instants, h apart, a function f is no
     greater than there by more than h^2 / 8 max|f''|.
     """
     # Powers first: all pieces and joints in one product.
@@ -241,23 +241,23 @@ def peaks(trajectory: Trajectory) -> tuple[Array, Array, Array]:
     n, dof = c.shape[1:]
     T = np.diff(trajectory.times)[:, None]
     size = np.abs(c)
-    bends = (
+    curvatures = (
         6 * size[3] + 24 * size[4] + 60 * size[5],
         24 * size[4] + 120 * size[5],
         120 * size[5],
     )
     found = []
     for order, powers in enumerate((_FIRST, _SECOND, _THIRD), start=1):
-        seen = np.abs(powers @ c[order:].reshape(6 - order, -1)).max(axis=0).reshape(n, dof)
-        found.append(((seen + _BETWEEN * bends[order - 1]) / T**order).max(axis=0))
+        sampled = np.abs(powers @ c[order:].reshape(6 - order, -1)).max(axis=0).reshape(n, dof)
+        found.append(((sampled + _BETWEEN * curvatures[order - 1]) / T**order).max(axis=0))
     return found[0], found[1], found[2]
 
 
 def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
     """
-    Return by which factor a trajectory must be slowed to hold its limits; <= 1: it does.
+    Return the factor by which a trajectory must be slowed to keep its limits; <= 1: it does.
 
-    What is within a limit by `peaks` exceeds it nowhere by more than 0.2 %.
+    A motion within a limit by `peaks` nowhere exceeds it by more than 0.2 %.
     """
     ratios = []
     for order, (peak, limit) in enumerate(
@@ -269,7 +269,7 @@ def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
 
 
 def excess(trajectory: Trajectory, limits: MotionLimits) -> float:
-    """Return the greatest share of a limit that a trajectory takes: of 1.01 it is 1 % beyond."""
+    """Return the greatest ratio of a trajectory to its limits; 1.01: 1 % beyond."""
     shares = zip(
         peaks(trajectory), (limits.velocity, limits.acceleration, limits.jerk), strict=True
     )

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The arm round its wearer in space, seen from where the wearer hides least of it."""
+"""A 3-D view of the arm on its wearer, from the direction in which it is hidden least."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -19,9 +19,9 @@ from rrth_planner.visualization.occlusion import best_view, cut, is_hidden
 START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'
 CLOTH, SKIN = '#8fa3bf', '#e3b898'
 # Behind the wearer's boxes, between, and in front of them.
-HIDDEN, BODY, SEEN = 1.0, 2.0, 3.0
+HIDDEN, BODY, VISIBLE = 1.0, 2.0, 3.0
 LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
-N_POSTURES = 16
+N_DRAWN = 16
 # A ray that passes a target by no more than that points at it [m].
 AIMED = 0.01
 # How large the space is drawn, and the width of the picture over its height.
@@ -47,7 +47,7 @@ def draw_motion(
     ray_guard_length: float,
 ) -> None:
     """
-    Draw the wearer, the arm on its way, the pointing ray, the tool's path and the target.
+    Draw the wearer, the arm along its motion, the pointing ray, the tool's path and the target.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ def draw_motion(
     target : ndarray, shape (3,)
         In the base frame [m].
     ray_guard_length : float
-        How much of the ray is drawn where it does not point at the target yet [m].
+        Drawn length of the ray where it does not meet the target yet [m].
 
     """
-    q = sample(trajectory, np.linspace(0.0, trajectory.duration, N_POSTURES))[0]
+    q = sample(trajectory, np.linspace(0.0, trajectory.duration, N_DRAWN))[0]
     q_dense = sample(trajectory, np.linspace(0.0, trajectory.duration, 200))[0]
-    draw_way(axes, arm, scene, q, q_dense, target, ray_guard_length)
+    draw_configurations(axes, arm, scene, q, q_dense, target, ray_guard_length)
 
 
-def draw_way(
+def draw_configurations(
     axes: Any,
     arm: ArmModel,
     scene: Scene,
@@ -81,7 +81,7 @@ def draw_way(
     towards: Array | None = None,
 ) -> None:
     """
-    Draw the same of any sequence of configurations.
+    Draw the same for any sequence of configurations.
 
     Parameters
     ----------
@@ -90,24 +90,24 @@ def draw_way(
     scene : Scene
         The wearer in the base frame.
     q : ndarray, shape (n, dof)
-        What is drawn as postures, from start to goal, n >= 2 [rad].
+        Configurations in which the arm is drawn, from start to goal, n >= 2 [rad].
     q_dense : ndarray, shape (m, dof)
-        What the tool's path is drawn through [rad].
+        Configurations along the tool's path [rad].
     target : ndarray, shape (3,), or None
         In the base frame [m].
     ray_guard_length : float
-        How much of a ray is drawn where it does not point at the target [m].
+        Drawn length of a ray that does not meet the target [m].
     q_stops : sequence of ndarray, shape (dof,)
-        Where the arm was stopped on its way [rad].
+        Configurations in which the arm was stopped [rad].
     names : tuple of str
-        What is written at the first and at the last posture.
+        Labels of the first and the last configuration.
     shape : float
         Width of the picture over its height.
     towards : ndarray, shape (3,), optional
-        Direction to the eye; without, the one that shows most of the arm and of the last ray.
+        Direction to the camera; default: the one that shows most of the arm and of the last ray.
 
     """
-    postures = np.array([arm_points(arm, row) for row in q])
+    outlines = np.array([arm_points(arm, row) for row in q])
     poses = np.array([forward_kinematics(arm, row)[-1] for row in q_dense])
     tool_path, first, last = poses[:, :3, 3], poses[0], poses[-1]
     first_ray = np.array([first[:3, 3], first[:3, 3] + ray_guard_length * first[:3, 2]])
@@ -117,23 +117,23 @@ def draw_way(
     targets = [] if target is None else [target[None]]
 
     if towards is None:
-        towards = best_view(scene, postures, ray)
-    _frame(axes, scene, np.concatenate([*postures, ray, first_ray, *targets]), towards, shape)
+        towards = best_view(scene, outlines, ray)
+    _frame(axes, scene, np.concatenate([*outlines, ray, first_ray, *targets]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)
-    blend = np.linspace(0.0, 1.0, len(postures))[:, None]
+    blend = np.linspace(0.0, 1.0, len(outlines))[:, None]
     colours = (1.0 - blend) * to_rgb(START) + blend * to_rgb(GOAL)
-    for posture, colour in zip(postures[1:-1], colours[1:-1], strict=True):
-        _draw_line(axes, scene, towards, posture, colour, 1.6, 0.30)
+    for outline, colour in zip(outlines[1:-1], colours[1:-1], strict=True):
+        _draw_line(axes, scene, towards, outline, colour, 1.6, 0.30)
     _draw_line(axes, scene, towards, tool_path, PATH, 1.8, 0.95)
     _draw_line(axes, scene, towards, first_ray, START, 1.2, 0.7)
     _draw_line(axes, scene, towards, ray, GOAL, 1.8, 0.95)
-    ends = [(postures[0], START, names[0], -0.14), (postures[-1], GOAL, names[1], 0.07)]
+    ends = [(outlines[0], START, names[0], -0.14), (outlines[-1], GOAL, names[1], 0.07)]
     stops = [(arm_points(arm, row), STOP, '', 0.0) for row in q_stops]
-    for posture, colour, name, offset in (*stops, *ends):
-        _draw_line(axes, scene, towards, posture, colour, 5.0, 1.0)
-        axes.plot(*posture.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=SEEN)
-        axes.text(*posture[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
+    for outline, colour, name, offset in (*stops, *ends):
+        _draw_line(axes, scene, towards, outline, colour, 5.0, 1.0)
+        axes.plot(*outline.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=VISIBLE)
+        axes.text(*outline[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
     if target is None:
         return
     axes.plot(
@@ -160,7 +160,7 @@ def _draw_line(
 ) -> None:
     pieces = cut(points)
     hidden = is_hidden(scene, pieces.mean(axis=1), towards)
-    for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], SEEN)):
+    for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], VISIBLE)):
         if len(part):
             lines = Line3DCollection(
                 part, colors=[colour], linewidths=width, alpha=alpha, zorder=depth

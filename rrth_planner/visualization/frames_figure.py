@@ -28,7 +28,7 @@ Draw the frames that docs/conventions.md names: left on the wearer, right along 
 # x, y and z of every frame.
 AXIS_COLOURS = ('#d1495b', '#2f9e6e', '#1b6ca8')
 BAR, RAY, SKIN, EDGE, TEXT = '#4a5763', '#d97706', '#c9d3df', '#9aa7b5', '#30343b'
-# Elevation and azimuth that each side is seen from [deg].
+# Elevation and azimuth of the camera, for each side [deg].
 VIEWS = ((14.0, -142.0), (16.0, -128.0))
 # How far into the range of each joint the arm stands: no two axes in line.
 SHARE = (0.57, 0.30, 0.66, 0.40)
@@ -61,11 +61,11 @@ def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
     FigureCanvasAgg(figure)
     key = 'red: x    green: y    blue: z, the axis of a joint and the pointing ray of the tool'
     figure.text(0.5, 0.055, key, ha='center', color=TEXT)
-    key = 'of two frames with one origin the later one is drawn shorter and thicker'
+    key = 'of two frames with the same origin the later one is shorter and thicker'
     figure.text(0.5, 0.02, key, ha='center', color=TEXT)
 
     body: Any = figure.add_axes((0.0, 0.09, 0.49, 0.9), projection='3d')
-    _look(body, _corners(scene, poses, RAY_SHARE * size), VIEWS[0])
+    _aim_camera(body, _corners(scene, poses, RAY_SHARE * size), VIEWS[0])
     for box in scene.boxes:
         _draw_box(body, box.center, box.rotation * (0.5 * box.size))
     _draw_arm(body, arm, q, poses, RAY_SHARE * size)
@@ -80,7 +80,7 @@ def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
     _label(body, points, ['base frame', 'mount: frame 0', 'tool', 'pointing ray'])
 
     close: Any = figure.add_axes((0.5, 0.09, 0.49, 0.9), projection='3d')
-    _look(close, _around(poses, 0.26 * size), VIEWS[1])
+    _aim_camera(close, _around(poses, 0.26 * size), VIEWS[1])
     _draw_arm(close, arm, q, poses, 0.42 * size)
     for pose, length, width in zip(poses, *_sizes(poses, 0.26 * size), strict=True):
         _draw_frame(close, pose, length, width)
@@ -142,8 +142,8 @@ def _around(poses: Array, reach: float) -> Array:
     return points
 
 
-def _look(axes: Any, points: Array, view: tuple[float, float]) -> None:
-    """Have points fill the axes, seen from an elevation and an azimuth [deg]."""
+def _aim_camera(axes: Any, points: Array, view: tuple[float, float]) -> None:
+    """Fit the axes to points, seen from an elevation and an azimuth [deg]."""
     low, high = points.min(axis=0), points.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low, zoom=1.07)
@@ -189,7 +189,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Draw the picture and return the exit code."""
     parser = argparse.ArgumentParser(prog='frames_figure', description=DESCRIPTION)
     parser.add_argument(
-        '--output', type=Path, default=Path('frames.png'), help='picture to write (%(default)s)'
+        '--output', type=Path, default=Path('frames.png'), help='picture file (%(default)s)'
     )
     parser.add_argument(
         '--arm', type=Path, metavar='FILE', help='the arm, as config/arm.yaml (default: that one)'
@@ -210,7 +210,7 @@ def _save(figure: Figure, path: Path) -> None:
         figure.savefig(path, dpi=DOTS_PER_INCH, metadata={'Software': None})
     except (OSError, ValueError) as problem:
         raise SceneError(
-            f'file {path}: {problem}, expected a picture to write, as .png'
+            f'file {path}: {problem}, expected a picture file, e.g. .png'
         ) from problem
 
 

@@ -53,7 +53,7 @@ def motion_figure(
     ray_guard_length: float,
 ) -> Figure:
     """
-    Return a figure of motions: left the arm round its wearer, right the curves of the joints.
+    Return a figure of motions: left the arm on its wearer, right the curves of the joints.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def motion_figure(
     limits : MotionLimits
         Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float
-        How much of the pointing ray was guarded in motion [m].
+        How much of the pointing ray stays clear in motion [m].
 
     """
     n = len(motions)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of a recorded run: the arm as told and as seen, and its distance to the wearer."""
+"""The figure of a recorded run: the arm as commanded and measured, and its clearance."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -21,7 +21,7 @@ from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.visualization.arm_view import arm_points, draw_way, N_POSTURES, STOP
+from rrth_planner.visualization.arm_view import arm_points, draw_configurations, N_DRAWN, STOP
 from rrth_planner.visualization.motion_figure import (
     DASHES,
     draw_limits,
@@ -34,12 +34,12 @@ from rrth_planner.visualization.occlusion import best_view
 SIZE = (14.0, 8.6)
 # Of the view of the arm: its width over its height.
 VIEW_SHAPE = 0.94
-# Between two instants that are further apart the arm was not seen [s].
-UNSEEN = 0.25
+# A longer time between two joint states is a gap in the recording [s].
+GAP = 0.25
 N_DENSE = 300
-# So many changes of the body are marked one by one.
+# Most changes of the body that are marked one by one.
 MOST_MARKS = 40
-GUARD_COLOURS = {
+MONITOR_COLOURS = {
     'no motion': '#dfe3e8',
     'monitoring': '#8cc5a3',
     'stopping': '#e07a2f',
@@ -54,18 +54,18 @@ def recording_figure(
     """
     Return the figure of a run.
 
-    Left where the arm went round the wearer as he was at the end; right, over time, joint
-    positions and velocities as told and as seen, the arm's distance to the wearer, and what the
-    monitor of the motion did.
+    Left, the motion of the arm with the wearer as at the end; right, over time, joint positions
+    and velocities as commanded and as measured, the arm's distance to the wearer, and the state of
+    the monitor.
 
     Parameters
     ----------
     recording : Recording
     arm : ArmModel
     settings : PlanSettings
-        For the margin, the guarded length of the ray, and the limits.
+        For the margin, the length of the ray that must stay clear, and the limits.
     title : str
-        A line above the curves.
+        Title above the curves.
 
     """
     figure = Figure(figsize=SIZE, facecolor='white')
@@ -83,7 +83,7 @@ def recording_figure(
     _draw_distance(distance, recording, clearances, settings.margin)
     _draw_monitor(monitor, recording)
     begin, end = _span(recording)
-    stops = [told for told in commanded_stops(recording) if begin <= told.begin <= end]
+    stops = [stop for stop in commanded_stops(recording) if begin <= stop.begin <= end]
     for axes in (position, velocity, distance):
         axes.tick_params(labelbottom=False)
         axes.grid(color='#e4e6ea', lw=0.8)
@@ -107,7 +107,7 @@ def recording_figure(
         settings.ray_guard_length,
         [stop.trajectory.positions[-1] for stop in stops],
     )
-    key = 'blue: start    red: end    violet: path of the tool    orange: stopped for the wearer'
+    key = 'blue: start    red: end    violet: path of the tool    orange: stopped by the monitor'
     figure.text(0.03, 0.965, key, fontsize=9, color=LIMIT)
     return figure
 
@@ -119,11 +119,11 @@ def _span(recording: Recording) -> tuple[float, float]:
 
 def _caption(recording: Recording, clearances: Array, n_stops: int) -> str:
     begin, end = _span(recording)
-    n = sum(begin <= told.begin <= end for told in recording.commanded) - n_stops
+    n = sum(begin <= motion.begin <= end for motion in recording.commanded) - n_stops
     parts = [_count(n, 'motion'), _count(n_stops, 'stop')]
-    seen = clearances[np.isfinite(clearances)]
-    if len(seen):
-        parts.append(f'{1e3 * float(seen.min()):.0f} mm from the wearer at the closest')
+    known = clearances[np.isfinite(clearances)]
+    if len(known):
+        parts.append(f'{1e3 * float(known.min()):.0f} mm least distance to the wearer')
     return ', '.join(parts)
 
 
@@ -140,24 +140,24 @@ def _draw_space(
 ) -> None:
     _, end = _span(recording)
     q = recording.positions
-    # The arm stands still most of the time: postures at equal steps of the way, not of time.
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
+    # The arm is at rest most of the time: drawn at equal steps of its path, not of time.
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
     scene = at(recording.bodies, end) or Scene(())
-    q_drawn, target = q[_equal_steps(way, N_POSTURES)], at(recording.targets, end)
+    q_drawn, target = q[_equal_steps(path, N_DRAWN)], at(recording.targets, end)
     first, last = tool_pose(arm, q[[0, -1]])
     rays = [first[:3, 3] + ray_guard_length * first[:3, 2], first[:3, 3], last[:3, 3]]
-    draw_way(
+    draw_configurations(
         axes,
         arm,
         scene,
         q_drawn,
-        q[_equal_steps(way, N_DENSE)],
+        q[_equal_steps(path, N_DENSE)],
         target,
         ray_guard_length,
         q_stops,
         names=('start', 'end'),
         shape=VIEW_SHAPE,
-        # A motion may be short: where the ray was at first counts too.
+        # A motion may be short: the first ray counts too.
         towards=best_view(
             scene,
             np.array([arm_points(arm, row) for row in q_drawn]),
@@ -166,16 +166,16 @@ def _draw_space(
     )
 
 
-def _equal_steps(way: Array, n: int) -> Any:
-    """Return the indices of instants after equal parts of a way, (n,), first and last included."""
-    found = np.searchsorted(way, np.linspace(0.0, way[-1], n)).clip(0, len(way) - 1)
-    found[0], found[-1] = 0, len(way) - 1
+def _equal_steps(path: Array, n: int) -> Any:
+    """Return the indices of n instants at equal steps of a path length, (m,), ends included."""
+    found = np.searchsorted(path, np.linspace(0.0, path[-1], n)).clip(0, len(path) - 1)
+    found[0], found[-1] = 0, len(path) - 1
     return found
 
 
 def _with_gaps(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return a curve, (n,) twice, that is interrupted where nothing was seen."""
-    after = np.flatnonzero(np.diff(times) > UNSEEN) + 1
+    """Return a curve, (n,) twice, that is interrupted where nothing was recorded."""
+    after = np.flatnonzero(np.diff(times) > GAP) + 1
     return np.insert(times, after, np.nan), np.insert(values, after, np.nan)
 
 
@@ -191,15 +191,17 @@ def _draw_joints(
     q, v = commanded_at(recording, times)
     for i, name in enumerate(arm.joint_names):
         colour = JOINT_COLOURS[i % len(JOINT_COLOURS)]
-        for axes, told, seen in (
+        for axes, commanded, measured in (
             (position, q, recording.positions),
             (velocity, v, recording.velocities),
         ):
-            axes.plot(times, told[:, i], color=colour, lw=5.0, alpha=0.3)
+            axes.plot(times, commanded[:, i], color=colour, lw=5.0, alpha=0.3)
             label = name.replace('_', ' ') if axes is position else None
-            axes.plot(*_with_gaps(recording.times, seen[:, i]), color=colour, lw=1.3, label=label)
-    position.plot([], [], color=LIMIT, lw=5.0, alpha=0.3, label='told')
-    position.plot([], [], color=LIMIT, lw=1.3, label='seen')
+            axes.plot(
+                *_with_gaps(recording.times, measured[:, i]), color=colour, lw=1.3, label=label
+            )
+    position.plot([], [], color=LIMIT, lw=5.0, alpha=0.3, label='commanded')
+    position.plot([], [], color=LIMIT, lw=1.3, label='measured')
     unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
     position.set_ylabel(f'position [{unit}]')
     velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
@@ -252,7 +254,7 @@ def _draw_monitor(axes: Axes, recording: Recording) -> None:
     for (since, state), (until, _) in pairwise(steps):
         left, right = max(since, begin), min(until, end)
         if left < right:
-            colour = shown[state] = GUARD_COLOURS.get(state, OTHER)
+            colour = shown[state] = MONITOR_COLOURS.get(state, OTHER)
             axes.axvspan(left, right, color=colour, lw=0)
     axes.set_yticks([])
     axes.set_ylim(0.0, 1.0)
@@ -262,7 +264,7 @@ def _draw_monitor(axes: Axes, recording: Recording) -> None:
     handles += axes.plot([], [], ls='', marker='v', color=CLEARANCE)
     axes.legend(
         handles,
-        [*shown, 'the wearer is seen anew'],
+        [*shown, 'update of the wearer'],
         loc='upper right',
         bbox_to_anchor=(1.0, -0.95),
         ncols=len(handles),

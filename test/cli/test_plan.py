@@ -101,7 +101,7 @@ def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
         (['--output', 'motion.txt'], '.yaml or .csv'),
         (['--output', '/nowhere/at/all.csv'], '/nowhere/at/all.csv'),
         (['--output', 'motion.csv', '--period', '0'], 'period: 0.0, expected'),
-        (['--period', '0.1'], '--period: without --output'),
+        (['--period', '0.1'], '--period: given without --output'),
         (['--arm', 'none.yaml'], 'none.yaml'),
         (['--arm', str(resource_path('config/examples/chest_arm.urdf'))], 'read_urdf writes one'),
         (['--body', 'none.yaml'], 'none.yaml'),

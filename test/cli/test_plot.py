@@ -117,7 +117,7 @@ def test_a_run_is_drawn_with_its_stop_its_distance_and_the_guard():
     assert distance.get_ylabel().endswith('[m]')
     assert guard.get_xlabel() == 'time [s]'
     names = [text.get_text() for text in guard.get_legend().get_texts()]
-    assert names == ['monitoring', 'stopping', 'holding', 'the wearer is seen anew']
+    assert names == ['monitoring', 'stopping', 'holding', 'update of the wearer']
     # A band where the arm was stopped, in each of the three curves; the stages of the guard.
     for axes in (position, velocity, distance):
         (band,) = axes.patches
@@ -128,7 +128,7 @@ def test_a_run_is_drawn_with_its_stop_its_distance_and_the_guard():
     assert 'end' in {text.get_text() for text in view.texts}
 
 
-def test_the_curves_are_what_was_told_and_what_was_seen():
+def test_the_curves_are_commanded_and_measured():
     run = stopped_run()
     figure = recording_figure(run, ARM, load_settings(4), 'run')
     position = figure.axes[1]
@@ -139,7 +139,7 @@ def test_the_curves_are_what_was_told_and_what_was_seen():
     np.testing.assert_allclose(told[:, 1], expected, atol=1e-3)
 
 
-def test_a_line_is_interrupted_where_the_arm_was_not_seen():
+def test_a_line_is_interrupted_where_nothing_was_recorded():
     run = stopped_run()
     rows = np.flatnonzero((run.times < 0.5) | (run.times > 1.0))
     gap = Recording(

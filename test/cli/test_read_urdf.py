@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Arms from URDF files move as their URDF says; what is no arm is refused in a sentence."""
+"""Arms from URDF files move as their URDF says; what is no arm is rejected in a sentence."""
 
 import subprocess
 import sys
@@ -155,7 +155,7 @@ def test_a_joint_without_velocity_is_named(tmp_path, capsys):
         assert read_urdf.main([str(file_of(tmp_path, text)), *output]) == 0
         said.append([line for line in capsys.readouterr().out.split('\n') if 'max_vel' in line])
     ((line,), none) = said
-    assert '[?, 1.6, 1.6, 2.4, 2.4, 2.4]; it gives none for turn: write one' in line
+    assert '[?, 1.6, 1.6, 2.4, 2.4, 2.4]; none given for turn: replace' in line
     assert none == []
 
 
@@ -175,7 +175,7 @@ def test_a_link_that_is_not_declared_is_named(tmp_path, capsys, which, left):
     assert said.count('\n') == 1
 
 
-def test_lines_that_are_no_numbers_are_refused():
+def test_lines_that_are_no_numbers_are_rejected():
     with pytest.raises(ModelError, match='finite'):
         rows_of_axes(np.full((2, 3), np.nan), np.eye(3)[:2], np.eye(3)[2])
 
@@ -218,7 +218,7 @@ TEXTS = {
 
 
 @pytest.mark.parametrize('words', TEXTS)
-def test_what_is_no_arm_is_refused_in_a_sentence(tmp_path, capsys, words):
+def test_what_is_no_arm_is_rejected_in_a_sentence(tmp_path, capsys, words):
     file, arm = file_of(tmp_path, TEXTS[words]), tmp_path / 'arm.yaml'
     assert read_urdf.main([str(file), '--output', str(arm)]) == 2
     said = capsys.readouterr().err
@@ -244,7 +244,7 @@ def test_what_is_no_arm_is_refused_in_a_sentence(tmp_path, capsys, words):
         (['--tool', 'turret'], 'expected 2: the ray sweeps a surface'),
     ],
 )
-def test_a_wrong_request_is_refused_in_a_sentence(tmp_path, capsys, arguments, words):
+def test_a_wrong_request_is_rejected_in_a_sentence(tmp_path, capsys, arguments, words):
     file, arm = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'arm.yaml'
     assert read_urdf.main([str(file), '--output', str(arm), *arguments]) == 2
     said = capsys.readouterr().err

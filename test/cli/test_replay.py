@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Incidents are played back: what happens again, what does not, and which judge says what."""
+"""Incidents are replayed: what is reproduced, what is not, and the results of the checkers."""
 
 from dataclasses import replace
 import os
@@ -43,7 +43,7 @@ QUESTION = PlanQuestion(
 
 
 def disagree(monkeypatch):
-    """Have python-fcl see a touch in every motion."""
+    """Have python-fcl find a violation in every motion."""
     monkeypatch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)
 
 
@@ -76,13 +76,13 @@ def play(path):
     return found.returncode, found.stdout, found.stderr
 
 
-def test_judges_that_agree_now_are_told_apart_from_a_reproduction(monkeypatch, tmp_path):
+def test_checks_that_agree_now_are_no_reproduction(monkeypatch, tmp_path):
     code, out, err = play(write_incident(disagreement(monkeypatch), tmp_path))
     assert (code, err) == (1, '')
     assert 'recorded: disagreement, ' in out
-    assert 'the same motion to the bit: yes' in out
+    assert 'motion identical to the bit: yes' in out
     assert out.splitlines()[-1] == (
-        'not reproduced: the judges agree now that the recorded motion is free'
+        'not reproduced: the collision checks now agree that the recorded motion is free'
     )
 
 
@@ -109,8 +109,8 @@ def test_another_motion_is_no_reproduction(monkeypatch, capsys):
     disagree(monkeypatch)
     assert replay.replay(replace(incident, trajectory=other)) == 1
     out = capsys.readouterr().out
-    assert 'the same motion to the bit: no' in out
-    assert 'planning again does not lead to the same motion' in out.splitlines()[-1]
+    assert 'motion identical to the bit: no' in out
+    assert 'planning again gives another motion' in out.splitlines()[-1]
 
 
 def test_a_motion_of_an_arm_that_moves_is_planned_again_to_the_bit(monkeypatch, capsys, tmp_path):
@@ -125,18 +125,18 @@ def test_a_motion_of_an_arm_that_moves_is_planned_again_to_the_bit(monkeypatch, 
     assert ' moving; ' in capsys.readouterr().out
 
 
-def test_the_wearer_that_a_motion_was_judged_for_is_the_one_asked_about(monkeypatch, capsys):
+def test_a_motion_is_checked_against_the_recorded_wearer(monkeypatch, capsys):
     incident = disagreement(monkeypatch)
     # All of the wearer's surroundings.
     wall = Box('wall', np.zeros(3), np.full(3, 5.0), np.eye(3))
     assert replay.replay(replace(incident, present=Scene((wall,)))) == 1
     out = capsys.readouterr().out
-    assert '8 boxes, 1 when judged' in out
+    assert '8 boxes, 1 when checked' in out
     assert 'certificate: not proven' in out
     assert out.splitlines()[-1].endswith('the recorded motion is not proven free')
 
 
-def test_a_motion_that_first_leaves_a_box_is_judged_as_one(monkeypatch, capsys):
+def test_a_motion_with_an_escape_is_checked_as_one(monkeypatch, capsys):
     rng, world = np.random.default_rng(4), arm_world(table_1_arm(), wearer(), MARGIN, RAY)
     for _ in range(100):
         question = replace(QUESTION, q_start=rng.uniform(*world.bounds))
@@ -156,37 +156,37 @@ def test_a_motion_that_first_leaves_a_box_is_judged_as_one(monkeypatch, capsys):
     assert replay.replay(incident) == 0
 
 
-def test_every_judge_has_an_opinion_on_every_piece(monkeypatch):
+def test_all_checkers_agree_on_every_piece(monkeypatch):
     trajectory = disagreement(monkeypatch).trajectory
     arguments = (table_1_arm(), wearer(), QUESTION.goal, trajectory, MARGIN, RAY)
-    verdict = checker_comparison.verdict_of(*arguments)
-    assert verdict.is_proven
-    assert verdict.touch is None
-    assert not verdict.is_disagreement
-    assert len(verdict.opinions) == len(trajectory.times)
-    for i, opinion in enumerate(verdict.opinions[:-1]):
-        assert (opinion.begin, opinion.end) == tuple(trajectory.times[i : i + 2])
-    for opinion in verdict.opinions:
-        assert opinion.certificate == 'proven'
-        assert opinion.begin <= opinion.fcl.time <= opinion.end + 1e-12
-        # They look at nearly the same instants.
-        assert opinion.fcl.distance == pytest.approx(opinion.oracle, abs=1e-4)
-    assert verdict.clearance >= MARGIN
+    comparison = checker_comparison.compare_checkers(*arguments)
+    assert comparison.is_proven
+    assert comparison.violation is None
+    assert not comparison.is_disagreement
+    assert len(comparison.pieces) == len(trajectory.times)
+    for i, piece in enumerate(comparison.pieces[:-1]):
+        assert (piece.begin, piece.end) == tuple(trajectory.times[i : i + 2])
+    for piece in comparison.pieces:
+        assert piece.certificate == 'proven'
+        assert piece.begin <= piece.fcl.time <= piece.end + 1e-12
+        # They sample nearly the same instants.
+        assert piece.fcl.distance == pytest.approx(piece.reference, abs=1e-4)
+    assert comparison.clearance >= MARGIN
 
 
-def test_a_motion_without_pieces_and_a_wearer_without_boxes_have_a_verdict():
+def test_a_motion_without_pieces_and_a_wearer_without_boxes_are_compared():
     still = Trajectory(
         times=np.zeros(1),
         positions=FOLDED[None],
         velocities=np.zeros((1, 4)),
         accelerations=np.zeros((1, 4)),
     )
-    verdict = checker_comparison.verdict_of(
+    comparison = checker_comparison.compare_checkers(
         table_1_arm(), Scene(()), QUESTION.goal, still, MARGIN, RAY
     )
-    assert verdict.is_proven
-    assert verdict.clearance == np.inf
-    assert len(verdict.opinions) == 1
+    assert comparison.is_proven
+    assert comparison.clearance == np.inf
+    assert len(comparison.pieces) == 1
 
 
 def fail(*_, **__):
@@ -211,8 +211,8 @@ def test_an_error_after_the_plan_says_so(capsys):
     incident = error_incident(QUESTION, OSError('no publisher'), 'Traceback ...', trajectory)
     assert replay.replay(incident) == 1
     out = capsys.readouterr().out
-    assert 'the same motion to the bit: yes' in out
-    assert 'not reproduced: the OSError came after the motion had been planned' in out
+    assert 'motion identical to the bit: yes' in out
+    assert 'not reproduced: the OSError occurred after the motion had been planned' in out
 
 
 def test_versions_that_differ_are_named(monkeypatch, capsys):
@@ -236,7 +236,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],
 )
-def test_a_bad_file_is_refused_in_one_sentence(capsys, tmp_path, content, sentence):
+def test_a_bad_file_is_rejected_in_one_sentence(capsys, tmp_path, content, sentence):
     path = tmp_path / 'incident.yaml'
     if content is not None:
         path.write_text(content)

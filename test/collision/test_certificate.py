@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The proof of a timed curve: its bounds hold, and what touches is never proven."""
+"""The proof of a timed curve: its bounds hold, and a violation is never proven."""
 
 from hypothesis import given, strategies as st
 import numpy as np
@@ -76,26 +76,26 @@ def test_derivative_bounds_of_a_line_are_its_speed():
 
 
 def check_certificate(arm, scene, trajectory):
-    """Check a certificate against the oracle; return what it says."""
+    """Check a certificate against the reference checker; return it."""
     world = arm_world(arm, scene, MARGIN, RAY)
     certificate = certify(trajectory, world)
     pieces = piece_coefficients(trajectory)
     touched = [dense_touch(arm, scene, MARGIN, RAY, c, 4000) >= 0 for c in pieces]
     if certificate.is_proven:
         assert certificate.piece == -1
-        assert not certificate.touches
+        assert not certificate.is_violated
         assert not any(touched)
     else:
         assert 0 <= certificate.piece < len(pieces)
         # Those before it are proven.
         assert not any(touched[: certificate.piece])
-        if certificate.touches:
+        if certificate.is_violated:
             curve = pieces[certificate.piece]
             assert dense_touch(arm, scene, MARGIN + 1e-6, RAY, curve, 40000) >= 0
     return certificate
 
 
-def test_no_trajectory_that_touches_is_certified():
+def test_no_trajectory_that_collides_is_certified():
     rng = np.random.default_rng(81)
     n_proven = n_touching = n_later = 0
     for i in range(250):
@@ -104,7 +104,7 @@ def test_no_trajectory_that_touches_is_certified():
         trajectory = random_motion(rng, arm.bounds, 4, rng.choice([0.05, 0.2, 0.6]))
         certificate = check_certificate(arm, scene, trajectory)
         n_proven += certificate.is_proven
-        n_touching += certificate.touches
+        n_touching += certificate.is_violated
         n_later += certificate.piece > 0
     assert n_proven > 30
     assert n_touching > 60
@@ -121,7 +121,7 @@ def varied_body_of(i):
     return BODIES[i % 5]
 
 
-def test_no_trajectory_of_any_chain_that_touches_is_certified():
+def test_no_trajectory_of_any_chain_that_collides_is_certified():
     rng = np.random.default_rng(82)
     said = []
     for i in range(80):
@@ -139,7 +139,7 @@ def test_no_trajectory_of_any_chain_that_touches_is_certified():
     assert 10 < sum(said) < 75
 
 
-def test_the_oracle_sees_no_contact_in_what_is_certified():
+def test_the_reference_checker_finds_no_contact_in_certified_motions():
     rng = np.random.default_rng(83)
     arm, scene, world = table_1_arm(), wearer(), wearer_world()
     n_proven = 0
@@ -170,7 +170,7 @@ def test_the_piece_that_is_not_proven_is_named():
         )
         certificate = certify(trajectory, world)
         assert (certificate.is_proven, certificate.piece) == (False, piece)
-        assert certificate.touches
+        assert certificate.is_violated
 
 
 def test_standing_still_in_the_wearer_is_not_certified():

@@ -1,10 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""No point of a bar moves further than its way, by the oracle's kinematics."""
+"""No point of a bar moves further than its bound, by the kinematics of the reference checker."""
 
 from hypothesis import given, strategies as st
 import numpy as np
-from rrth_planner.collision.displacement_bounds import travelled
+from rrth_planner.collision.displacement_bounds import displacements
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import examples, oracle_bars, random_chain, table_1_arm
 
@@ -13,7 +13,7 @@ RAY = 0.8
 
 @examples(80)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_no_point_of_a_bar_moves_further_than_its_way(seed):
+def test_no_point_of_a_bar_moves_further_than_its_bound(seed):
     rng = np.random.default_rng(seed)
     arm = table_1_arm() if rng.random() < 0.5 else random_chain(rng, rng.random() < 0.5)
     n, scale = int(rng.integers(2, 6)), rng.choice([0.1, 1.0, 10.0])
@@ -28,7 +28,7 @@ def test_no_point_of_a_bar_moves_further_than_its_way(seed):
         times=times - times[0], positions=states[0], velocities=states[1], accelerations=states[2]
     )
     instants = np.linspace(0.0, trajectory.duration, 400)
-    ways = travelled(arm, trajectory, instants, RAY)
+    ways = displacements(arm, trajectory, instants, RAY)
     q, _, _ = sample(trajectory, instants)
     assert ((q >= arm.bounds[0]) & (q <= arm.bounds[1]))[:, slides].all()
     bars = oracle_bars(arm, q, RAY)
@@ -49,13 +49,13 @@ def test_the_way_of_a_joint_that_turns_alone_is_its_arc():
     q[1, 3] = 1.0
     still = np.zeros((2, 4))
     turn = Trajectory(times=[0.0, 2.0], positions=q, velocities=still, accelerations=still)
-    ways = travelled(arm, turn, np.array([0.0, 2.0]), RAY)
+    ways = displacements(arm, turn, np.array([0.0, 2.0]), RAY)
     assert ways[:2].max() == 0.0
     assert RAY <= ways[2, 1] <= 1.8 * RAY
 
 
-def test_an_arm_that_holds_still_has_no_way():
+def test_an_arm_that_holds_still_has_no_displacement():
     arm = table_1_arm()
     one = np.zeros((1, 4))
     hold = Trajectory(times=[0.0], positions=one, velocities=one, accelerations=one)
-    assert not travelled(arm, hold, np.zeros(2), RAY).any()
+    assert not displacements(arm, hold, np.zeros(2), RAY).any()

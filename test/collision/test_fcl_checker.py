@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The second opinion agrees with the kernels and finds what the oracle finds."""
+"""python-fcl agrees with the kernels and with the reference checker."""
 
 import numpy as np
 import pytest
@@ -38,17 +38,17 @@ def check_nearest(arm, scene, rng, n):
     n_apart = 0
     for q in rng.uniform(*arm.bounds, (n, arm.dof)):
         distances = world.clearances(q)
-        touch = fcl_check.nearest(arm, scene, q, 1.0)
+        violation = fcl_check.nearest(arm, scene, q, 1.0)
         least = distances.min()
         if least > 1e-4:
             n_apart += 1
-            assert touch.distance == pytest.approx(least, abs=5e-6)
+            assert violation.distance == pytest.approx(least, abs=5e-6)
             # Both offsets of a row have the same name.
-            rows = [name == touch.bar for name in world.bar_names]
-            named = distances[rows, world.box_names.index(touch.box)].min()
+            rows = [name == violation.bar for name in world.bar_names]
+            named = distances[rows, world.box_names.index(violation.box)].min()
             assert named == pytest.approx(least, abs=1e-5)
         elif least < -1e-4:
-            assert touch.distance < 1e-5
+            assert violation.distance < 1e-5
     return n_apart
 
 
@@ -79,20 +79,20 @@ def test_contacts_deeper_than_a_millimetre_are_found():
         trajectory = straight(q_from, q_to)
         dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 4001))
         curve = np.stack([q_from, q_to - q_from])
-        touch = fcl_check.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
+        violation = fcl_check.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
         # Round corners: what the grown boxes touch only at their edges may pass the margin.
         if min(world.clearances(q).min() for q in dense[::8]) < -0.0125:
-            assert touch is not None
+            assert violation is not None
             n_touching += 1
         if dense_touch(arm, scene, 0.02, 1.0, curve, 8000) < 0:
-            assert touch is None
+            assert violation is None
             n_free += 1
-        if touch is not None:
-            q, _, _ = sample(trajectory, [touch.time])
-            bar, box = world.bar_names.index(touch.bar), world.box_names.index(touch.box)
+        if violation is not None:
+            q, _, _ = sample(trajectory, [violation.time])
+            bar, box = world.bar_names.index(violation.bar), world.box_names.index(violation.box)
             own = arm_world(arm, scene, 0.0, 1.0).clearances(q[0])
             assert own[bar, box] < 0.02 + 1e-5
-            earlier = dense[: int(touch.time * 4000) - 8 : 8]
+            earlier = dense[: int(violation.time * 4000) - 8 : 8]
             bare = arm_world(arm, scene, 0.0, 1.0)
             assert all(bare.clearances(q).min() > 0.019 for q in earlier)
     assert n_touching > 8
@@ -123,7 +123,7 @@ def first_touch_by_brute_force(arm, scene, trajectory, margin, ray):
     return None
 
 
-def test_the_first_touch_is_that_of_a_look_every_millisecond():
+def test_the_first_violation_is_that_of_a_check_every_millisecond():
     rng = np.random.default_rng(24)
     n_touching = n_free = 0
     for i in range(120):
@@ -139,15 +139,15 @@ def test_the_first_touch_is_that_of_a_look_every_millisecond():
             # Touching by as little as can be, and not touching by as little, too.
             margin = rng.choice([0.0, 0.02, 0.1])
             expected = first_touch_by_brute_force(arm, scene, trajectory, margin, 0.5)
-            touch = fcl_check.first_violation(arm, scene, trajectory, margin, 0.5, 0.5)
-            assert (touch and touch.time) == expected
+            violation = fcl_check.first_violation(arm, scene, trajectory, margin, 0.5, 0.5)
+            assert (violation and violation.time) == expected
             n_touching += expected is not None
             n_free += expected is None
     assert n_touching > 40
     assert n_free > 40
 
 
-def test_a_touch_of_one_instant_is_found():
+def test_a_violation_of_one_instant_is_found():
     rng = np.random.default_rng(25)
     arm, n_found = table_1_arm(), 0
     for _ in range(40):
@@ -162,9 +162,9 @@ def test_a_touch_of_one_instant_is_found():
             continue
         n_found += 1
         margin = least[lowest] + 2 * fcl_check.TOLERANCE
-        touch = fcl_check.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
-        assert touch is not None
-        assert touch.distance == pytest.approx(least[lowest], abs=2 * fcl_check.TOLERANCE)
+        violation = fcl_check.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
+        assert violation is not None
+        assert violation.distance == pytest.approx(least[lowest], abs=2 * fcl_check.TOLERANCE)
         assert fcl_check.first_violation(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
     assert n_found > 10
 
@@ -183,10 +183,10 @@ def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre():
     for gap in (0.01, 0.02, 0.05):
         scene = plate_beside(arm, q, gap)
         assert fcl_check.first_violation(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
-        touch = fcl_check.first_violation(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
-        assert touch is not None
-        assert (touch.time, touch.bar, touch.box) == (0.0, 'pointing ray', 'plate')
-        assert touch.distance == pytest.approx(gap, abs=5e-6)
+        violation = fcl_check.first_violation(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
+        assert violation is not None
+        assert (violation.time, violation.bar, violation.box) == (0.0, 'pointing ray', 'plate')
+        assert violation.distance == pytest.approx(gap, abs=5e-6)
 
 
 def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over():
@@ -195,11 +195,11 @@ def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over():
     T = tool_pose(arm, np.array([0.31, -0.8, 0.0, 0.5]))
     thin = Scene((Box('blade', T[:3, 3] + 0.9 * T[:3, 2], (0.002,) * 3, np.eye(3)),))
     for duration in (0.3, 1.0, 5.0):
-        touch = fcl_check.first_violation(
+        violation = fcl_check.first_violation(
             arm, thin, straight(q_from, q_to, duration), 0.02, 1.0, 1.0
         )
-        assert touch is not None
-        assert touch.box == 'blade'
+        assert violation is not None
+        assert violation.box == 'blade'
 
 
 def test_only_at_the_end_the_ray_counts_out_to_the_target():
@@ -212,14 +212,14 @@ def test_only_at_the_end_the_ray_counts_out_to_the_target():
 
     trajectory = straight(q_from, q_to)
     assert fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
-    touch = fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
-    assert touch is not None
-    assert touch.time == trajectory.duration
+    violation = fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
+    assert violation is not None
+    assert violation.time == trajectory.duration
     middle = 0.5 * (q_from + q_to)
     assert fcl_check.first_violation(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
 
 
-def test_nothing_touches_where_there_is_nothing():
+def test_nothing_collides_where_there_is_nothing():
     arm = table_1_arm()
     trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))
     assert fcl_check.first_violation(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
@@ -238,8 +238,13 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
 
     def look():
         motion = straight(q_from, q_to)
-        touches = [fcl_check.first_violation(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies]
-        return [touch and (touch.time, touch.distance, touch.bar, touch.box) for touch in touches]
+        violations = [
+            fcl_check.first_violation(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies
+        ]
+        return [
+            violation and (violation.time, violation.distance, violation.bar, violation.box)
+            for violation in violations
+        ]
 
     before = look()
     monkeypatch.setattr(fcl_shapes.fcl, 'CollisionObject', counted)

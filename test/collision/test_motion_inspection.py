@@ -57,11 +57,11 @@ def test_a_good_motion_passes_with_its_figures():
 @pytest.mark.parametrize(
     ('changes', 'words'),
     [
-        ({'velocities': [[0.1, 0, 0, 0], [0.0] * 4]}, 'velocity .* at an end'),
-        ({'accelerations': [[0.0] * 4, [0.1, 0, 0, 0]]}, 'acceleration .* at an end'),
+        ({'velocities': [[0.1, 0, 0, 0], [0.0] * 4]}, 'velocity .* at start or end'),
+        ({'accelerations': [[0.0] * 4, [0.1, 0, 0, 0]]}, 'acceleration .* at start or end'),
         ({'times': [0.0, 0.45]}, 'velocity reaches|acceleration reaches'),
-        ({'positions': [START, START]}, 'mm by the target'),
-        ({'positions': [START + 0.01, END]}, 'begins'),
+        ({'positions': [START, START]}, 'misses the target by'),
+        ({'positions': [START + 0.01, END]}, 'starts'),
         (
             {
                 'times': [0.0, 1.5, 3.0],
@@ -69,7 +69,7 @@ def test_a_good_motion_passes_with_its_figures():
                 'velocities': np.zeros((3, 4)),
                 'accelerations': np.zeros((3, 4)),
             },
-            'range',
+            'position limits',
         ),
     ],
 )
@@ -100,5 +100,5 @@ def test_the_margin_is_kept():
 
 
 def test_a_target_behind_the_tool_is_not_pointed_at():
-    with pytest.raises(UnsafeMotionError, match='by the target'):
+    with pytest.raises(UnsafeMotionError, match='misses the target by'):
         inspect(motion(), target=TOOL[:3, 3] - 2.0 * TOOL[:3, 2])

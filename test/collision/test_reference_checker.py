@@ -1,10 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The judge is judged: by points along the bar, and by the polynomials it solves for."""
+"""The reference checker against points along the bar, and the polynomials it solves for."""
 
 from hypothesis import assume, given, settings, strategies as st
 import numpy as np
-from rrth_planner.collision.reference_checker import bar_box_touch, bars, frames, quintic_states
+from rrth_planner.collision.reference_checker import bar_box_contact, bars, frames, quintic_states
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.rotation import rotation_matrix
@@ -31,7 +31,7 @@ def test_a_bar_meets_a_box_where_one_of_its_points_is_inside(a, b, center, half,
     depth = (np.abs((points - center) @ rotation) - half).max(axis=1).min()
     # Between two points the bar may still enter by less than their distance.
     assume(not -1e-9 < depth < np.linalg.norm(np.subtract(b, a)) / 4000 + 1e-9)
-    touches = bar_box_touch(np.array([a, b]), np.array(center), rotation, half)
+    touches = bar_box_contact(np.array([a, b]), np.array(center), rotation, half)
     assert bool(touches) == (depth < 0.0)
 
 

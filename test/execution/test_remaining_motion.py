@@ -26,7 +26,7 @@ from rrth_planner.model.trajectory import (
     sample,
     Trajectory,
 )
-from rrth_planner.timing.fast_stop import fast_stop, ON_ITS_WAY
+from rrth_planner.timing.fast_stop import fast_stop, LATENCY
 from rrth_planner.timing.parameterization import limit_ratio
 from worlds import (
     dense_touch,
@@ -74,7 +74,7 @@ def test_a_fast_stop_begins_as_the_motion_and_rests_on_its_path(seed):
     assert stop.duration <= motion.duration - time + 1e-6
     assert limit_ratio(stop, limits()) <= 1.0026
     # A controller that gets it late finds itself on it.
-    late = min(0.9 * ON_ITS_WAY, stop.duration)
+    late = min(0.9 * LATENCY, stop.duration)
     for mine, its in zip(sample(stop, [late]), sample(motion, [time + late]), strict=True):
         assert np.allclose(mine, its, atol=1e-6)
     grid, q, _, _ = quintic_states(

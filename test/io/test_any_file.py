@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever a file holds, what reads it makes a value of it or refuses it in one sentence."""
+"""Whatever a file holds, what reads it makes a value of it or rejects it in one sentence."""
 
 import functools
 from pathlib import Path
@@ -127,7 +127,7 @@ def taken(read, file):
 
 
 @pytest.mark.parametrize('kind', READERS)
-def test_a_file_that_is_spoilt_anywhere_is_read_or_refused(tmp_path, kind):
+def test_a_file_that_is_spoilt_anywhere_is_read_or_rejected(tmp_path, kind):
     read, suffix, files = READERS[kind]
     originals, file = files(tmp_path), tmp_path / f'spoilt{suffix}'
 
@@ -166,7 +166,7 @@ def places(data, path=()):
 
 
 @pytest.mark.parametrize('kind', [k for k, (_, suffix, _) in READERS.items() if suffix == '.yaml'])
-def test_a_value_of_any_type_in_any_place_is_taken_or_refused(tmp_path, kind):
+def test_a_value_of_any_type_in_any_place_is_taken_or_rejected(tmp_path, kind):
     read, suffix, files = READERS[kind]
     text, file = files(tmp_path)[0].decode(), tmp_path / f'spoilt{suffix}'
     everywhere = list(places(parse_yaml(text, 'text')))
@@ -233,7 +233,7 @@ def test_what_only_looks_like_a_number_is_none(tmp_path, kind, path, value):
 @pytest.mark.parametrize(
     'name', ['a\nb', '\x1b[31mb', '\x9b31m', '\u202egnp', '\u2028', '', 7, None]
 )
-def test_names_that_are_not_printable_are_refused_wherever_they_stand(tmp_path, name):
+def test_names_that_are_not_printable_are_rejected_wherever_they_stand(tmp_path, name):
     body = load_yaml(ROOT / 'config/body.yaml')
     body['boxes'][0]['name'] = name
     arm, named = load_yaml(ROOT / 'config/arm.yaml'), load_yaml(ROOT / 'config/arm.yaml')
@@ -254,9 +254,9 @@ def test_names_that_are_not_printable_are_refused_wherever_they_stand(tmp_path, 
         file.write_text(to_yaml(data))
         with pytest.raises(
             RrthError, match='name.*expected (a text|1 to 256 printable)'
-        ) as refused:
+        ) as rejected:
             read(file)
-        assert str(refused.value).isprintable()
+        assert str(rejected.value).isprintable()
 
 
 def test_a_text_of_a_marker_names_its_box_in_one_line(tmp_path):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A body from a file is that of the example message; what is no body is refused in a sentence."""
+"""A body from a file is that of the example message; what is no body is rejected in a sentence."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_the_packaged_body_is_that_of_the_example_message():
         ({'boxes': [{**GOOD, 'quaternion_xyzw': [0, 0, 0, 0]}]}, 'expected four numbers'),
     ],
 )
-def test_what_is_no_body_is_refused(data, words):
+def test_what_is_no_body_is_rejected(data, words):
     with pytest.raises(SceneError, match=words):
         scene_from_mapping(data)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Records of incidents: exact to the bit, a hundred a folder, refused in one sentence."""
+"""Records of incidents: exact to the bit, a hundred a folder, rejected in one sentence."""
 
 from dataclasses import replace
 import os
@@ -247,7 +247,7 @@ del_ = object()
         (('versions',), [], 'versions: [], expected a mapping'),
     ],
 )
-def test_a_bad_record_is_refused_in_one_sentence(tmp_path, path, value, sentence):
+def test_a_bad_record_is_rejected_in_one_sentence(tmp_path, path, value, sentence):
     with pytest.raises(RrthError) as problem:
         incident_from_mapping(changed(path, value))
     assert str(problem.value).startswith(sentence)
@@ -283,7 +283,7 @@ PATHS = list(paths_in(incident_to_mapping(disagreement())))
 
 @examples(400)
 @given(st.sampled_from(PATHS), JUNK)
-def test_whatever_a_record_holds_it_is_read_or_refused(path, junk):
+def test_whatever_a_record_holds_it_is_read_or_rejected(path, junk):
     try:
         again = incident_from_mapping(changed(path, junk))
     except RrthError as problem:
@@ -293,12 +293,12 @@ def test_whatever_a_record_holds_it_is_read_or_refused(path, junk):
 
 
 @pytest.mark.parametrize('data', [None, 3, 'text', [], MappingProxyType({})])
-def test_what_is_no_mapping_is_refused(data):
+def test_what_is_no_mapping_is_rejected(data):
     with pytest.raises(RecordError):
         incident_from_mapping(data)
 
 
-def test_options_without_a_name_are_refused():
+def test_options_without_a_name_are_rejected():
     record = error_incident(question(options=PrintedRRTHOptions()), ValueError(), '', None)
     with pytest.raises(RecordError, match='PrintedRRTHOptions, expected those of rrt_h, rrt'):
         incident_to_mapping(record)

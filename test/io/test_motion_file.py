@@ -108,7 +108,7 @@ BAD = {
 
 
 @pytest.mark.parametrize('name', BAD)
-def test_a_file_that_holds_no_motion_is_refused(tmp_path, name):
+def test_a_file_that_holds_no_motion_is_rejected(tmp_path, name):
     text, words = BAD[name]
     file = tmp_path / name
     file.write_text(text)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every example message loads, is what it says, and is taken or refused by the nodes' checks."""
+"""Every example message loads, is what it says, and is taken or rejected by the nodes' checks."""
 
 from pathlib import Path
 import re
@@ -106,7 +106,7 @@ def test_the_raised_arm_is_higher_than_the_head():
     assert top > head.center[2] + 0.5 * head.size[2]
 
 
-def test_the_bad_body_is_refused_by_name():
+def test_the_bad_body_is_rejected_by_name():
     with pytest.raises(MessageError, match='head'):
         WearerBody().apply(example('body_bad'), 0.0, 'torso')
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Text is read as the data that was written, or refused: at once, in one sentence."""
+"""Text is read as the data that was written, or rejected: at once, in one sentence."""
 
 import math
 from pathlib import Path
@@ -38,7 +38,7 @@ PLAIN = st.recursive(
 
 
 def refusal(text):
-    """Return the sentence in which a text is refused."""
+    """Return the sentence in which a text is rejected."""
     with pytest.raises(ModelError) as caught:
         parse_yaml(text, 'text')
     sentence = str(caught.value)
@@ -134,13 +134,13 @@ MERGES = 'm0: &m0 {k: 1}\n' + ''.join(
         ('%YAML 9.9\n---\na', 'line 1: '),
     ],
 )
-def test_what_is_no_plain_data_is_refused_at_its_line(text, words):
+def test_what_is_no_plain_data_is_rejected_at_its_line(text, words):
     assert words in refusal(text)
 
 
 @examples(500)
 @given(st.text(st.sampled_from(list('ab12.[]{}:,-? \n\t#&*!|>"\'%@`~<=\\\x00\x1b\ud7ff\u202e'))))
-def test_any_text_is_data_or_refused(text):
+def test_any_text_is_data_or_rejected(text):
     try:
         data = parse_yaml(text, 'text')
     except ModelError as problem:
@@ -169,9 +169,9 @@ def test_a_file_without_end_is_read_as_far_as_the_limit(tmp_path):
 
 def test_what_cannot_be_read_is_named(tmp_path):
     for path in (tmp_path, tmp_path / 'none', tmp_path / 'a\x00b', tmp_path / ('x' * 300)):
-        with pytest.raises(ModelError, match='file .*; expected a readable file') as refused:
+        with pytest.raises(ModelError, match='file .*; expected a readable file') as rejected:
             read_bytes(path)
-        assert str(refused.value).isprintable()
+        assert str(rejected.value).isprintable()
     (tmp_path / 'latin').write_bytes(b'a: \xe4')
     with pytest.raises(ModelError, match='latin: .*expected text in UTF-8'):
         load_yaml(tmp_path / 'latin')
@@ -199,10 +199,10 @@ LAUGHS = ''.join(f'<!ENTITY e{i + 1} "{f"&e{i};" * 10}">' for i in range(9))
         ('<?xml version="1.0" encoding="utf-7"?><a/>', 'expected a readable XML file'),
     ],
 )
-def test_what_is_no_plain_xml_is_refused(tmp_path, text, words):
+def test_what_is_no_plain_xml_is_rejected(tmp_path, text, words):
     file = tmp_path / 'a.urdf'
     file.write_text(text)
-    with pytest.raises(ModelError, match='a.urdf: .*; expected a readable XML file') as refused:
+    with pytest.raises(ModelError, match='a.urdf: .*; expected a readable XML file') as rejected:
         load_xml(file)
-    assert words in str(refused.value)
-    assert str(refused.value).isprintable()
+    assert words in str(rejected.value)
+    assert str(rejected.value).isprintable()

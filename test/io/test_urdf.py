@@ -202,6 +202,6 @@ def test_an_arm_without_a_name_is_called_arm(tmp_path):
         assert ElementTree.fromstring(urdf_of_file(file)).get('name') == expected
 
 
-def test_speeds_that_are_none_are_refused():
+def test_speeds_that_are_none_are_rejected():
     with pytest.raises(ModelError, match='max_velocity: shape'):
         arm_to_urdf(load_arm(), np.ones(3), RADIUS)

@@ -67,7 +67,7 @@ def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
         ),
     ],
 )
-def test_what_is_no_box_of_the_wearer_is_refused_and_not_left_out(tmp_path, head, words):
+def test_what_is_no_box_of_the_wearer_is_rejected_and_not_left_out(tmp_path, head, words):
     with pytest.raises(SceneError, match=f'body.yaml: marker 6.*{words}'):
         load_wearer(message(tmp_path, head))
 

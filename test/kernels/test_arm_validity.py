@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.certificate import derivative_bounds
-from rrth_planner.collision.reference_checker import bar_box_touch, bars, first_contact
+from rrth_planner.collision.reference_checker import bar_box_contact, bars, first_contact
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
@@ -58,7 +58,7 @@ from worlds import (
 
 
 def decide(world, q_from, q_to):
-    """Return 1, 0 or -1: free, touching, undecided."""
+    """Return 1, 0 or -1: free, collision, undecided."""
     curve = np.ascontiguousarray(line(q_from, q_to))
     return prove_curve(
         curve,
@@ -76,7 +76,7 @@ def is_free(world, q_from, q_to):
 
 
 @pytest.fixture(scope='module')
-def taut_edges():
+def shortened_edges():
     """Edges of shortened paths round the standing wearer: they pass its corners closely."""
     world = wearer_world()
     rng = np.random.default_rng(11)
@@ -93,7 +93,7 @@ def taut_edges():
     return edges
 
 
-def test_configurations_are_judged_as_by_the_oracle():
+def test_configurations_are_checked_as_by_the_reference_checker():
     rng = np.random.default_rng(12)
     for arm in (table_1_arm(), table_1_arm(radius=0.03)):
         for scene in (wearer(), varied_body(rng)):
@@ -103,12 +103,12 @@ def test_configurations_are_judged_as_by_the_oracle():
             ends, touched = bars(arm, q, RAY), np.zeros(len(q), dtype=bool)
             for box in scene.boxes:
                 half = 0.5 * box.size + MARGIN + arm.radii[0]
-                touched |= bar_box_touch(ends, box.center, box.rotation, half).any(axis=1)
+                touched |= bar_box_contact(ends, box.center, box.rotation, half).any(axis=1)
             assert np.array_equal(got, ~touched)
             assert 300 < np.sum(got) < 2450
 
 
-def test_the_dense_oracle_of_the_tests_is_the_oracle():
+def test_the_dense_oracle_of_the_tests_is_the_reference_checker():
     rng = np.random.default_rng(13)
     n_touching = 0
     for i in range(60):
@@ -124,7 +124,7 @@ def test_the_dense_oracle_of_the_tests_is_the_oracle():
     assert 10 < n_touching < 58
 
 
-def test_no_random_edge_is_certified_that_touches():
+def test_no_random_edge_is_certified_that_collides():
     rng = np.random.default_rng(14)
     n_certified = n_touching = 0
     for i in range(20):
@@ -147,9 +147,9 @@ def test_no_random_edge_is_certified_that_touches():
     assert n_touching > 250
 
 
-def test_no_edge_of_any_chain_is_certified_that_touches():
+def test_no_edge_of_any_chain_is_certified_that_collides():
     rng = np.random.default_rng(15)
-    n_certified = n_refused = 0
+    n_certified = n_rejected = 0
     for i in range(120):
         arm, scene = compiled_chain(rng, i % 2 == 0), random_boxes(rng, 4, spread=0.7)
         world = arm_world(arm, scene, 0.005, 0.6)
@@ -160,9 +160,9 @@ def test_no_edge_of_any_chain_is_certified_that_touches():
             touches = edge_touches(arm, scene, 0.005, 0.6, q_from, q_to, 1e-3)
             assert not (proof == 1 and touches)
             n_certified += proof == 1
-            n_refused += touches
+            n_rejected += touches
     assert n_certified > 300
-    assert n_refused > 300
+    assert n_rejected > 300
 
 
 def grazing(world, arm, scene, edge, rng):
@@ -183,11 +183,11 @@ def grazing(world, arm, scene, edge, rng):
     return low, high, shift
 
 
-def test_no_taut_or_grazing_edge_is_certified_that_touches(taut_edges):
+def test_no_shortened_or_grazing_edge_is_certified_that_collides(shortened_edges):
     rng = np.random.default_rng(16)
     arm, scene, world = table_1_arm(), wearer(), wearer_world()
     n_grazing = n_certified = 0
-    for edge in taut_edges:
+    for edge in shortened_edges:
         assert not edge_touches(arm, scene, MARGIN, RAY, *edge, 2e-4)
         found = grazing(world, arm, scene, edge, rng)
         if found is None:
@@ -203,11 +203,11 @@ def test_no_taut_or_grazing_edge_is_certified_that_touches(taut_edges):
     assert n_certified > 20
 
 
-def test_truly_free_taut_edges_are_nearly_all_certified(taut_edges):
+def test_truly_free_shortened_edges_are_nearly_all_certified(shortened_edges):
     rng = np.random.default_rng(17)
     arm, scene, world = table_1_arm(), wearer(), wearer_world()
     results = []
-    for edge in taut_edges:
+    for edge in shortened_edges:
         found = grazing(world, arm, scene, edge, rng)
         if found is None:
             continue
@@ -219,10 +219,10 @@ def test_truly_free_taut_edges_are_nearly_all_certified(taut_edges):
     assert np.mean(results) >= 0.97
 
 
-def test_planned_edges_are_certified_in_the_other_direction_too(taut_edges):
+def test_planned_edges_are_certified_in_the_other_direction_too(shortened_edges):
     world = wearer_world()
     # But for rounding.
-    assert np.mean([is_free(world, b, a) for a, b in taut_edges]) >= 0.97
+    assert np.mean([is_free(world, b, a) for a, b in shortened_edges]) >= 0.97
 
 
 @kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
@@ -241,7 +241,7 @@ def is_free_at_instants(q_from, q_to, resolution, chain, robot, boxes):
     return True
 
 
-def test_edges_pulled_taut_by_a_sampled_check_are_nearly_all_certified_if_free():
+def test_edges_shortened_with_a_sampled_check_are_nearly_all_certified_if_free():
     world, arm, scene = wearer_world(), table_1_arm(), wearer()
     sampled = replace(world, edge_check=first_class(is_free_at_instants))
     options = RRTHOptions(club_attempts=0, improve_time=0.0)
@@ -261,7 +261,7 @@ def test_edges_pulled_taut_by_a_sampled_check_are_nearly_all_certified_if_free()
     assert np.mean(results) >= 0.97
 
 
-def test_no_quintic_is_proven_that_touches():
+def test_no_quintic_is_proven_that_collides():
     rng = np.random.default_rng(18)
     n_proven = n_touching = 0
     for i in range(500):
@@ -283,12 +283,12 @@ def test_no_quintic_is_proven_that_touches():
     assert n_touching > 80
 
 
-def test_both_directions_of_an_edge_are_never_judged_opposite(taut_edges):
+def test_both_directions_of_an_edge_are_never_judged_opposite(shortened_edges):
     rng = np.random.default_rng(19)
     world = wearer_world()
     edges = [rng.uniform(*world.bounds, (2, 4)) for _ in range(1500)]
     n_decided = 0
-    for a, b in [*edges, *taut_edges]:
+    for a, b in [*edges, *shortened_edges]:
         forth, back = decide(world, a, b), decide(world, b, a)
         assert {forth, back} != {0, 1}
         n_decided += forth == back != -1
@@ -399,13 +399,13 @@ def test_thousands_of_boxes_far_away_cost_nothing_and_hide_none():
     assert n_touching > 5
 
 
-def test_open_pairs_that_outgrow_their_room_are_refused(taut_edges):
+def test_open_pairs_that_outgrow_their_room_are_rejected(shortened_edges):
     crowd = arm_world(table_1_arm(), Scene(wearer().boxes * MAX_OPEN), MARGIN, RAY)
-    decisions = [decide(crowd, *edge) for edge in taut_edges[:60]]
+    decisions = [decide(crowd, *edge) for edge in shortened_edges[:60]]
     assert set(decisions) == {1, -1}
 
 
-def test_an_edge_longer_than_the_proof_has_room_for_is_refused():
+def test_an_edge_longer_than_the_proof_has_room_for_is_rejected():
     world = wearer_world()
     q_to = FOLDED + np.array([2.0 * MAX_NODES, 0.0, 0.0, 0.0])
     assert decide(world, FOLDED, q_to) == -1
@@ -422,7 +422,7 @@ from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.planning.pointing_goals import goal_configurations, pointing_problem
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.kernels.clock import now
-from rrth_planner.kernels.collision.edge_contacts import edge_contacts, SLOPES
+from rrth_planner.kernels.collision.edge_contacts import edge_contacts, GRADIENT
 from rrth_planner.kernels.search.random import next_word, normal, random_state, uniform
 from rrth_planner.kernels.search.sampling import draw_near
 from rrth_planner.planning.options import RRTHOptions
@@ -456,7 +456,7 @@ options = RRTHOptions(
     club_attempts=1, corner_moves=3, improve_time=1000.0, time_limit=1000.0
 )
 result = plan(problem, options, np.random.default_rng(3))
-contacts = np.empty((64, SLOPES + 4))
+contacts = np.empty((64, GRADIENT + 4))
 leans = []
 for a, b in zip(result.path.waypoints[:-1], result.path.waypoints[1:]):
     n = edge_contacts(a, b, world.chain, world.robot, world.obstacles, contacts)

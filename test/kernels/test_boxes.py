@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Boxes as numbers: placed as matrices place them, refused as one by one, none of them lost."""
+"""Boxes as numbers: placed as matrices place them, rejected as one by one, none of them lost."""
 
 from hypothesis import given, strategies as st
 import numpy as np
@@ -47,7 +47,7 @@ def test_markers_are_placed_as_by_matrices(seed, n):
 
 
 @pytest.mark.parametrize(('field', 'index', 'value', 'words'), WRONG)
-def test_of_many_boxes_the_first_that_is_none_is_refused(field, index, value, words):
+def test_of_many_boxes_the_first_that_is_none_is_rejected(field, index, value, words):
     scene = random_boxes(np.random.default_rng(3), 5)
     names, numbers = [box.name for box in scene.boxes], scene.numbers.copy()
     assert first_bad(numbers) == -1

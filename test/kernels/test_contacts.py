@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an edge leans on boxes: gaps, their slopes, and none that is overlooked."""
+"""Contacts of an edge with boxes: gaps, their gradients, and none that is overlooked."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from rrth_planner.kernels.collision.edge_contacts import (
     CLOSE,
     edge_contacts,
     GAP,
+    GRADIENT,
     SHARE,
-    SLOPES,
     SPACING,
 )
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
@@ -144,7 +144,7 @@ def gaps_at(arm, scene, world, q):
 def test_the_close_pairs_of_an_edge_are_found_with_their_slopes(case):
     arm, scene = cases()[case]
     world, rng = arm_world(arm, scene, MARGIN, RAY), np.random.default_rng(74 + case)
-    contacts, n_contacts, n_kinks = np.empty((400, SLOPES + arm.dof)), 0, 0
+    contacts, n_contacts, n_kinks = np.empty((400, GRADIENT + arm.dof)), 0, 0
     for _ in range(60):
         q_from = free_configuration(rng, world)
         step = rng.standard_normal(arm.dof)
@@ -170,7 +170,7 @@ def test_the_close_pairs_of_an_edge_are_found_with_their_slopes(case):
                     gaps_at(arm, scene, world, q - h),
                 )
                 slopes[k] = (ahead - behind) / 2e-6
-            errors = [np.abs(slopes[:, i, j] - row[SLOPES:]).max() for i, j in pairs]
+            errors = [np.abs(slopes[:, i, j] - row[GRADIENT:]).max() for i, j in pairs]
             # Two separating axes may be as good as each other there.
             n_kinks += min(errors) > 1e-4
             matched.append((row[SHARE], row[GAP], {tuple(pair) for pair in pairs}))
@@ -195,16 +195,16 @@ def test_the_close_pairs_of_an_edge_are_found_with_their_slopes(case):
     assert n_kinks <= 0.05 * n_contacts
 
 
-def test_an_edge_far_from_every_box_leans_on_nothing():
+def test_an_edge_far_from_every_box_has_no_contacts():
     arm = table_1_arm()
     far = Scene(tuple(random_boxes(np.random.default_rng(75), 20).boxes))
     world = arm_world(arm, Scene(()), MARGIN, RAY)
-    contacts = np.empty((10, SLOPES + 4))
+    contacts = np.empty((10, GRADIENT + 4))
     q = np.array([0.1, -0.5, 0.2, 0.3])
     assert edge_contacts(q, q + 0.5, world.chain, world.robot, world.obstacles, contacts) == 0
     # Where the room ends, the rest is left out.
     crowd = arm_world(arm, far, MARGIN, RAY)
-    few = np.full((3, SLOPES + 4), np.nan)
+    few = np.full((3, GRADIENT + 4), np.nan)
     n = edge_contacts(q, q + 1.5, crowd.chain, crowd.robot, crowd.obstacles, few[:2])
     assert n <= 2
     assert np.isnan(few[2:]).all()

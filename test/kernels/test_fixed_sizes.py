@@ -10,7 +10,7 @@ import re
 import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import tree_depth
-from rrth_planner.collision.reference_checker import bar_box_touch
+from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
 from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
@@ -49,8 +49,8 @@ TESTS = Path(__file__).parent
 
 # What keeps what is given within each size that has a name: the tests that show it, at the size
 # and beyond it.
-JOINTS = ('test_an_arm_as_large_as_there_is_room_for', 'test_a_larger_arm_is_refused')
-BOXES = ('test_as_many_boxes_as_there_is_room_for', 'test_more_boxes_are_refused')
+JOINTS = ('test_an_arm_as_large_as_there_is_room_for', 'test_a_larger_arm_is_rejected')
+BOXES = ('test_as_many_boxes_as_there_is_room_for', 'test_more_boxes_are_rejected')
 PROOF = (
     'test_open_pairs_that_outgrow_their_room',
     'test_an_edge_longer_than_the_proof_has_room_for',
@@ -58,7 +58,7 @@ PROOF = (
 )
 LEANING = (
     'test_a_path_of_more_corners_than_there_is_room_for',
-    'test_an_edge_that_leans_on_more_than_there_is_room_for',
+    'test_an_edge_with_more_contacts_than_there_is_room_for',
 )
 CLOSED = ('test_an_arm_of_many_joints_aims_numerically',)
 NEAREST = ('test_nearest_is_the_least_distance_of_numpy',)
@@ -80,7 +80,7 @@ NAMED = {
     'SQUARE': LEANING,
     'MAX_CONTACTS': LEANING,
     'MAX_CLOSED_DOF': CLOSED,
-    'SLOPES_ROOM': CLOSED,
+    'GRADIENTS_ROOM': CLOSED,
     'SQUARE_ROOM': CLOSED,
     'ROOM': NEAREST,
     'MOST_PHASES': PHASES,
@@ -191,7 +191,7 @@ def boxes_round(rng):
 
 
 @pytest.mark.parametrize('n_joints', [32, layout.MAX_DOF])
-def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joints):
+def test_an_arm_as_large_as_there_is_room_for_is_checked_as_by_the_reference_checker(n_joints):
     arm, rng = long_arm(n_joints, layout.MAX_BARS), np.random.default_rng(71)
     assert len(bar_ends(arm)) == layout.MAX_BARS
     scene = boxes_round(rng)
@@ -201,14 +201,14 @@ def test_an_arm_as_large_as_there_is_room_for_is_judged_as_by_the_oracle(n_joint
         ends = oracle_bars(arm, q, 0.5)
         assert np.abs(kernel_bars(arm, world, q, 0.5) - ends[0]).max() < 1e-12
         touched = [
-            bar_box_touch(ends, b.center, b.rotation, 0.5 * b.size + MARGIN + 0.01).any()
+            bar_box_contact(ends, b.center, b.rotation, 0.5 * b.size + MARGIN + 0.01).any()
             for b in scene.boxes
         ]
         assert world.is_valid(q) == (not any(touched))
         n_free += not any(touched)
     assert 10 < n_free < 90
     proofs = {1: 0, 0: 0, -1: 0}
-    rows = np.empty((50, edge_contacts.SLOPES + n_joints))
+    rows = np.empty((50, edge_contacts.GRADIENT + n_joints))
     for _ in range(20):
         q = free_configuration(rng, world)
         step = rng.standard_normal(n_joints)
@@ -251,7 +251,7 @@ def test_the_kinematics_of_an_arm_make_room_for_all_of_its_joints(n_joints):
     assert max(map(int, re.findall(r'angles\[(\d+)\]', text))) == max(rooms) - 1
 
 
-def test_a_larger_arm_is_refused():
+def test_a_larger_arm_is_rejected():
     with pytest.raises(ModelError, match=r'joint_names: 65 joints, expected at most 64$'):
         long_arm(layout.MAX_DOF + 1, layout.MAX_BARS)
     with pytest.raises(ModelError, match=r'dh: 64 bars, expected at most 63: '):
@@ -271,7 +271,7 @@ def many_boxes(n):
     return rows
 
 
-def test_as_many_boxes_as_there_is_room_for_are_judged_as_by_the_oracle():
+def test_as_many_boxes_as_there_is_room_for_are_checked_as_by_the_reference_checker():
     rows, arm = many_boxes(layout.MAX_BOXES), table_1_arm()
     scene = Scene(tuple(Box.of_row('box', row) for row in rows))
     world = arm_world(arm, scene, 0.0, 0.2)
@@ -289,7 +289,7 @@ def test_as_many_boxes_as_there_is_room_for_are_judged_as_by_the_oracle():
             )
             half = np.full(3, 0.0025)
             touched |= any(
-                bar_box_touch(np.array([[[a, b]]]), c, np.eye(3), half).any()
+                bar_box_contact(np.array([[[a, b]]]), c, np.eye(3), half).any()
                 for c in rows[near, :3]
             )
         assert world.is_valid(q) == (not touched)
@@ -297,7 +297,7 @@ def test_as_many_boxes_as_there_is_room_for_are_judged_as_by_the_oracle():
     assert min(ends.values()) > 5
 
 
-def test_more_boxes_are_refused():
+def test_more_boxes_are_rejected():
     box = Box('box', np.zeros(3), np.ones(3), np.eye(3))
     with pytest.raises(SceneError, match='boxes: 32769, expected at most 32768'):
         Scene((box,) * (layout.MAX_BOXES + 1))
@@ -318,14 +318,14 @@ def test_the_queue_and_the_points_of_a_proof_hold_all_of_its_nodes():
 
 
 @pytest.mark.parametrize('resolution', [0.0, -1.0, 0.99 * FINEST, np.inf, np.nan])
-def test_a_proof_that_would_cut_bars_into_too_many_parts_is_refused(resolution):
+def test_a_proof_that_would_cut_bars_into_too_many_parts_is_rejected(resolution):
     world = wearer_world()
     replace(world, resolution=FINEST)
     with pytest.raises(OptionsError, match=r'resolution: .*, expected a spacing from 1e-09 on'):
         replace(world, resolution=resolution)
 
 
-def test_an_edge_that_leans_on_more_than_there_is_room_for_finds_as_many_as_there_is():
+def test_an_edge_with_more_contacts_than_there_is_room_for_finds_as_many_as_there_is():
     arm, rng = table_1_arm(), np.random.default_rng(74)
     # More boxes in a row, each within reach of the ray as it passes, than pairs are looked at.
     rows = many_boxes(3000)
@@ -335,7 +335,7 @@ def test_an_edge_that_leans_on_more_than_there_is_room_for_finds_as_many_as_ther
     for _ in range(40):
         q_from, q_to = rng.uniform(*arm.bounds, (2, 4))
         for capacity in (0, 1, 7, elastic_band.MAX_CONTACTS):
-            rows = np.full((capacity + 2, edge_contacts.SLOPES + 4), 7.0)
+            rows = np.full((capacity + 2, edge_contacts.GRADIENT + 4), 7.0)
             n = edge_contacts.edge_contacts(
                 q_from, q_to, world.chain, world.robot, world.obstacles, rows[:capacity]
             )
@@ -378,7 +378,7 @@ def test_a_stretch_has_no_more_phases_than_there_is_room_for():
         v_from, v_to, top = np.sort(rng.uniform(0.0, 1.0, 3))
         cell = np.array([10.0 ** rng.uniform(-3, 1), top, *10.0 ** rng.uniform(-1, 2, 2)])
         phases = np.full((speed_profile.MOST_PHASES + 1, 2), 7.0)
-        n = speed_profile.stretch_phases(v_from, v_to, cell, phases[: speed_profile.MOST_PHASES])
+        n = speed_profile.cell_phases(v_from, v_to, cell, phases[: speed_profile.MOST_PHASES])
         assert (phases[-1] == 7.0).all()
         found.add(n)
     assert max(found) == speed_profile.MOST_PHASES

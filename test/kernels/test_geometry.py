@@ -8,8 +8,8 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.collision.box_tree import pack_boxes
-from rrth_planner.collision.reference_checker import bar_box_touch
-from rrth_planner.kernels.collision.bar_box import bar_box_distance, open_lanes, touched_lanes
+from rrth_planner.collision.reference_checker import bar_box_contact
+from rrth_planner.kernels.collision.bar_box import bar_box_distance, contact_lanes, open_lanes
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from worlds import examples, random_rotation
 
@@ -27,7 +27,7 @@ def packed(center, rotation, half):
 
 def touches(a, b, radius, boxes):
     """Return whether the bar a-b touches any box of the only group."""
-    return touched_lanes(np.array([*a, 0.0, *b, radius]), 0, boxes, 0) != 0
+    return contact_lanes(np.array([*a, 0.0, *b, radius]), 0, boxes, 0) != 0
 
 
 def is_open(points, bow_start, bow_end, radius, boxes):
@@ -92,7 +92,7 @@ def test_contact_is_that_of_clipping(cases):
         if abs(signed) < 1e-9:
             continue
         got = touches(a, b, 0.0, packed(center, rotation, half))
-        assert got == bar_box_touch(np.stack([a, b]), center, rotation, half), k
+        assert got == bar_box_contact(np.stack([a, b]), center, rotation, half), k
         assert got == (signed < 0.0), k
         n_touching += got
         n_grazing += abs(signed) < 2e-5
@@ -106,7 +106,7 @@ def test_a_radius_grows_the_box(cases):
         assert touches(a, b, 0.07, boxes) == touches(a, b, 0.0, fat)
 
 
-def test_each_lane_is_judged_as_if_it_were_alone(cases):
+def test_each_lane_is_checked_as_if_it_were_alone(cases):
     n = LANES - 1
     a, b, center, rotation, half = (part[:60] for part in cases)
     groups = [packed(c, r, h) for c, r, h in zip(center, rotation, half, strict=True)]
@@ -118,7 +118,7 @@ def test_each_lane_is_judged_as_if_it_were_alone(cases):
             alone = [touches(p, q, 0.0, group) for group in groups[first : first + n]]
             together[:BOX_HALF, n:] = 0.0
             points = np.array([*p, 0.0, *q, 0.0])
-            bits = touched_lanes(points, 0, together.reshape(1, -1), 0)
+            bits = contact_lanes(points, 0, together.reshape(1, -1), 0)
             assert [bool(bits >> lane & 1) for lane in range(LANES)] == [*alone, False]
 
 
@@ -182,11 +182,11 @@ def test_inside_the_distance_is_the_depth_of_penetration(cases):
         axes = np.concatenate([axes, -axes]) @ rotation.T
         ends = np.stack([a, b])
         out = ends + (depth + 1e-9) * axes[:, None]
-        assert not bar_box_touch(out, center, rotation, half).all()
+        assert not bar_box_contact(out, center, rotation, half).all()
         others = rng.standard_normal((60, 3))
         others /= np.linalg.norm(others, axis=1)[:, None]
         less = ends + (depth - 1e-9) * np.concatenate([axes, others])[:, None]
-        assert bar_box_touch(less, center, rotation, half).all()
+        assert bar_box_contact(less, center, rotation, half).all()
     assert n_inside > 250
 
 
@@ -279,7 +279,7 @@ def test_a_number_that_is_none_counts_as_contact():
 
 @examples(400)
 @given(seed=SEEDS)
-def test_a_hull_that_is_apart_contains_no_bar_that_touches(seed):
+def test_a_hull_that_is_apart_contains_no_bar_that_collides(seed):
     rng = np.random.default_rng(seed)
     center, rotation = rng.uniform(-0.5, 0.5, 3), random_rotation(rng)
     half = rng.uniform(0.05, 0.4, 3)
@@ -297,7 +297,7 @@ def test_a_hull_that_is_apart_contains_no_bar_that_touches(seed):
         stray = rng.standard_normal((40, 2, 3))
         stray /= np.linalg.norm(stray, axis=2)[..., None]
         ends += stray * bows[:, None]
-        assert not bar_box_touch(ends, center, rotation, half + radius).any()
+        assert not bar_box_contact(ends, center, rotation, half + radius).any()
 
 
 def test_a_hull_well_away_is_seen_to_be_apart():

@@ -34,7 +34,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 
 def every_candidate(arm, target, q_near, n_draws):
-    """Return the postures of all draws that aim, nearest first, each of them once."""
+    """Return the configurations of all draws that aim, nearest first, each of them once."""
     kernels = pointing_kernels(arm)
     candidates, reaches = np.empty((2 * n_draws, arm.dof)), np.empty(2 * n_draws)
     world = arm_world(arm, Scene(()), 0.0, RAY)
@@ -137,7 +137,7 @@ def draws(arm):
     return np.random.default_rng(0).uniform(*arm.bounds, (300, arm.dof))
 
 
-def test_a_posture_that_aims_already_is_the_only_goal():
+def test_a_configuration_that_aims_already_is_the_only_goal():
     arm, scene, rng = table_1_arm(), wearer(), np.random.default_rng(36)
     world = arm_world(arm, scene, MARGIN, RAY)
     n_kept = 0
@@ -146,7 +146,7 @@ def test_a_posture_that_aims_already_is_the_only_goal():
         T = tool_pose(arm, q)
         target = T[:3, 3] + 0.8 * T[:3, 2]
         goals = goal_configurations(arm, PointingGoal(target), world, q, 128)
-        # One of the two branches of the first draw is the posture itself.
+        # One of the two branches of the first draw is the configuration itself.
         assert np.abs(goals.q_goals[0] - q).max() < 1e-9
         assert len(goals.q_goals) == 1
         assert goals.n_bent == 0

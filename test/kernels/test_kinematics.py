@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Kinematics against numpy, the oracle and roboticstoolbox."""
+"""Kinematics against numpy, the reference checker and roboticstoolbox."""
 
 from hypothesis import given, strategies as st
 import numpy as np
@@ -40,7 +40,7 @@ def test_sine_and_cosine_are_numpys_to_the_last_bits():
     assert np.abs(got[:, 1] - np.cos(angles)).max() <= 2e-15
 
 
-def test_bars_of_the_paper_arm_are_those_of_the_oracle():
+def test_bars_of_the_paper_arm_are_those_of_the_reference_checker():
     rng = np.random.default_rng(2)
     arm, world = table_1_arm(), wearer_world()
     q = rng.uniform(*(1.2 * arm.bounds), (10000, arm.dof))
@@ -51,7 +51,7 @@ def test_bars_of_the_paper_arm_are_those_of_the_oracle():
 
 @examples(150)
 @given(seed=SEEDS, has_tail=st.booleans())
-def test_the_chain_written_for_any_arm_is_the_oracles(seed, has_tail):
+def test_the_chain_written_for_any_arm_is_the_reference_checkers(seed, has_tail):
     rng = np.random.default_rng(seed)
     arm = random_chain(rng, has_tail)
     rows = robot_rows(arm, 0.8)
@@ -76,7 +76,7 @@ def test_the_chain_written_for_any_arm_is_the_oracles(seed, has_tail):
 
 @examples(60)
 @given(seed=SEEDS, has_tail=st.booleans())
-def test_bars_of_any_compiled_chain_are_those_of_the_oracle(seed, has_tail):
+def test_bars_of_any_compiled_chain_are_those_of_the_reference_checker(seed, has_tail):
     rng = np.random.default_rng(seed)
     arm = compiled_chain(rng, has_tail)
     world = arm_world(arm, Scene(()), 0.0, 0.8)
@@ -92,7 +92,7 @@ def test_bars_of_any_compiled_chain_are_those_of_the_oracle(seed, has_tail):
 
 @examples(100)
 @given(seed=SEEDS, has_tail=st.booleans())
-def test_forward_kinematics_is_the_oracles(seed, has_tail):
+def test_forward_kinematics_is_the_reference_checkers(seed, has_tail):
     rng = np.random.default_rng(seed)
     arm = random_chain(rng, has_tail)
     q = rng.uniform(*arm.bounds)

@@ -1,14 +1,14 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Paths that lean on boxes: never longer than taut ones, the same ends, every edge proven."""
+"""Elastic band: paths never longer than by shortcuts, the same ends, every edge proven."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from rrth_planner.collision.world import arm_world
-from rrth_planner.kernels.search.elastic_band import MAX_CORNERS, tighten
-from rrth_planner.kernels.search.shortcut import pull_taut, TAUT
+from rrth_planner.kernels.search.elastic_band import MAX_CORNERS, shorten
+from rrth_planner.kernels.search.shortcut import LEAST_GAIN, shortcut_path
 from worlds import (
     blocked_pair,
     compiled_chain,
@@ -30,11 +30,11 @@ def shortened(world, waypoints, kernel, *how, room=64):
     path = np.full((room, waypoints.shape[1]), np.nan)
     path[: len(waypoints)] = waypoints
     seam = (world.resolution, world.chain, world.robot, world.obstacles)
-    if kernel is pull_taut:
-        n = pull_taut(world.edge_check, *seam, path, len(waypoints), SPACING, TAUT)
+    if kernel is shortcut_path:
+        n = shortcut_path(world.edge_check, *seam, path, len(waypoints), SPACING, LEAST_GAIN)
     else:
         seam = (world.edge_check, world.contacts, *seam, world.bounds)
-        n = tighten(*seam, path, len(waypoints), np.array([SPACING, *how, TAUT]))
+        n = shorten(*seam, path, len(waypoints), np.array([SPACING, *how, LEAST_GAIN]))
     return path[:n]
 
 
@@ -43,17 +43,17 @@ def length(waypoints):
 
 
 def check_shorter(arm, scene, world, raw):
-    """Check what becomes of a path; return its gain over the taut one, relative."""
-    taut = shortened(world, raw, pull_taut)
-    leaning = shortened(world, raw, tighten, ROUNDS)
-    assert length(leaning) <= length(taut) * (1 + 1e-12)
-    assert np.array_equal(leaning[0], raw[0])
-    assert np.array_equal(leaning[-1], raw[-1])
-    for a, b in zip(leaning[:-1], leaning[1:], strict=True):
+    """Check the elastic band of a path; return its relative gain over shortcuts."""
+    taut = shortened(world, raw, shortcut_path)
+    band = shortened(world, raw, shorten, ROUNDS)
+    assert length(band) <= length(taut) * (1 + 1e-12)
+    assert np.array_equal(band[0], raw[0])
+    assert np.array_equal(band[-1], raw[-1])
+    for a, b in zip(band[:-1], band[1:], strict=True):
         # Also within limits.
         assert world.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
         assert not edge_touches(arm, scene, MARGIN, RAY, a, b)
-    return 1.0 - length(leaning) / length(taut)
+    return 1.0 - length(band) / length(taut)
 
 
 @pytest.fixture(scope='module')
@@ -63,14 +63,14 @@ def raw():
     return world, raw_paths(world, np.random.default_rng(91), 30)
 
 
-def test_leaning_never_lengthens_and_every_edge_is_proven(raw):
+def test_the_band_never_lengthens_and_every_edge_is_proven(raw):
     world, paths = raw
     gains = [check_shorter(table_1_arm(), wearer(), world, path) for path in paths]
     assert np.mean(gains) > 0.005
     assert np.mean(np.array(gains) > 1e-4) > 0.5
 
 
-def test_leaning_never_lengthens_a_path_of_any_arm():
+def test_the_band_never_lengthens_a_path_of_any_arm():
     rng, gains, seen = np.random.default_rng(92), [], set()
     while len(gains) < 24:
         arm = compiled_chain(rng, len(gains) % 2 == 0)
@@ -93,21 +93,21 @@ def has_blocked_pairs(world, rng):
     return len(free) > 40 and sum(not world.is_edge_valid(a, b) for a, b in pairs) > 5
 
 
-def test_leaning_stays_within_limits_that_the_shorter_way_would_pass(raw):
+def test_the_band_stays_within_limits_that_a_shorter_path_would_pass(raw):
     world, paths = raw
     n_outside = n_shorter = 0
     for path in paths:
-        taut = shortened(world, path, pull_taut)
+        taut = shortened(world, path, shortcut_path)
         narrow = replace(
             world, bounds=np.stack([taut.min(axis=0) - 1e-3, taut.max(axis=0) + 1e-3])
         )
-        held = shortened(narrow, taut, tighten, ROUNDS)
+        held = shortened(narrow, taut, shorten, ROUNDS)
         assert length(held) <= length(taut) * (1 + 1e-12)
         for a, b in zip(held[:-1], held[1:], strict=True):
             assert narrow.is_in_bounds(a)
             assert narrow.is_in_bounds(b)
             assert narrow.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
-        freely = shortened(world, taut, tighten, ROUNDS)
+        freely = shortened(world, taut, shorten, ROUNDS)
         if not all(narrow.is_in_bounds(q) for q in freely):
             n_outside += 1
             n_shorter += length(held) < length(taut) * (1 - 1e-5)
@@ -115,33 +115,33 @@ def test_leaning_stays_within_limits_that_the_shorter_way_would_pass(raw):
     assert n_shorter >= 1
 
 
-def test_without_rounds_a_path_is_only_pulled_taut(raw):
+def test_without_rounds_a_path_gets_shortcuts_only(raw):
     world, paths = raw
     for path in paths:
-        taut = shortened(world, path, pull_taut)
-        assert np.array_equal(shortened(world, path, tighten, 0), taut)
+        taut = shortened(world, path, shortcut_path)
+        assert np.array_equal(shortened(world, path, shorten, 0), taut)
 
 
-def test_the_same_path_leans_the_same_way_every_time(raw):
+def test_the_band_of_the_same_path_is_the_same_every_time(raw):
     world, paths = raw
     for path in paths[:6]:
-        once, again = (shortened(world, path, tighten, ROUNDS) for _ in range(2))
+        once, again = (shortened(world, path, shorten, ROUNDS) for _ in range(2))
         assert once.tobytes() == again.tobytes()
 
 
 def test_paths_of_one_or_two_points_are_left_alone(raw):
     world, _ = raw
     q = np.stack([free_configuration(np.random.default_rng(93), world)] * 2)
-    assert np.array_equal(shortened(world, q[:1], tighten, ROUNDS), q[:1])
-    assert np.array_equal(shortened(world, q, tighten, ROUNDS), q)
+    assert np.array_equal(shortened(world, q[:1], shorten, ROUNDS), q[:1])
+    assert np.array_equal(shortened(world, q, shorten, ROUNDS), q)
 
 
 def test_a_full_buffer_takes_no_further_waypoint(raw):
     world, paths = raw
     for path in paths:
-        leaning = shortened(world, path, tighten, ROUNDS, room=len(path))
-        assert len(leaning) <= len(path)
-        assert length(leaning) <= length(path) * (1 + 1e-12)
+        band = shortened(world, path, shorten, ROUNDS, room=len(path))
+        assert len(band) <= len(path)
+        assert length(band) <= length(path) * (1 + 1e-12)
 
 
 def test_a_path_of_more_corners_than_there_is_room_for_is_still_shortened(raw):
@@ -159,9 +159,9 @@ def test_a_path_of_more_corners_than_there_is_room_for_is_still_shortened(raw):
         if not all(world.is_edge_valid(a, b) for a, b in edges):
             continue
         n_long += 1
-        leaning = shortened(world, dense, tighten, ROUNDS, room=128)
-        assert length(leaning) <= length(dense) * (1 + 1e-12)
-        for a, b in zip(leaning[:-1], leaning[1:], strict=True):
+        band = shortened(world, dense, shorten, ROUNDS, room=128)
+        assert length(band) <= length(dense) * (1 + 1e-12)
+        for a, b in zip(band[:-1], band[1:], strict=True):
             assert world.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
     assert n_long > 5
 

@@ -43,7 +43,7 @@ def aimed(arm, target, q_near, branch, free):
 
 
 def check_aims(arm, seed, n):
-    """Check n random targets; return how many postures aim, and how many differ by branch."""
+    """Check n random targets; return how many candidates aim, and how many differ by branch."""
     rng = np.random.default_rng(seed)
     n_aiming = n_pairs = 0
     for _ in range(n):
@@ -101,7 +101,7 @@ def test_all_four_hands_of_a_tail_are_aimed(tilt, ray):
     assert check_aims(arm, 32, 200)[1] > 150
 
 
-def test_a_posture_that_aims_is_found_again_by_one_of_the_branches():
+def test_a_configuration_that_aims_is_found_again_by_one_of_the_branches():
     rng = np.random.default_rng(33)
     arm = table_1_arm()
     for q in rng.uniform(*arm.bounds, (300, 4)):
@@ -115,7 +115,7 @@ def test_a_posture_that_aims_is_found_again_by_one_of_the_branches():
         assert min(gaps) < 1e-9
 
 
-def test_a_target_on_the_pan_axis_is_refused():
+def test_a_target_on_the_pan_axis_is_rejected():
     arm = table_1_arm()
     q = np.array([0.2, -0.7, 0.0, 0.0])
     # The pan axis is that of link 3; the ray passes it at 38 mm.

@@ -94,7 +94,7 @@ def test_what_can_be_reached_is_found():
         )
 
 
-def test_a_posture_that_aims_is_the_first_candidate_as_it_is():
+def test_a_configuration_that_aims_is_the_first_candidate_as_it_is():
     rng = np.random.default_rng(42)
     for _ in range(100):
         arm = random_chain(rng, has_tail=False, fewest=2)
@@ -235,7 +235,7 @@ def test_a_target_beyond_the_limits_has_no_candidates():
             assert len(aiming_candidates(numerical(), arm, target, q_near, 64)[0]) == 0
 
 
-def test_singular_postures_give_numbers_or_nothing():
+def test_singular_configurations_give_numbers_or_nothing():
     stretched = simple_arm([[0.0, 0.3, 0.0, 0.0]] * 7 + [[QUARTER, 0.0, 0.0, 0.0]], (False,) * 7)
     rolls = simple_arm([[0.0, 0.0, 0.0, 0.1]] * 3 + [[0.0] * 4], (False,) * 3)
     slides = simple_arm([[QUARTER, 0.0, 0.0, 0.0]] * 3 + [[0.0] * 4], (True,) * 3)
@@ -263,9 +263,9 @@ def test_wide_limits_bring_the_turns_near_the_start_first():
     assert (np.abs(candidates) > 4.0).any()
 
 
-def test_arms_whose_ray_sweeps_a_surface_only_are_refused():
+def test_arms_whose_ray_sweeps_a_surface_only_are_rejected():
     pan = [0.0, 0.0, 0.0, 0.2]
-    refused = {
+    rejected = {
         'one joint': ([pan, [QUARTER, 0.0, 0.0, 0.0]], (False,)),
         'in a plane': (
             [pan, [0.0, 0.3, 0.0, 0.0], [0.0, 0.3, 0.0, 0.0], [QUARTER, 0.0, 0.0, 0.0]],
@@ -274,7 +274,7 @@ def test_arms_whose_ray_sweeps_a_surface_only_are_refused():
         'rolls': ([pan] * 3 + [[0.0] * 4], (False,) * 3),
         'slide along the ray': ([pan, [QUARTER, 0.0, 0.0, 0.0], [0.0] * 4], (False, True)),
     }
-    for dh, is_prismatic in refused.values():
+    for dh, is_prismatic in rejected.values():
         with pytest.raises(ModelError, match=r'arm: .* [01] direction\(s\), expected 2'):
             check_pointing_arm(simple_arm(dh, is_prismatic))
     slides = [[0.0, 0.0, 0.0, 0.0], [QUARTER, 0.0, QUARTER, 0.0], [QUARTER, 0.0, 0.0, 0.0]]

@@ -79,7 +79,7 @@ def test_points_are_finite(bad, field, row):
     given = points(np.random.default_rng(row))
     trajectory(given)
     given[field][(row,) + (1,) * (field > 0)] = bad
-    refused(given)
+    rejected(given)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_points_are_finite(bad, field, row):
 )
 def test_times_increase_from_0(times):
     given = (np.array(times), *np.zeros((3, 3, 2)))
-    refused(given)
+    rejected(given)
 
 
 def trajectory(given):
@@ -95,10 +95,10 @@ def trajectory(given):
     return Trajectory(**dict(zip(names, given, strict=True)))
 
 
-def refused(given):
+def rejected(given):
     with pytest.raises(RrthError):
         trajectory(given)
 
 
 def test_no_points_are_none():
-    refused((np.empty(0), *np.empty((3, 0, 2))))
+    rejected((np.empty(0), *np.empty((3, 0, 2))))

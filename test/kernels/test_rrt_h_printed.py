@@ -6,7 +6,11 @@ import functools
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.search.rrt_h_published import cut_corners, first_contact, pull_forward
+from rrth_planner.kernels.search.rrt_h_published import (
+    cut_corners,
+    first_contact,
+    shortcut_forward,
+)
 from rrth_planner.kernels.vectors import path_length
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.box_map import BoxMap, map_problem, map_world
@@ -73,25 +77,25 @@ def test_the_first_check_point_that_collides_is_told_and_the_start_is_none():
 
 
 def test_forward_the_last_visible_point_takes_the_place_of_the_middle_one():
-    pulled = after(pull_forward, plane(), CORNER, ONE, FINE)
+    pulled = after(shortcut_forward, plane(), CORNER, ONE, FINE)
     np.testing.assert_allclose(pulled, [[0, 0], [2, 4], [8, 4]], atol=1e-12)
 
 
 def test_points_twice_as_dense_bring_the_middle_one_further():
     # P_T every half: 2.5 is seen, 3 is not.
-    pulled = after(pull_forward, plane(), CORNER, 0.5 * ONE, FINE)
+    pulled = after(shortcut_forward, plane(), CORNER, 0.5 * ONE, FINE)
     np.testing.assert_allclose(pulled, [[0, 0], [2.5, 4], [8, 4]], atol=1e-12)
 
 
 def test_sparse_check_points_do_not_see_the_box_until_they_fall_into_it():
     # Of the lines to 3, 4 and 5 no third or quarter is inside, of the one to 6 the first quarter.
-    pulled = after(pull_forward, plane(), CORNER, ONE, 2.0)
+    pulled = after(shortcut_forward, plane(), CORNER, ONE, 2.0)
     np.testing.assert_allclose(pulled, [[0, 0], [5, 4], [8, 4]], atol=1e-12)
 
 
 def test_forward_i_moves_on_after_a_deletion_too():
     straight = [[x, 0.0] for x in range(6)]
-    pulled = after(pull_forward, plane([]), straight, ONE, ONE)
+    pulled = after(shortcut_forward, plane([]), straight, ONE, ONE)
     np.testing.assert_allclose(pulled, [[0, 0], [2, 0], [4, 0], [5, 0]], atol=1e-12)
 
 
@@ -216,7 +220,7 @@ def test_the_steps_are_those_of_the_paper_in_numpy(name):
         for k, targets, checks in np.array([[1, 1, 1], [2, 0.7, 0.4], [0.5, 0.3, 1.3]]) * spacing:
             pulled = forward_in_words(problem.world, raw, targets, checks)
             np.testing.assert_allclose(
-                after(pull_forward, problem.world, raw, targets, checks), pulled, atol=1e-9
+                after(shortcut_forward, problem.world, raw, targets, checks), pulled, atol=1e-9
             )
             cut = all_steps(problem.world, raw, k, targets, checks)
             words = steps_in_words(problem.world, raw, k, targets, checks)

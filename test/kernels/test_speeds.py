@@ -41,7 +41,7 @@ def test_a_stretch_takes_as_long_as_ruckigs_profile(seed):
     assert Ruckig(1).calculate(request, profile) in (Result.Working, Result.Finished)
     phases = np.empty((7, 2))
     cell = np.array([length, top, a_max, j_max])
-    n = speed_profile.stretch_phases(v_from, v_to, cell, phases)
+    n = speed_profile.cell_phases(v_from, v_to, cell, phases)
     assert phases[:n, 0].sum() == pytest.approx(profile.duration, rel=1e-5, abs=1e-6)
 
 
@@ -99,7 +99,7 @@ def test_without_a_limit_of_jerk_the_time_is_that_of_toppra():
         _, pace, _ = solver.compute_parameterization(0.0, 0.0)
         best = np.sum(2.0 * np.diff(grid) / (pace[1:] + pace[:-1]))
         ratios.append(parameterize(path, blends, bounds).duration / best)
-    # The grid of the oracle costs it a little.
+    # The grid of the reference checker costs it a little.
     assert min(ratios) > 0.99
     assert np.mean(ratios) < 1.03
 

@@ -1,10 +1,10 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Paths pulled taut: never longer, the same ends, every edge proven."""
+"""Shortcut paths: never longer, the same ends, every edge proven."""
 
 import numpy as np
 import pytest
-from rrth_planner.kernels.search.shortcut import pull_forward, pull_taut, TAUT
+from rrth_planner.kernels.search.shortcut import LEAST_GAIN, shortcut_forward, shortcut_path
 from rrth_planner.kernels.vectors import path_length
 from rrth_planner.planning.box_map import BoxMap, map_world
 from worlds import (
@@ -25,15 +25,15 @@ def raw():
     return raw_paths(wearer_world(), np.random.default_rng(44), 20)
 
 
-def taut(world, waypoints, spacing=0.01, room=64, enough=TAUT):
+def taut(world, waypoints, spacing=0.01, room=64, enough=LEAST_GAIN):
     path = np.full((room, 4), np.nan)
     path[: len(waypoints)] = waypoints
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    n = pull_taut(*seam, path, len(waypoints), spacing, enough)
+    n = shortcut_path(*seam, path, len(waypoints), spacing, enough)
     return path[:n]
 
 
-def test_pulling_taut_never_lengthens_and_keeps_both_ends(raw):
+def test_shortcuts_never_lengthens_and_keeps_both_ends(raw):
     world, arm, scene = wearer_world(), table_1_arm(), wearer()
     for path in raw:
         for spacing in (0.3, 0.01):
@@ -47,7 +47,7 @@ def test_pulling_taut_never_lengthens_and_keeps_both_ends(raw):
                 assert world.is_edge_valid(a, b) or np.linalg.norm(a - b) < 1e-9
 
 
-def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
+def test_shortcutting_a_path_again_gains_next_to_nothing(raw):
     world = wearer_world()
     for path in raw:
         once = taut(world, path)
@@ -56,14 +56,14 @@ def test_pulling_a_taut_path_again_gains_next_to_nothing(raw):
         assert gain <= 2e-3 * path_length(once, len(once))
 
 
-def test_pulling_loosely_is_a_beginning_of_pulling_taut(raw):
+def test_coarse_shortcuts_are_a_beginning_of_fine_ones(raw):
     world, n_looser = wearer_world(), 0
     for path in raw:
         loose, tight = taut(world, path, enough=0.5), taut(world, path)
         lengths = [path_length(p, len(p)) for p in (path, loose, tight)]
         assert lengths[0] * (1 + 1e-12) >= lengths[1] >= lengths[2] * (1 - 1e-12)
         n_looser += lengths[1] > lengths[2] * (1 + 1e-6)
-        # Going on where it stopped ends where pulling taut at once ends.
+        # Going on where it stopped ends where fine shortcuts end.
         assert np.array_equal(taut(world, loose), tight)
     assert n_looser > 2
 
@@ -106,6 +106,6 @@ def test_forward_goes_to_the_last_visible_point_whatever_is_how_thin(spacing, wi
     world = map_world(box_map)
     path = np.array([[0.0, 0.0], [0.0, 4.0], [8.0, 4.0]])
     seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    assert pull_forward(*seam, path, 3, spacing) == 3
+    assert shortcut_forward(*seam, path, 3, spacing) == 3
     assert path[1, 1] == 4.0
     assert 2.8 - spacing <= path[1, 0] <= 2.8 + 1e-5

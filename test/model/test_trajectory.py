@@ -130,7 +130,7 @@ def test_a_part_from_point_to_point_has_the_rows_of_the_trajectory():
     assert np.array_equal(part.times, motion.times[2:-1] - motion.times[2])
 
 
-def test_a_part_is_seen_by_the_oracle_as_the_trajectory_is():
+def test_a_part_is_seen_by_the_reference_checker_as_the_trajectory_is():
     motion = a_motion(np.random.default_rng(5))
     begin, end = 0.31 * motion.duration, 0.77 * motion.duration
     part = part_of(motion, begin, end)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Values refuse what describes nothing, in one sentence, and cannot be changed."""
+"""Values reject what describes nothing, in one sentence, and cannot be changed."""
 
 from dataclasses import FrozenInstanceError
 import warnings
@@ -38,8 +38,8 @@ from worlds import (
 EYE = np.eye(3)
 
 
-def refuses(error, make, *words, unit=None):
-    """Check that a value is refused in one sentence that names what was given and expected."""
+def rejects(error, make, *words, unit=None):
+    """Check that a value is rejected in one sentence that names what was given and expected."""
     with pytest.raises(error) as caught:
         make()
     sentence = str(caught.value)
@@ -86,8 +86,8 @@ def changed(*path, value):
         (('tool', 'd'), 0.2, ['0.2', 'tool']),
     ],
 )
-def test_a_bad_arm_is_refused(path, value, words):
-    refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
+def test_a_bad_arm_is_rejected(path, value, words):
+    rejects(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
 
 
 @pytest.mark.parametrize(
@@ -107,10 +107,10 @@ def test_a_bad_arm_is_refused(path, value, words):
         (('joints', 2, 'radius'), 9999.5, ['arm: 10000.5', 'at most 10000 [m]']),
     ],
 )
-def test_an_arm_of_which_rounding_cannot_be_bounded_is_refused(path, value, words):
+def test_an_arm_of_which_rounding_cannot_be_bounded_is_rejected(path, value, words):
     with warnings.catch_warnings():
         warnings.simplefilter('error')
-        refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
+        rejects(ModelError, lambda: arm_from_mapping(changed(*path, value=value)), *words)
 
 
 @examples(200)
@@ -146,15 +146,15 @@ def test_no_point_of_an_arm_is_farther_than_proofs_allow_for(data):
     assert np.abs(poses[:, :3, 3]).max() <= FARTHEST * (1.0 + 1e-9)
 
 
-def test_what_is_refused_is_what_the_proofs_do_not_cover():
+def test_what_is_rejected_is_what_the_proofs_do_not_cover():
     assert arm_validity.LARGEST == FARTHEST
 
 
 @pytest.mark.parametrize('value', [1.1e4, 1e103, 1e300, -0.1, float('nan')])
-def test_a_margin_or_ray_that_no_box_has_room_for_is_refused(value):
+def test_a_margin_or_ray_that_no_box_has_room_for_is_rejected(value):
     # Round many boxes a margin beyond 1e102 would overflow, and its boxes be passed over.
     for margin, ray in ((value, 1.0), (0.02, value)):
-        refuses(
+        rejects(
             OptionsError,
             lambda m=margin, r=ray: arm_world(table_1_arm(), wearer(), m, r),
             unit='m',
@@ -165,9 +165,9 @@ def test_a_margin_or_ray_that_no_box_has_room_for_is_refused(value):
     'name', ['', 'a\nb', '\x1b[2J', '\x9b1m', '\u202e', 'x' * 257, None, 7, True]
 )
 def test_names_are_texts_that_may_be_printed(name):
-    refuses(SceneError, lambda: Box(name, [0, 0, 0], [1, 1, 1], EYE), 'name of a box')
+    rejects(SceneError, lambda: Box(name, [0, 0, 0], [1, 1, 1], EYE), 'name of a box')
     path = ('joints', 1, 'name')
-    refuses(ModelError, lambda: arm_from_mapping(changed(*path, value=name)), 'joint 1: name')
+    rejects(ModelError, lambda: arm_from_mapping(changed(*path, value=name)), 'joint 1: name')
     assert Box('Ω 🦾', [0, 0, 0], [1, 1, 1], EYE).name == 'Ω 🦾'
 
 
@@ -176,55 +176,55 @@ def test_names_are_texts_that_may_be_printed(name):
     [[True, 1, 1], [1, 1, '1'], ['1', '1', '1'], True, [None] * 3, [10**400] * 3, [[1]] * 3],
 )
 def test_what_only_looks_like_numbers_is_none(value):
-    refuses(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
-    refuses(SceneError, lambda: Box('a', value, [1, 1, 1], EYE), 'center', unit='m')
+    rejects(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
+    rejects(SceneError, lambda: Box('a', value, [1, 1, 1], EYE), 'center', unit='m')
 
 
 @pytest.mark.parametrize(
     'value', [np.ones(3, bool), np.array(['1', '1', '1']), [np.True_, 1.0, 1.0]]
 )
 def test_arrays_of_other_types_are_no_numbers(value):
-    refuses(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
+    rejects(RrthError, lambda: frozen_array(value, (3,), 'x', 'm', RrthError), 'x: ', unit='m')
     for same in (np.ones(3, np.float32), np.ones(3, np.uint8), [np.float32(1), np.int64(1), 1]):
         assert frozen_array(same, (3,), 'x', 'm', RrthError).tolist() == [1.0, 1.0, 1.0]
 
 
 def test_an_option_that_is_true_is_no_number_and_one_that_is_1_not_true():
     for name in ('step_size', 'goal_bias', 'max_samples', 'club_count', 'time_limit'):
-        refuses(OptionsError, lambda name=name: RRTHOptions(**{name: True}), name)
+        rejects(OptionsError, lambda name=name: RRTHOptions(**{name: True}), name)
     for value in (0, 1, 0.5, 'true', None):
-        refuses(OptionsError, lambda value=value: RRTHOptions(is_bidirectional=value), 'true or')
+        rejects(OptionsError, lambda value=value: RRTHOptions(is_bidirectional=value), 'true or')
 
 
-def test_a_trajectory_beyond_what_is_proven_is_refused():
+def test_a_trajectory_beyond_what_is_proven_is_rejected():
     still = {'times': [0.0], 'velocities': np.zeros((1, 2)), 'accelerations': np.zeros((1, 2))}
     Trajectory(positions=[[FARTHEST, -FARTHEST]], **still)
     for q in ([[0.0, 1.1e4]], np.array([[0.0, 1.1e4]]), np.array([[-1e300, 0.0]])):
-        refuses(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
+        rejects(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
     for q in ([[True, 0.0]], [['1', 0.0]], np.array([['1', '0']])):
-        refuses(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
+        rejects(RrthError, lambda q=q: Trajectory(positions=q, **still), 'positions', unit='rad')
 
 
 @pytest.mark.parametrize('key', ['joints', 'tool', 'mount'])
-def test_an_arm_without_a_part_is_refused(key):
+def test_an_arm_without_a_part_is_rejected(key):
     data = table_1_mapping()
     del data[key]
-    refuses(ModelError, lambda: arm_from_mapping(data), key)
+    rejects(ModelError, lambda: arm_from_mapping(data), key)
 
 
 @pytest.mark.parametrize('key', ['name', 'type', 'alpha', 'a', 'offset', 'd', 'lower', 'upper'])
-def test_a_joint_without_a_number_is_refused(key):
+def test_a_joint_without_a_number_is_rejected(key):
     data = table_1_mapping()
     del data['joints'][2][key]
-    refuses(ModelError, lambda: arm_from_mapping(data), key)
+    rejects(ModelError, lambda: arm_from_mapping(data), key)
 
 
 @pytest.mark.parametrize('data', [None, [], 'arm', 5])
 def test_what_is_no_mapping_is_no_arm(data):
-    refuses(ModelError, lambda: arm_from_mapping(data))
+    rejects(ModelError, lambda: arm_from_mapping(data))
 
 
-def test_an_arm_whose_mount_is_no_pose_is_refused():
+def test_an_arm_whose_mount_is_no_pose_is_rejected():
     arm = table_1_arm()
 
     def with_mount(T):
@@ -238,21 +238,21 @@ def test_an_arm_whose_mount_is_no_pose_is_refused():
         )
 
     mirrored = np.diag([1.0, 1.0, -1.0, 1.0])
-    refuses(ModelError, lambda: with_mount(mirrored), 'mount')
-    refuses(ModelError, lambda: with_mount(2.0 * np.eye(4)), 'mount')
+    rejects(ModelError, lambda: with_mount(mirrored), 'mount')
+    rejects(ModelError, lambda: with_mount(2.0 * np.eye(4)), 'mount')
     sheared = np.eye(4)
     sheared[3, 0] = 0.5
-    refuses(ModelError, lambda: with_mount(sheared), 'mount')
+    rejects(ModelError, lambda: with_mount(sheared), 'mount')
 
 
-def test_a_bad_box_is_refused():
+def test_a_bad_box_is_rejected():
     def box(center=(0, 0, 0), size=(1, 1, 1), rotation=EYE):
         return lambda: Box('torso', center, size, rotation)
 
     for size in ((1, 1, 0), (1, -1, 1), (np.nan, 1, 1), (np.inf, 1, 1), (1, 1), 1.0, None, 'big'):
-        refuses(SceneError, box(size=size), 'box "torso"', 'size', unit='m')
+        rejects(SceneError, box(size=size), 'box "torso"', 'size', unit='m')
     for center in ((0, 0), (np.nan, 0, 0), (np.inf, 0, 0), (0, 0, 1e5)):
-        refuses(SceneError, box(center=center), 'box "torso"', 'center', unit='m')
+        rejects(SceneError, box(center=center), 'box "torso"', 'center', unit='m')
     skew = np.eye(3)
     skew[0, 1] = 1e-3
     for rotation in (
@@ -262,82 +262,82 @@ def test_a_bad_box_is_refused():
         np.zeros((3, 3)),
         np.full((3, 3), np.nan),
     ):
-        refuses(SceneError, box(rotation=rotation), 'box "torso"', 'rotation', unit='-')
+        rejects(SceneError, box(rotation=rotation), 'box "torso"', 'rotation', unit='-')
 
 
-def test_a_bad_target_is_refused():
+def test_a_bad_target_is_rejected():
     for target in ((0, 0), (np.nan, 0, 0), (np.inf, 0, 0), (0, 0, 1e5), None, 'there'):
-        refuses(SceneError, lambda target=target: PointingGoal(target), 'target', unit='m')
+        rejects(SceneError, lambda target=target: PointingGoal(target), 'target', unit='m')
 
 
-def test_bad_limits_are_refused():
+def test_bad_limits_are_rejected():
     good = {'velocity': [1.0, 1.0], 'acceleration': [1.0, 1.0], 'jerk': [1.0, 1.0]}
     units = {'velocity': 'rad/s', 'acceleration': 'rad/s^2', 'jerk': 'rad/s^3'}
     for name, unit in units.items():
         for bad in ([0.0, 1.0], [-1.0, 1.0], [np.nan, 1.0], [np.inf, 1.0]):
             data = {**good, name: bad}
-            refuses(OptionsError, lambda data=data: MotionLimits(**data), name, unit=unit)
+            rejects(OptionsError, lambda data=data: MotionLimits(**data), name, unit=unit)
     for name in ('acceleration', 'jerk'):
         data = {**good, name: [1.0]}
-        refuses(OptionsError, lambda data=data: MotionLimits(**data), name, unit=units[name])
+        rejects(OptionsError, lambda data=data: MotionLimits(**data), name, unit=units[name])
 
 
 @pytest.mark.parametrize('name', list(RRTHOptions.__dataclass_fields__))
-def test_bad_options_are_refused(name):
+def test_bad_options_are_rejected(name):
     meta = RRTHOptions.__dataclass_fields__[name].metadata
     kind = bool if name == 'is_bidirectional' else lambda value: value
     RRTHOptions(**{name: kind(meta['low'])})
     RRTHOptions(**{name: kind(meta['high'])})
     for bad in (meta['low'] - 1, meta['high'] * 1.01 + 1, float('nan'), float('inf'), -1e9):
-        refuses(OptionsError, lambda bad=bad: RRTHOptions(**{name: bad}), name, unit=meta['unit'])
+        rejects(OptionsError, lambda bad=bad: RRTHOptions(**{name: bad}), name, unit=meta['unit'])
 
 
 @pytest.mark.parametrize('name', ['max_samples', 'club_attempts', 'club_count', 'club_budget'])
-def test_counts_that_are_no_whole_numbers_are_refused(name):
-    refuses(OptionsError, lambda: RRTHOptions(**{name: 2.5}), name)
+def test_counts_that_are_no_whole_numbers_are_rejected(name):
+    rejects(OptionsError, lambda: RRTHOptions(**{name: 2.5}), name)
 
 
 @pytest.mark.parametrize('bad', ['1.5', None, [1.0]])
-def test_options_that_are_no_numbers_are_refused(bad):
-    refuses(OptionsError, lambda: RRTHOptions(step_size=bad), 'step_size')
+def test_options_that_are_no_numbers_are_rejected(bad):
+    rejects(OptionsError, lambda: RRTHOptions(step_size=bad), 'step_size')
 
 
-def test_a_bad_trajectory_is_refused():
+def test_a_bad_trajectory_is_rejected():
     def motion(times=(0.0, 1.0), **parts):
         still = {name: np.zeros((2, 3)) for name in ('positions', 'velocities', 'accelerations')}
         return lambda: Trajectory(times=times, **{**still, **parts})
 
     motion()()
     for times in ([], [0.1, 1.0], [0.0, 0.0], [0.0, -1.0], [0.0, np.nan], [0.0, np.inf], 0.0):
-        refuses(RrthError, motion(times), 'times', unit='s')
-    refuses(RrthError, motion([0.0, 1.0, 2.0]), 'positions', '(2, 3)', '(3, ', unit='rad')
+        rejects(RrthError, motion(times), 'times', unit='s')
+    rejects(RrthError, motion([0.0, 1.0, 2.0]), 'positions', '(2, 3)', '(3, ', unit='rad')
     for name, unit in (
         ('positions', 'rad'),
         ('velocities', 'rad/s'),
         ('accelerations', 'rad/s^2'),
     ):
-        refuses(RrthError, motion(**{name: np.full((2, 3), np.nan)}), name, unit=unit)
-        refuses(RrthError, motion(**{name: np.zeros((1, 3))}), name, unit=unit)
-    refuses(RrthError, motion(positions=1.0), 'positions', unit='rad')
+        rejects(RrthError, motion(**{name: np.full((2, 3), np.nan)}), name, unit=unit)
+        rejects(RrthError, motion(**{name: np.zeros((1, 3))}), name, unit=unit)
+    rejects(RrthError, motion(positions=1.0), 'positions', unit='rad')
 
 
-def test_a_bad_path_is_refused():
+def test_a_bad_path_is_rejected():
     for bad in (np.empty((0, 4)), [1.0, 2.0], np.full((2, 2), np.inf), 5.0, [[1.0], [1.0, 2.0]]):
-        refuses(RrthError, lambda bad=bad: Path(bad), 'waypoints', unit='rad')
+        rejects(RrthError, lambda bad=bad: Path(bad), 'waypoints', unit='rad')
 
 
-def test_a_bad_problem_is_refused():
+def test_a_bad_problem_is_rejected():
     world = wearer_world()
     q = np.zeros(4)
-    refuses(RrthError, lambda: PlanningProblem(world=world, q_start=q[:3], q_goals=[q]), 'q_start')
-    refuses(RrthError, lambda: PlanningProblem(world=world, q_start=q, q_goals=[q[:3]]), 'q_goals')
-    refuses(
+    rejects(RrthError, lambda: PlanningProblem(world=world, q_start=q[:3], q_goals=[q]), 'q_start')
+    rejects(RrthError, lambda: PlanningProblem(world=world, q_start=q, q_goals=[q[:3]]), 'q_goals')
+    rejects(
         RrthError,
         lambda: PlanningProblem(world=world, q_start=q, q_goals=[np.full(4, np.nan)]),
         'q_goals',
     )
     for bad in (np.zeros(2), np.full(3, np.inf)):
-        refuses(
+        rejects(
             RrthError,
             lambda bad=bad: PlanningProblem(world=world, q_start=q, q_goals=[q], target=bad),
             'target',
@@ -345,12 +345,12 @@ def test_a_bad_problem_is_refused():
         )
 
 
-def test_bad_margins_are_refused():
+def test_bad_margins_are_rejected():
     arm = table_1_arm()
     for bad in (-0.01, np.nan, np.inf):
-        refuses(OptionsError, lambda bad=bad: arm_world(arm, wearer(), bad, 1.0), 'margin')
-        refuses(OptionsError, lambda bad=bad: arm_world(arm, wearer(), 0.0, bad), 'ray_guard')
-    refuses(SceneError, lambda: grown(wearer_world(), -1.0), 'growth')
+        rejects(OptionsError, lambda bad=bad: arm_world(arm, wearer(), bad, 1.0), 'margin')
+        rejects(OptionsError, lambda bad=bad: arm_world(arm, wearer(), 0.0, bad), 'ray_guard')
+    rejects(SceneError, lambda: grown(wearer_world(), -1.0), 'growth')
 
 
 @pytest.mark.parametrize('n', [1, 3, 5])
@@ -372,7 +372,7 @@ def test_values_of_another_number_of_joints_do_not_reach_a_kernel(n):
         lambda: goal_configurations(other, goal, world, q, FEW),
         lambda: goal_configurations(other, goal, world, FOLDED, FEW),
     ):
-        refuses(RrthError, ask, 'shape', 'a value for each of')
+        rejects(RrthError, ask, 'shape', 'a value for each of')
 
 
 def test_a_frozen_array_is_a_finite_read_only_copy():
@@ -385,7 +385,7 @@ def test_a_frozen_array_is_a_finite_read_only_copy():
         frozen[0, 0] = 1.0
     assert frozen_array([1, 2], (2,), 'x', 'm', RrthError).dtype == np.float64
     for bad, shape in (([1.0], (2,)), ([[1.0]], (1,)), ([np.nan], (1,)), (['a'], (1,))):
-        refuses(
+        rejects(
             RrthError,
             lambda bad=bad, shape=shape: frozen_array(bad, shape, 'x', 'm', RrthError),
             'x:',
@@ -436,7 +436,7 @@ def test_a_urdf_is_no_arm_file_and_is_sent_to_read_urdf(tmp_path, before):
     file = tmp_path / 'arm.yaml'
     file.write_text(f'{before}<robot name="a"><link name="b"/></robot>', encoding='utf-8')
     words = (f'file {file}: XML, as a URDF is', 'read_urdf writes one')
-    refuses(ModelError, lambda: arm_file.load_arm(file), *words)
+    rejects(ModelError, lambda: arm_file.load_arm(file), *words)
 
 
 @examples(300)

@@ -10,7 +10,7 @@ from hypothesis import given, strategies
 import numpy as np
 import pytest
 from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
-from rrth_planner.collision.reference_checker import bar_box_touch, first_contact
+from rrth_planner.collision.reference_checker import bar_box_contact, first_contact
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
@@ -71,7 +71,7 @@ def collides(arm, box, q, growth):
     ends = oracle_bars(arm, q, RAY)
     radii = [arm.radii[row] for row, _ in bar_ends(arm)]
     hits = [
-        bar_box_touch(ends[:, k], box.center, box.rotation, 0.5 * box.size + growth + radius)
+        bar_box_contact(ends[:, k], box.center, box.rotation, 0.5 * box.size + growth + radius)
         for k, radius in enumerate(radii)
     ]
     return np.any(hits, axis=0)
@@ -117,7 +117,7 @@ def is_shoulder_covered(arm, scene):
     """Return whether a box covers the beginning of the first bar, which no joint moves."""
     shoulder = oracle_bars(arm, FOLDED[None], RAY)[0, 0, :1]
     return any(
-        bar_box_touch(
+        bar_box_contact(
             np.repeat(shoulder, 2, axis=0),
             box.center,
             box.rotation,
@@ -243,7 +243,7 @@ def test_deeper_is_rejected_with_part_box_and_depth(seed):
     ends = oracle_bars(arm, q_start[None], RAY)[0, k]
     for more, is_hit in ((1e-4, False), (-1e-4, True)):
         half = 0.5 * box.size + MARGIN - depths.max() - more + arm.radii[0]
-        assert bar_box_touch(ends, box.center, box.rotation, half) == is_hit
+        assert bar_box_contact(ends, box.center, box.rotation, half) == is_hit
     # One that may be that deep escapes, or is rejected since there is no escape.
     plan = ask(arm, scene, q_start, escape_depth=0.1)
     assert 'escape_depth' not in plan.sentence
@@ -352,20 +352,20 @@ def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
 
 def second_opinion(arm, scene, world, trajectory):
     depths = box_depths(world, trajectory.positions[0]).max(axis=0)
-    return fcl_checker.touch_on_way_out(
+    return fcl_checker.first_escape_violation(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
 
 
-def test_an_escape_that_violates_for_the_second_checker_is_rejected(monkeypatch):
+def test_an_escape_with_a_violation_by_python_fcl_is_rejected(monkeypatch):
     arm, scene = pressed()
-    violation = Violation(0.001, 0.005, 'pointing ray', 'hand')
-    monkeypatch.setattr(trajectory_validation, 'touch_on_way_out', lambda *_: violation)
+    touch = Violation(0.001, 0.005, 'pointing ray', 'hand')
+    monkeypatch.setattr(trajectory_validation, 'first_escape_violation', lambda *_: touch)
     plan = ask(arm, scene, FOLDED)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None
-    assert plan.disagreement.touch == violation
-    assert 'at 0.001 s, on the way out of the wearer; expected no part deeper' in plan.sentence
+    assert plan.disagreement.violation == touch
+    assert 'at 0.001 s, during the escape, expected no penetration deeper' in plan.sentence
 
 
 def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every algorithm plans the arm's motions, and every motion passes the same judges."""
+"""Every algorithm plans the arm's motions, and every motion passes the same checkers."""
 
 from dataclasses import replace
 import itertools
@@ -35,7 +35,7 @@ STAR = {'max_samples': 800, 'improve_time': 30.0, 'time_limit': 30.0}
 
 @pytest.mark.parametrize('is_bidirectional', [False, True])
 @pytest.mark.parametrize('kind', KINDS)
-def test_each_algorithm_plans_motions_that_pass_the_judges(kind, is_bidirectional):
+def test_each_algorithm_plans_motions_that_pass_the_checkers(kind, is_bidirectional):
     arm, scene, limits = worlds.table_1_arm(), worlds.wearer(), worlds.limits()
     options = kind(
         is_bidirectional=is_bidirectional,

@@ -74,7 +74,7 @@ def small_body():
 
 
 @pytest.mark.parametrize('shape', [PAN_TILT_SLIDE, ROLLING_WRIST, ON_A_RAIL], ids=['3', '6', '7'])
-def test_motions_of_any_arm_never_touch_and_end_on_target(shape):
+def test_motions_of_any_arm_never_collide_and_end_on_target(shape):
     arm, scene = make_arm(*shape), small_body()
     check_pointing_arm(arm)
     assert pointing_kernels(arm) is numerical()
@@ -113,7 +113,7 @@ def test_motions_of_any_arm_never_touch_and_end_on_target(shape):
     assert n_bent >= 1
 
 
-def test_an_arm_that_cannot_point_is_refused_before_the_first_plan():
+def test_an_arm_that_cannot_point_is_rejected_before_the_first_plan():
     arm = make_arm(((0.0, 0.0, 0.0, 0.1), (0.0, 0.3, 0.0, 0.0), (QUARTER, 0.3, 0.0, 0.0)), ())
     with pytest.raises(ModelError, match='surface'):
         pipeline.warm_up(arm, OPTIONS)

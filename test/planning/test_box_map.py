@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Another map as a YAML file works, a bad one is refused in one sentence."""
+"""Another map as a YAML file works, a bad one is rejected in one sentence."""
 
 import numpy as np
 import pytest
@@ -81,7 +81,7 @@ def test_a_map_without_walls_is_a_map(tmp_path):
         ('start: [5, 20]', 'start: here', "start: 'here', expected numbers of shape (n) [map]"),
     ],
 )
-def test_a_bad_map_is_refused_in_one_sentence(tmp_path, old, new, told):
+def test_a_bad_map_is_rejected_in_one_sentence(tmp_path, old, new, told):
     text = GATE.replace(old, new)
     assert text != GATE
     with pytest.raises(SceneError) as refusal:
@@ -100,13 +100,13 @@ def test_a_wall_that_a_second_one_of_its_name_would_hide_is_no_silent_loss(tmp_p
 
 
 @pytest.mark.parametrize('text', ['', '[1, 2]', 'a wall'])
-def test_a_file_that_holds_no_map_is_refused_in_one_sentence(tmp_path, text):
+def test_a_file_that_holds_no_map_is_rejected_in_one_sentence(tmp_path, text):
     with pytest.raises(SceneError, match='expected a mapping with bounds, rectangles or boxes'):
         read(tmp_path, text)
 
 
 @pytest.mark.parametrize('text', ['bounds: [0, 0', '\t- :'])
-def test_a_file_that_is_no_yaml_is_refused_in_one_sentence(tmp_path, text):
+def test_a_file_that_is_no_yaml_is_rejected_in_one_sentence(tmp_path, text):
     with pytest.raises(RrthError) as refusal:
         read(tmp_path, text)
     assert '\n' not in str(refusal.value)
@@ -143,7 +143,7 @@ def test_a_map_of_as_many_dimensions_as_there_may_be_is_planned_on(kind):
     assert not enters(q[:-1], q[1:], extended_obstacles(box_map)).any()
 
 
-def test_a_map_of_no_dimensions_or_of_too_many_is_refused():
+def test_a_map_of_no_dimensions_or_of_too_many_is_rejected():
     with pytest.raises(SceneError, match='bounds of 65 dimensions, expected 1 to 64'):
         walled(MAX_DOF + 1)
     with pytest.raises(SceneError, match='bounds of 0 dimensions, expected 1 to 64'):

@@ -320,7 +320,7 @@ def test_an_impossible_plan_ends_at_its_samples(walled):
     assert result.cost_history == ()
 
 
-def test_a_start_that_touches_is_never_planned_from():
+def test_a_start_that_collides_is_never_planned_from():
     world, rng = wearer_world(), np.random.default_rng(64)
     q_start = rng.uniform(*world.bounds)
     while world.is_valid(q_start):
@@ -330,7 +330,7 @@ def test_a_start_that_touches_is_never_planned_from():
     assert result.status is PlanStatus.SAMPLE_LIMIT
 
 
-def test_a_problem_without_goals_is_refused():
+def test_a_problem_without_goals_is_rejected():
     with pytest.raises(RrthError, match='q_goals: none'):
         PlanningProblem(world=wearer_world(), q_start=FOLDED, q_goals=np.empty((0, 4)))
 

@@ -136,7 +136,7 @@ everything = pytest.mark.parametrize(
 
 
 @everything
-def test_a_path_leads_from_start_to_a_goal_by_edges_that_the_judge_finds_free(algorithm, name):
+def test_a_path_leads_from_start_to_a_goal_by_edges_that_the_checker_finds_free(algorithm, name):
     problem, is_free, _ = _problems()[name]
     result = _solved(algorithm, name)
     assert result.status is PlanStatus.SOLVED
@@ -531,7 +531,7 @@ def _starts_inside(q):
     return bool(((q > box_map.obstacles[:, 0]) & (q < box_map.obstacles[:, 1])).all(1).any())
 
 
-def test_bars_of_the_oracle_touch_where_the_check_points_do():
+def test_bars_of_the_reference_checker_touch_where_the_check_points_do():
     arm, scene = worlds.table_1_arm(), worlds.wearer()
     points = by_check_points(arm_world(arm, scene, 0.0, 1.0), 0.05)
     rng = np.random.default_rng(1)
@@ -541,10 +541,10 @@ def test_bars_of_the_oracle_touch_where_the_check_points_do():
     touching = np.zeros(len(q), dtype=bool)
     for box in scene.boxes:
         half = 0.5 * box.size
-        touching |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+        touching |= reference_checker.bar_box_contact(ends, box.center, box.rotation, half).any(
             axis=1
         )
-    # A check point inside means a bar inside; a seventh of the colliding postures is missed.
+    # A check point inside means a bar inside; a seventh of the colliding configurations is missed.
     assert not (~by_points & ~touching).any()
     assert 0.02 < (by_points & touching).sum() / touching.sum() < 0.3
 

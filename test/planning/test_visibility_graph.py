@@ -124,7 +124,7 @@ def test_without_walls_the_way_is_straight():
     assert len(waypoints) == 2
 
 
-def test_a_wall_from_border_to_border_leaves_no_way():
+def test_a_wall_from_border_to_border_leaves_no_path():
     box_map = BoxMap(
         name='closed',
         bounds=[[0, 0], [9, 9]],
@@ -137,7 +137,7 @@ def test_a_wall_from_border_to_border_leaves_no_way():
     assert waypoints.shape == (0, 2)
 
 
-def test_a_map_that_is_not_in_the_plane_is_refused():
+def test_a_map_that_is_not_in_the_plane_is_rejected():
     box_map = BoxMap(
         name='room', bounds=[[0] * 3, [9] * 3], obstacles=[], start=[1] * 3, goal=[2] * 3
     )

@@ -130,7 +130,7 @@ def test_whether_denser_points_cost_time_is_told_from_the_rows(output, n_slower,
 
 
 @pytest.mark.parametrize('arguments', [('--runs', '0'), ('--maps', 'moon'), ('--runs', 'ten')])
-def test_a_bad_command_line_is_refused(arguments, capsys):
+def test_a_bad_command_line_is_rejected(arguments, capsys):
     # What the parser does not know the command does: names of maps, for which much is loaded.
     try:
         code = main(arguments)
@@ -140,7 +140,7 @@ def test_a_bad_command_line_is_refused(arguments, capsys):
     assert 'reproduce: ' in capsys.readouterr().err
 
 
-def test_data_that_are_no_campaign_are_refused_in_one_sentence(tmp_path, capsys):
+def test_data_that_are_no_campaign_are_rejected_in_one_sentence(tmp_path, capsys):
     (tmp_path / 'reproduction.parquet').write_bytes(b'something else')
     assert main([*TINY, 'low_left', '--output', str(tmp_path)]) == 1
     error = capsys.readouterr().err

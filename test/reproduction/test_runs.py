@@ -125,7 +125,7 @@ def test_the_judge_of_a_map_finds_what_the_printed_steps_break():
     assert row['is_valid'] is False
 
 
-def test_the_judge_of_the_arm_refuses_a_motion_through_the_wearer():
+def test_the_judge_of_the_arm_rejects_a_motion_through_the_wearer():
     named = load_problem('arm/front')
     q_start, q_goal = named.problem.q_start, named.problem.q_goals[0]
     assert named.is_path_valid(np.array([q_start, q_start]))
@@ -136,7 +136,7 @@ def test_the_judge_of_the_arm_refuses_a_motion_through_the_wearer():
     ('name', 'collision'),
     [('arm/nowhere', 'certified'), ('no_map', 'certified'), ('c_shape', 'guessed:1')],
 )
-def test_an_unknown_problem_or_mode_is_refused(name, collision):
+def test_an_unknown_problem_or_mode_is_rejected(name, collision):
     with pytest.raises(RrthError, match='expected'):
         load_problem(name, collision)
 
@@ -197,7 +197,7 @@ def test_a_part_that_was_cut_short_is_done_again_and_one_left_behind_counts_once
     assert len(pq.read_table(path)) == 2
 
 
-def test_a_file_of_something_else_is_refused_and_kept(tmp_path):
+def test_a_file_of_something_else_is_rejected_and_kept(tmp_path):
     path = tmp_path / 'rows.parquet'
     path.write_bytes(b'my letters')
     with pytest.raises(RrthError, match='expected the rows of a campaign'):

@@ -110,9 +110,9 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     # Without the patch they agree, and the node lives on.
     code, out = replayed(file)
     assert code == 1
-    assert 'the same motion to the bit: yes' in out
+    assert 'motion identical to the bit: yes' in out
     assert out.splitlines()[-1] == (
-        'not reproduced: the judges agree now that the recorded motion is free'
+        'not reproduced: the collision checks now agree that the recorded motion is free'
     )
     stranger.publishers['joint_states'].publish(samples.joints())
     stranger.wait_until(lambda: not inputs_of(planner).joints.value.velocities.any())
@@ -217,7 +217,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
     code, out = replayed(file)
     assert code == 1
     assert out.splitlines()[-1] == (
-        'not reproduced: the OSError came after the motion had been planned'
+        'not reproduced: the OSError occurred after the motion had been planned'
     )
     assert stranger.answer().success
 

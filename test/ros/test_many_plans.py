@@ -98,7 +98,7 @@ def _is_blocked_by_reference(rng, arm, scene, target):
     for box in scene.boxes:
         # Half a centimetre of room: what is only just free may be missed by a finite search.
         half = 0.5 * box.size + MARGIN + 0.005
-        collides |= reference_checker.bar_box_touch(ends, box.center, box.rotation, half).any(
+        collides |= reference_checker.bar_box_contact(ends, box.center, box.rotation, half).any(
             axis=1
         )
     return bool(collides.all())

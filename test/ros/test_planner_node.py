@@ -363,7 +363,7 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
         wait_until(lambda: inputs.body.value is not body)
         for violation in violations:
             monkeypatch.setattr(
-                trajectory_validation, 'touch_on_way_out', lambda *_, found=violation: found
+                trajectory_validation, 'first_escape_violation', lambda *_, found=violation: found
             )
         return plan
 

@@ -131,7 +131,7 @@ def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
     ended = run(0.3, 1.3, 0.2)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('SUCCESS (1): ')
-    assert 'mm past the target' in ended.stdout
+    assert 'the ray misses the target by' in ended.stdout
     wait_until(lambda: len(bystander.motions) == 2)
 
     # A target that the planner rejects moves nothing.

@@ -126,7 +126,7 @@ def _run(ros_context, tmp_path_factory):
             wait_until(lambda: subscribes(node, *topics))
             wait_until(lambda: node.count_subscribers('target') > 1)
             # The planner and the arm know of the recorder.
-            missing = {'subscribes /diagnostics', 'subscribes /joint_states'}
+            missing = {'receiving /diagnostics', 'receiving /joint_states'}
             while missing:
                 line = process.stdout.readline()
                 assert line, process.stderr.read()
@@ -293,7 +293,7 @@ def rejection(*arguments, **options):
 def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path):
     path = tmp_path / 'run.mcap'
     said = rejection('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
-    assert 'nothing was heard' in said
+    assert 'no message received' in said
     assert 'ROS_DOMAIN_ID' in said
     assert not path.exists()
 

@@ -147,7 +147,7 @@ def test_what_the_nodes_would_reject_is_left_out_and_said(tmp_path, capsys):
     assert main(['recording', str(path), '-o', str(tmp_path / 'run.png')]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4
-    assert all('bad messages are left out' in line for line in lines)
+    assert all('malformed messages skipped' in line for line in lines)
 
 
 @pytest.mark.parametrize(

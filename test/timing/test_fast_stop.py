@@ -5,9 +5,9 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels.trajectory.fast_stop import first_look, first_rest
-from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, TIME, time_after, WAY
-from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold, stop_way
+from rrth_planner.kernels.trajectory.fast_stop import first_rest, first_window
+from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, S, TIME, time_after
+from rrth_planner.kernels.trajectory.stop_profile import keeps_limits, line_stop, stop_s
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
     jerks_at,
@@ -18,7 +18,7 @@ from rrth_planner.model.trajectory import (
 )
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.corner_blends import Blend
-from rrth_planner.timing.fast_stop import fast_stop, ON_ITS_WAY
+from rrth_planner.timing.fast_stop import fast_stop, LATENCY
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
 from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
 from worlds import examples, limits
@@ -44,7 +44,7 @@ def check_stop(stop, motion, time, bounds):
     ticks = stop.times * 1e9
     assert np.abs(ticks - np.round(ticks)).max() < 1e-3
     # A controller that gets it late finds itself on it.
-    late = np.linspace(0.0, min(ON_ITS_WAY, stop.duration - 1e-7), 20)
+    late = np.linspace(0.0, min(LATENCY, stop.duration - 1e-7), 20)
     for got, running in zip(sample(stop, late), sample(motion, time + late), strict=True):
         np.testing.assert_allclose(got, running, rtol=1e-5, atol=1e-6)
 
@@ -89,10 +89,10 @@ def test_a_quick_stop_of_any_number_and_kind_of_joints_is_one(seed):
 
 def later_brake(motion, time):
     """Return how long a motion lasts that goes on for a little and is braked then [s]."""
-    later = time + ON_ITS_WAY
+    later = time + LATENCY
     if later >= motion.duration:
         return motion.duration - time
-    return ON_ITS_WAY + brake(motion, later, LIMITS).duration
+    return LATENCY + brake(motion, later, LIMITS).duration
 
 
 @pytest.mark.parametrize('make', [planned_motion, foreign_motion])
@@ -119,7 +119,7 @@ def test_a_quick_stop_of_an_arm_that_gets_faster_is_soon():
 def test_a_quick_stop_keeps_to_points_that_are_close_to_where_it_begins():
     motion = planned_motion(np.random.default_rng(4))
     for knot in motion.times[1:-1]:
-        for gap in (-ON_ITS_WAY - 3e-5, -ON_ITS_WAY, -ON_ITS_WAY + 3e-5, -3e-5, -3e-6, 0.0):
+        for gap in (-LATENCY - 3e-5, -LATENCY, -LATENCY + 3e-5, -3e-5, -3e-6, 0.0):
             time = max(0.0, knot + gap)
             stop = fast_stop(motion, time, LIMITS)
             assert stop.duration <= 1.2 * later_brake(motion, time) + 1e-3
@@ -149,7 +149,7 @@ def test_a_motion_that_rests_on_its_way_is_followed_no_further():
     halt = Blend(corner=q[1], u_in=u[0], u_out=u[1], half_length=0.0)
     motion = parameterize(Path(q), (halt,), LIMITS)
     rest = float(motion.times[~motion.velocities.any(axis=1)][1])
-    # Where only the way to that rest is left, that is it.
+    # Where only the s to that rest is left, that is it.
     stop = fast_stop(motion, rest - 0.05, LIMITS)
     assert stop.duration <= 0.05 + 2e-9
     np.testing.assert_allclose(stop.positions[-1], q[1], atol=1e-9)
@@ -202,18 +202,18 @@ def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):
     time, rows_of = rng.random() * motion.duration * 0.8, table(LIMITS)
     curves, times = piece_coefficients(motion), motion.times
     rest = times[first_rest(curves, times, time)]
-    end = min(rest, time + first_look(curves, times, time, rows_of))
+    end = min(rest, time + first_window(curves, times, time, rows_of))
     size = 200 + len(times)
     rows, pieces = np.empty((size + 1, 4)), np.empty(size, np.int64)
     geometry, phases = np.empty((size, 3, 3, 4)), np.empty((3, 5))
     n = look_ahead(curves, times, time, time, end, 0.01, rows_of, rows, pieces, geometry)
     row = int(rng.integers(0, n // 2 + 1))
-    way, speed, slope = rows[row, 1:]
-    lasts = line_stop(way, speed, slope, *rng.uniform([0.2, 1.0], [1.5, 15.0]), phases)
+    s, speed, slope = rows[row, 1:]
+    lasts = line_stop(s, speed, slope, *rng.uniform([0.2, 1.0], [1.5, 15.0]), phases)
     if not np.isfinite(lasts):
         return
-    holds = seems_to_hold(phases, rows, geometry, pieces, row, n, 1.0)
-    gets = int(np.searchsorted(rows[: n + 1, WAY], stop_way(phases)))
+    holds = keeps_limits(phases, rows, geometry, pieces, row, n, 1.0)
+    gets = int(np.searchsorted(rows[: n + 1, S], stop_s(phases)))
     if gets > n:
         assert not holds
         return
@@ -221,12 +221,10 @@ def test_what_a_kernel_finds_within_limits_is_so_by_plain_numpy(seed):
     for begin_way, v0, a0, j, span in phases[:, [1, 2, 3, 4, 0]]:
         t = np.linspace(0.0, span, 200)
         x = begin_way + t * (v0 + t * (0.5 * a0 + t * j / 6.0))
-        cells = np.clip(np.searchsorted(rows[: n + 1, WAY], x, side='right') - 1, 0, n - 1)
+        cells = np.clip(np.searchsorted(rows[: n + 1, S], x, side='right') - 1, 0, n - 1)
         reached = [
-            time_after(
-                curves, times, pieces[c], *rows[c : c + 2, TIME], way - rows[c, WAY], rows_of
-            )
-            for c, way in zip(cells, x, strict=True)
+            time_after(curves, times, pieces[c], *rows[c : c + 2, TIME], s - rows[c, S], rows_of)
+            for c, s in zip(cells, x, strict=True)
         ]
         states = derivatives_at(motion, np.array(reached))
         w, w_slope, w_bend = along_path(states, LIMITS.acceleration)

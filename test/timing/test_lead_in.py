@@ -59,7 +59,7 @@ def test_a_lead_in_begins_with_the_state_and_ends_straight_ahead(seed):
     rest = parameterize(Path([first.positions[-1], lead.q_stop]), (), reserved(bounds), lead.speed)
     whole = joined(first, rest)
     assert limit_ratio(whole, bounds) <= 1.002
-    # The oracle's quintics through the points: velocity and acceleration have no jumps.
+    # The reference checker's quintics through the points: velocity and acceleration have no jumps.
     grid, q, v, a = quintic_states(
         whole.times, whole.positions, whole.velocities, whole.accelerations, 0.001
     )

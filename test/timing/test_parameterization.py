@@ -80,7 +80,7 @@ def distance_from(points, path):
 
 
 def check_motion(trajectory, path, blends, bounds):
-    """Check all that a timed path promises, by the oracle's own quintics."""
+    """Check all that a timed path promises, by the reference checker's own quintics."""
     times, q = trajectory.times, path.waypoints
     assert times[0] == 0.0
     assert (np.diff(times) > 0.0).all()
@@ -220,12 +220,12 @@ def test_the_curve_of_the_quintics_stays_within_a_ten_thousandth_of_lines_and_bl
 
 @examples(60)
 @given(seed=SEEDS)
-def test_the_oracles_quintics_are_those_that_are_sampled(seed):
+def test_the_reference_checkers_quintics_are_those_that_are_sampled(seed):
     rng = np.random.default_rng(seed)
     path = random_path(rng)
     bounds = limits(path.waypoints.shape[1])
     trajectory = parameterize(path, blends_of(path, rng), bounds)
-    # The oracle solves linear equations in seconds: of short pieces it loses digits.
+    # The reference checker solves linear equations in seconds: of short pieces it loses digits.
     if np.diff(trajectory.times).min() < 1e-3:
         return
     grid, q, v, a = quintic_states(

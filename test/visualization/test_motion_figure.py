@@ -17,7 +17,7 @@ from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, Trajectory  # noqa: E402
 from rrth_planner.visualization import arm_view  # noqa: E402
-from rrth_planner.visualization.arm_view import arm_points, draw_way  # noqa: E402
+from rrth_planner.visualization.arm_view import arm_points, draw_configurations  # noqa: E402
 from rrth_planner.visualization.motion_figure import (  # noqa: E402
     draw_limits,
     JOINT_COLOURS,
@@ -104,10 +104,10 @@ def test_the_picture_is_not_blank():
 
 
 @pytest.mark.parametrize('n', [2, 3, 40])
-def test_a_way_is_drawn_by_as_many_postures_as_are_given(n):
+def test_a_motion_is_drawn_by_as_many_configurations_as_are_given(n):
     axes = Figure().add_subplot(projection='3d')
     q = np.linspace(FOLDED, FOLDED - 0.4, n)
-    draw_way(axes, ARM, Scene(()), q, q, None, 1.0, towards=np.array([0.6, -0.6, 0.5]))
+    draw_configurations(axes, ARM, Scene(()), q, q, None, 1.0, towards=np.array([0.6, -0.6, 0.5]))
     # Nothing hides a piece of a line; the path of the tool, and two rays, are lines too.
     assert len(axes.collections) == n + 3
     colours = [lines.get_edgecolor()[0, :3] for lines in axes.collections[: n - 2]]
@@ -122,7 +122,7 @@ def test_a_ray_goes_to_the_target_only_where_it_points_there(monkeypatch, passes
     monkeypatch.setattr(arm_view, '_draw_line', lambda *line: drawn.append(line[3]))
     axes = Figure().add_subplot(projection='3d')
     q = np.array([FOLDED, FOLDED - 0.4])
-    draw_way(axes, ARM, SCENE, q, q, target, 1.2)
+    draw_configurations(axes, ARM, SCENE, q, q, target, 1.2)
     (ray,) = (line for line in drawn if len(line) == 2 and (line[0] == T[:3, 3]).all())
     np.testing.assert_allclose(ray[1], target if is_aimed else T[:3, 3] + 1.2 * T[:3, 2])
     # There is room for it in any case.

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The viewer's model without a browser: what is asked last is answered, and refusals are said."""
+"""The viewer's model without a browser: the last request is answered, and rejections are shown."""
 
 from argparse import Namespace
 from dataclasses import replace
@@ -31,7 +31,7 @@ from rrth_planner.visualization.viewer.examples import (
     start_of,
     TARGETS,
 )
-from rrth_planner.visualization.viewer.panel import answer_html
+from rrth_planner.visualization.viewer.panel import response_html
 from rrth_planner.visualization.viewer.planning_worker import ViewerModel
 from rrth_planner.visualization.viewer.player import Player
 
@@ -68,33 +68,33 @@ def test_a_dragged_target_is_planned_for_anew(model):
     first = model.wait(model.ask(), WAIT)
     left = example_target('left')
     second = model.wait(model.ask(target=left), WAIT)
-    for answer, target in ((first, FRONT), (second, left)):
-        assert answer.is_solved, answer.sentence
-        assert pointing_error(ARM, answer.plan.trajectory.positions[-1], target) < 1e-6
-        assert 'planning time' in answer_html(answer)
+    for response, target in ((first, FRONT), (second, left)):
+        assert response.is_solved, response.sentence
+        assert pointing_error(ARM, response.plan.trajectory.positions[-1], target) < 1e-6
+        assert 'planning time' in response_html(response)
 
 
 def test_the_newest_drag_wins(model):
     targets = [FRONT + [0.0, 0.01 * k, 0.0] for k in range(40)]
     numbers = [model.ask(target=target) for target in targets]
-    answer = model.wait(numbers[-1], WAIT)
-    assert answer.number == numbers[-1]
-    assert answer.question.goal.target.tolist() == targets[-1].tolist()
+    response = model.wait(numbers[-1], WAIT)
+    assert response.number == numbers[-1]
+    assert response.question.goal.target.tolist() == targets[-1].tolist()
 
 
 def test_a_refusal_is_said_and_the_next_target_is_planned_for(model):
-    answer = model.wait(model.ask(target=np.zeros(3)), WAIT)
-    assert not answer.is_solved
-    assert 'inside box "torso"' in answer.sentence
-    assert 'inside box &quot;torso&quot;' in answer_html(answer)
+    response = model.wait(model.ask(target=np.zeros(3)), WAIT)
+    assert not response.is_solved
+    assert 'inside box "torso"' in response.sentence
+    assert 'inside box &quot;torso&quot;' in response_html(response)
     assert model.wait(model.ask(target=FRONT), WAIT).is_solved
 
 
 def test_what_is_no_target_is_said_and_changes_nothing(model):
-    answer = model.wait(model.ask(target=np.array([np.nan, 0.0, 0.0])), WAIT)
-    assert answer.plan is None
-    assert 'target' in answer.sentence
-    assert 'no motion' in answer_html(answer)
+    response = model.wait(model.ask(target=np.array([np.nan, 0.0, 0.0])), WAIT)
+    assert response.plan is None
+    assert 'target' in response.sentence
+    assert 'no motion' in response_html(response)
     assert model.question.goal.target.tolist() == FRONT.tolist()
 
 
@@ -200,7 +200,7 @@ def test_another_target_shows_where_the_arm_comes_to():
     opened = Player().loaded(2.0)
     aimed = opened.aimed()
     assert (opened.time, aimed.time, aimed.loaded(3.0).time) == (0.0, 2.0, 3.0)
-    # Also after a refusal, which has no motion.
+    # Also after a rejection, which has no motion.
     assert aimed.loaded(0.0).aimed().loaded(3.0).time == 3.0
     assert Player().aimed().loaded(3.0).time == 3.0
     halfway = opened.moved(1.0)
@@ -236,8 +236,8 @@ def test_a_page_is_served_on_addresses_of_both_kinds(host, page, capsys):
         assert url.startswith(page)
         if host != '::':
             # Which of the two kinds the name stands for is the matter of the machine.
-            with urlopen(url, timeout=WAIT) as answer:
-                assert answer.status == 200
+            with urlopen(url, timeout=WAIT) as response:
+                assert response.status == 200
     assert f'The viewer is at {url}' in capsys.readouterr().out
 
 

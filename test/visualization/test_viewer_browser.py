@@ -48,7 +48,7 @@ def _page():
         process.kill()
 
 
-def answer(page):
+def response(page):
     """Return the figures that the page shows."""
     return page.get_by_text(SENTENCE).first.inner_text()
 
@@ -66,7 +66,7 @@ def wait_for_another(page, before):
         ' && e.innerText && e.innerText.includes(words) && !e.innerText.includes(before))',
         arg=[SENTENCE, before.strip()],
     )
-    return answer(page)
+    return response(page)
 
 
 def test_wearer_and_arm_are_drawn(page, tmp_path):
@@ -76,7 +76,7 @@ def test_wearer_and_arm_are_drawn(page, tmp_path):
 
 
 def test_another_target_is_planned_for_at_once(page):
-    before = answer(page)
+    before = response(page)
     values = page.eval_on_selector_all('input', 'all => all.map(e => e.value)')
     field = page.locator('input').nth(values.index('1.5'))
     field.fill('0.9')
@@ -87,7 +87,7 @@ def test_another_target_is_planned_for_at_once(page):
 
 
 def test_a_target_that_is_dragged_is_planned_for(page, tmp_path):
-    before, pixels = answer(page), canvas(page, tmp_path / 'drag.png')
+    before, pixels = response(page), canvas(page, tmp_path / 'drag.png')
     red, green, blue = np.moveaxis(pixels, -1, 0)
     # The arrow that points up, the only thing that is drawn in this blue.
     rows, columns = np.nonzero((blue > 0.8) & (red < 0.35) & (abs(green - 0.55) < 0.12))

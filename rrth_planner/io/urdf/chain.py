@@ -17,7 +17,7 @@ from rrth_planner.io.text_file import load_xml
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
 
-# An installation by colcon does not bring them, which is said when a file is to be read.
+# colcon does not install them; an error says so when a file is read.
 with suppress(ImportError):
     from trimesh import transformations
     import yourdfpy
@@ -64,7 +64,7 @@ class UrdfChain:
     ray : ndarray, shape (3,)
         The pointing ray in the tool's link.
     endless : tuple of str
-        Continuous joints, which may turn by half a turn either way.
+        Continuous joints, limited to +-pi.
     joints : tuple of yourdfpy.Joint
         All from base to tool, as they are in the file.
 
@@ -88,7 +88,7 @@ class UrdfChain:
         """
         Return the tool link's pose in the base link, (dof,) [rad or m] -> (4, 4) [m].
 
-        This is the URDF's own way, which knows nothing of lines: origin after origin.
+        Computed from the URDF itself, origin after origin, without DH parameters.
         """
         T = np.eye(4)
         values = dict(zip(self.joint_names, np.asarray(q).tolist(), strict=True))
@@ -106,7 +106,7 @@ def read_chain(
     path: str | Path, base: str | None = None, tool: str | None = None, ray: str = '+z'
 ) -> UrdfChain:
     """
-    Return the chain of a URDF file; meshes are not looked at.
+    Return the chain of a URDF file; meshes are ignored.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def _load(path: Path) -> Any:
 
 
 def _check_origin(origin: ElementTree.Element, label: str) -> None:
-    """Refuse other than three numbers: of more, of one or of infinite ones others are made."""
+    """Reject anything but three finite numbers: the parser would accept and change others."""
     for name in ('xyz', 'rpy'):
         given = origin.get(name, '0 0 0')
         try:

@@ -14,7 +14,7 @@ from rrth_planner.model.rotation import roll_pitch_yaw
 MOUNT, TOOL = 'mount', 'tool'
 # How much of the pointing ray is drawn, and how thick it is beside the bars.
 RAY_LENGTH, RAY_WIDTH = 0.15, 0.4
-# URDF asks for the greatest force of a joint, of which an arm's description says nothing.
+# URDF requires the greatest force of a joint, which the description of an arm does not have.
 EFFORT = 0.0
 # Shorter bars are none [m].
 SHORTEST = 1e-9
@@ -32,7 +32,7 @@ def arm_to_urdf(
     arm: ArmModel, max_velocity: Array, radius: float, base_frame: str = 'torso', name: str = 'arm'
 ) -> str:
     """
-    Return the URDF of an arm: links, joints with limits, and bars to look at; no masses.
+    Return the URDF of an arm: links, joints with limits, and visual bars; no masses.
 
     The base frame and the mount are fixed to each other, as are the last joint and the tool. A
     prismatic joint shows as a rod that slides through the place where it begins.

@@ -8,7 +8,7 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 
-# Points of a link that are looked at; radii are rounded up to this [m].
+# Number of sampled points of a link; radii are rounded up to this [m].
 POINTS, STEP = 1025, 1e-4
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How far the arm is from the boxes."""
+"""Clearance of the arm from the boxes."""
 
 import math
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What others check of an arm's edge: configurations at a spacing, or points at a spacing."""
+"""Sampled checks of an arm's edge, for comparison: configurations, or points, at a spacing."""
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
@@ -25,8 +25,8 @@ from rrth_planner.kernels.vectors import distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
 POINTS_PER_BAR = 10
-# Spacings between configurations over which a proof gives up: it is to be quicker than a look at
-# each of them.
+# Resolution of the continuous check that is tried first, in spacings: it has to be cheaper than
+# checking each configuration.
 SHORT_PROOF = 8.0
 
 
@@ -42,8 +42,8 @@ def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, boxes):
     """
     Return whether each configuration is free, exactly, at a spacing of `resolution` [rad].
 
-    Where a short proof holds for the whole edge it holds for each of them; where none does they
-    are looked at one by one, and what lies between them is not.
+    A coarse continuous check of the whole edge is tried first; where it is undecided, they are
+    checked one by one, and contacts between them are missed.
     """
     if is_edge_free(q_from, q_to, SHORT_PROOF * resolution, chain, robot, boxes):
         return True

@@ -1,13 +1,13 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the arm is clear of the boxes: at a configuration, and proven along a motion."""
+"""Collision checks of the arm: at a configuration, and continuous along a motion."""
 
 import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.bar_box import MAX_ENDS, open_lanes, touched_lanes
+from rrth_planner.kernels.collision.bar_box import contact_lanes, MAX_ENDS, open_lanes
 from rrth_planner.kernels.jit import (
     CHAIN,
     D,
@@ -26,14 +26,14 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.layout import MAX_DOF
 
 ENDS_ROOM = 4 * MAX_ENDS
-# Configurations that a proof may visit, and numbers for their points, before it gives up.
+# Most configurations of a continuous check, and room for the numbers of their points.
 MAX_NODES, POINTS_ROOM = 512, 8192
-# Entries of what is open (pairs of a bar and a group of boxes) that a proof has room for.
+# Most open entries (pairs of a bar and a group of boxes) of a continuous check.
 MAX_OPEN, ENTRY = 2048, 5
 QUEUE_ROOM, POOL_ROOM = 8 * MAX_NODES, ENTRY * MAX_OPEN
-# Groups of boxes that wait to be looked at: LANES a level of their tree.
+# Groups of boxes waiting to be checked: LANES per level of their tree.
 MAX_GROUPS = 64
-# Configurations beyond this are none: `sine_cosine` holds up to 1e5 [rad or m].
+# Largest joint position: `sine_cosine` is valid up to 1e5 [rad or m].
 LARGEST = 1e4
 # Intervals shorter than this [rad] are proven part by part of the bars, as long as there are no
 # more open parts than these.
@@ -43,11 +43,11 @@ FIRST_INTERVAL = 1.0
 
 
 @kernel(boolean(OUT_VEC, int64, int64, MAT))
-def touches(points, at, n_bars, boxes):
-    """Return whether any bar of the arm at points[at] touches a box: exact, the ray first."""
+def is_in_contact(points, at, n_bars, boxes):
+    """Return whether any bar of the arm at points[at] is in contact with a box: exact."""
     if boxes.shape[0] == 1:
         for k in range(n_bars - 1, -1, -1):
-            if touched_lanes(points, at + 4 * k, boxes, 0) != 0:
+            if contact_lanes(points, at + 4 * k, boxes, 0) != 0:
                 return True
         return False
     waiting = scratch.ints(MAX_GROUPS)
@@ -55,14 +55,14 @@ def touches(points, at, n_bars, boxes):
     while n_waiting > 0:
         n_waiting -= 1
         g = int64(waiting[n_waiting])
-        touched = 0
+        hit = 0
         is_leaf = LANES * g + 1 >= boxes.shape[0]
         for k in range(n_bars - 1, -1, -1):
-            touched |= touched_lanes(points, at + 4 * k, boxes, g)
-            if is_leaf and touched != 0:
+            hit |= contact_lanes(points, at + 4 * k, boxes, g)
+            if is_leaf and hit != 0:
                 return True
         for j in range(LANES):
-            if (touched >> j) & 1:
+            if (hit >> j) & 1:
                 waiting[n_waiting] = LANES * g + j + 1
                 n_waiting += 1
     return False
@@ -74,23 +74,23 @@ def is_configuration_free(q, ray_length, chain, boxes):
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
     if boxes.shape[0] > 1:
-        return not touches(points, 0, n_bars, boxes)
-    n_touched = 0
+        return not is_in_contact(points, 0, n_bars, boxes)
+    n_hit = 0
     for k in range(n_bars - 1, -1, -1):
-        n_touched += touched_lanes(points, 4 * k, boxes, 0)
-        if n_touched != 0:
+        n_hit += contact_lanes(points, 4 * k, boxes, 0)
+        if n_hit != 0:
             break
-    return n_touched == 0
+    return n_hit == 0
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))
-def curvature_bounds(robot, speed, bend, bows):
+def curvature_bounds(robot, speed, curvature, bows):
     """
     Write a bound of the second derivative of each end of a bar along a motion.
 
-    speed, bend: bounds of |dq/du| and |d2q/du2| of each joint along the motion. With R_j the reach
-    of a point round joint j: sum over i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus sum of
-    |q_j''| R_j; an inner prismatic joint adds nothing (`docs/algorithms.md`, section 2).
+    speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint along the motion. With R_j the
+    reach of a point round joint j: sum over i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus
+    sum of |q_j''| R_j; an inner prismatic joint adds nothing (`docs/algorithms.md`, section 2).
     """
     dof = speed.shape[0]
     bows[0] = 0.0
@@ -103,7 +103,7 @@ def curvature_bounds(robot, speed, bend, bows):
             for j in range(dof):
                 reach = robot[i, REACH + end * dof + j]
                 turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
-                total += reach * (speed[j] * (turns + 2.0 * inner) + bend[j])
+                total += reach * (speed[j] * (turns + 2.0 * inner) + curvature[j])
                 inner += turns
             bows[n] = total
             n += 1
@@ -165,7 +165,7 @@ def open_bar(points, a, b, k, first, last, boxes, pool, n_open):
 @kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, boolean, MAT, OUT_POOL, int64))
 def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     """
-    Append to the pool what is still open of its entry `row`; return its new length.
+    Append to the pool the open part of its entry `row`; return its new length.
 
     points[a], points[b]: the arm at two nearer instants; bow: width^2 / 8. The bar, or its part,
     is halved if asked for: on a short interval it is mostly the bar's own length that keeps the
@@ -194,14 +194,14 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
 
 
 @kernel(int64(MAT, VEC, VEC, float64, CHAIN, MAT, MAT))
-def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
+def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     """
-    Return 1 where a motion is proven free, 0 where it touches a box, -1 where neither is known.
+    Return 1 where a motion is proven free, 0 where it collides, -1 where it is undecided.
 
-    curve (degree + 1, dof): q(u) for u in [0, 1]; speed, bend (dof,): bounds of its derivatives.
+    curve (degree + 1, dof): q(u) for u in [0, 1]; speed, curvature (dof,): derivative bounds.
     An interval of u is free when the hull of each bar at its two ends, thickened by
-    width^2 / 8 times the bound of the second derivative, is apart from each box. What is not apart
-    is bisected, breadth first, and the halves test only the pairs of bar and box that were left
+    width^2 / 8 times the bound of the second derivative, is apart from each box. Otherwise
+    it is bisected, breadth first, and the halves test only the pairs of bar and box that are still
     open, on short intervals part by part, until an interval is shorter than `resolution` [rad]
     (`docs/algorithms.md`, section 3).
     """
@@ -211,20 +211,20 @@ def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
         for power in range(curve.shape[0]):
             extent += abs(curve[power, k])
     length = math.sqrt(length)
-    # Also what is no number: it must reach neither the conversion to an integer below, nor the
-    # reduction of angles.
+    # Also for NaN, which must reach neither the conversion to an integer below, nor the reduction
+    # of angles.
     if not (length < 0.5 * FIRST_INTERVAL * MAX_NODES and extent < LARGEST):
         return -1
     points, u = scratch.floats(POINTS_ROOM), scratch.floats(MAX_NODES)
     q, bows = scratch.floats(MAX_DOF), scratch.floats(MAX_ENDS)
-    # Queue of intervals: node at either end, then the run of `pool` that holds what is open.
+    # Queue of intervals: nodes at both ends, then the range of `pool` with the open entries.
     queue, pool = scratch.ints(QUEUE_ROOM), scratch.ints(POOL_ROOM)
     ray_length = robot[robot.shape[0] - 1, D]
-    # The far end first: it is the configuration that no earlier edge has proven.
+    # The far end first: earlier edges have mostly proven the start.
     u[0] = 1.0
     curve_point(curve, 1.0, q)
     n_bars = chain(q, ray_length, points, 0)
-    if touches(points, 0, n_bars, boxes):
+    if is_in_contact(points, 0, n_bars, boxes):
         return 0
     stride = 4 * (n_bars + 1)
     max_nodes = min(MAX_NODES, POINTS_ROOM // stride)
@@ -236,13 +236,13 @@ def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
         u[i] = (i - 1) / n_pieces
         curve_point(curve, u[i], q)
         chain(q, ray_length, points, i * stride)
-        # The start is looked at below: mostly it is known to be free.
-        if i > 1 and touches(points, i * stride, n_bars, boxes):
+        # The start is checked below: mostly it is known to be free.
+        if i > 1 and is_in_contact(points, i * stride, n_bars, boxes):
             return 0
         queue[tail], queue[tail + 1] = i, i + 1 if i < n_pieces else 0
         queue[tail + 2], queue[tail + 3] = 0, -1
         tail += 4
-    curvature_bounds(robot, speed, bend, bows)
+    curvature_bounds(robot, speed, curvature, bows)
     while head < tail:
         a, b = int64(queue[head]), int64(queue[head + 1])
         first, last = int64(queue[head + 2]), int64(queue[head + 3])
@@ -274,14 +274,14 @@ def prove_curve(curve, speed, bend, resolution, chain, robot, boxes):
                 return -1
         if n_open == start:
             continue
-        if a == 1 and last < 0 and touches(points, stride, n_bars, boxes):
+        if a == 1 and last < 0 and is_in_contact(points, stride, n_bars, boxes):
             return 0
         if width * length < resolution or n_nodes >= max_nodes or tail > QUEUE_ROOM - 8:
             return -1
         u[n_nodes] = 0.5 * (u[a] + u[b])
         curve_point(curve, u[n_nodes], q)
         chain(q, ray_length, points, n_nodes * stride)
-        if touches(points, n_nodes * stride, n_bars, boxes):
+        if is_in_contact(points, n_nodes * stride, n_bars, boxes):
             return 0
         queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = a, n_nodes, start, n_open
         tail += 4
@@ -296,12 +296,12 @@ def is_edge_free(q_from, q_to, resolution, chain, robot, boxes):
     """
     Return whether the straight joint motion q_from -> q_to is proven free along its whole length.
 
-    The edge check of the planners (`EDGE_CHECK`). False also where the proof fails at intervals
-    of `resolution` [rad].
+    The edge check of the planners (`EDGE_CHECK`). False also where it is undecided at
+    intervals of `resolution` [rad].
     """
     dof = q_from.shape[0]
-    line, speed, bend = np.empty((2, dof)), np.empty(dof), np.zeros(dof)
+    line, speed, curvature = np.empty((2, dof)), np.empty(dof), np.zeros(dof)
     for k in range(dof):
         line[0, k], line[1, k] = q_from[k], q_to[k] - q_from[k]
         speed[k] = abs(line[1, k])
-    return prove_curve(line, speed, bend, resolution, chain, robot, boxes) == 1
+    return prove_curve(line, speed, curvature, resolution, chain, robot, boxes) == 1

@@ -19,9 +19,9 @@ MAX_ENDS = MAX_BARS + 1
 
 
 @kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')
-def touched_lanes(points, at, boxes, g):
+def contact_lanes(points, at, boxes, g):
     """
-    Return the boxes of group g that a bar touches, bit l for lane l.
+    Return the boxes of group g in contact with a bar, bit l for lane l.
 
     The bar runs from points[at] to points[at + 4], its radius stands behind the latter. Separating
     axes (Gottschalk, Lin and Manocha 1996): three face normals and the bar's cross products with
@@ -32,7 +32,7 @@ def touched_lanes(points, at, boxes, g):
     bx, by, bz, radius = points[at + 4], points[at + 5], points[at + 6], points[at + 7]
     ex, ey, ez = 0.5 * (bx - ax), 0.5 * (by - ay), 0.5 * (bz - az)
     mx, my, mz = 0.5 * (bx + ax), 0.5 * (by + ay), 0.5 * (bz + az)
-    touched = 0
+    hit = 0
     for j in range(LANES):
         is_apart = False
         for r in range(3):
@@ -45,8 +45,8 @@ def touched_lanes(points, at, boxes, g):
             m = boxes[g, (9 + r) * LANES + j] + x * mx + y * my + z * mz
             local[r * LANES + j], local[(3 + r) * LANES + j] = e, m
             is_apart |= abs(m) > boxes[g, (12 + r) * LANES + j] + radius + abs(e)
-        touched |= (0 if is_apart else 1) << j
-    if touched == 0:
+        hit |= (0 if is_apart else 1) << j
+    if hit == 0:
         return 0
     apart = 0
     for j in range(LANES):
@@ -62,11 +62,11 @@ def touched_lanes(points, at, boxes, g):
             | (abs(m0 * e1 - m1 * e0) > h0 * f1 + h1 * f0)
         )
         apart |= (1 if is_apart else 0) << j
-    return touched & ~apart
+    return hit & ~apart
 
 
 @kernel(float64(OUT_VEC, OUT_VEC, OUT_VEC, float64))
-def _slope(start, step, half, t):
+def _derivative(start, step, half, t):
     """Return half the derivative by t of the squared distance of start + t step from a box."""
     total = 0.0
     for k in range(3):
@@ -82,14 +82,14 @@ def bar_box_distance(start, step, half):
     Return the signed distance of a bar from a box, in the box's own axes [m]; < 0 inside.
 
     Apart: the squared distance of the point start + t step is convex and piecewise quadratic in
-    t, so its slope is monotone and piecewise linear, with breaks where a coordinate crosses a
+    t, so its derivative is monotone and piecewise linear, with breaks where a coordinate crosses a
     face: the zero between two breaks is exact. In contact: the least overlap over the separating
     axes, which is the depth of penetration of two convex polytopes.
     """
     low, high = 0.0, 1.0
-    if _slope(start, step, half, 0.0) >= 0.0:
+    if _derivative(start, step, half, 0.0) >= 0.0:
         high = 0.0
-    elif _slope(start, step, half, 1.0) <= 0.0:
+    elif _derivative(start, step, half, 1.0) <= 0.0:
         low = 1.0
     else:
         for k in range(3):
@@ -97,12 +97,12 @@ def bar_box_distance(start, step, half):
                 for side in (-1.0, 1.0):
                     t = (side * half[k] - start[k]) / step[k]
                     if low < t < high:
-                        if _slope(start, step, half, t) < 0.0:
+                        if _derivative(start, step, half, t) < 0.0:
                             low = t
                         else:
                             high = t
-        at_low = _slope(start, step, half, low)
-        at_high = _slope(start, step, half, high)
+        at_low = _derivative(start, step, half, low)
+        at_high = _derivative(start, step, half, high)
         if at_high > at_low:
             low = low - at_low * (high - low) / (at_high - at_low)
     t = low

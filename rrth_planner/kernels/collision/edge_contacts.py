@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an edge of the arm passes close to boxes, and which way leads away from them."""
+"""Contacts of an edge: where the arm passes close to boxes, and the gradient of the gap."""
 
 import math
 
@@ -11,18 +11,18 @@ from rrth_planner.kernels.jit import CHAIN, D, kernel, LANES, MAT, OUT_MAT, OUT_
 from rrth_planner.kernels.layout import MAX_DOF
 from rrth_planner.kernels.vectors import distance
 
-# Passing closer than this counts as leaning on the box [m].
+# A gap smaller than this counts as contact [m].
 CLOSE = 0.03
-# Spacing at which an edge is looked at [rad]; near its closest place the gap is quadratic.
+# Spacing of the samples of an edge [rad]; near its minimum the gap is quadratic.
 SPACING = 0.04
-# Step of the differences that give the slopes [rad or m].
+# Step of the finite differences of the gradient [rad or m].
 STEP = 1e-6
-# Entries of a contact: where on the edge (0 to 1), gap [m], how hard the path presses there, then
-# the slope of the gap by each joint.
-SHARE, GAP, PRESSED, SLOPES = range(4)
-# The golden section, and how often it narrows a place down: to 0.5 % of the spacing.
+# Entries of a contact: where on the edge (0 to 1), gap [m], multiplier of its constraint, then the
+# gradient of the gap by the joints.
+SHARE, GAP, MULTIPLIER, GRADIENT = range(4)
+# The golden section, and its iterations: to 0.5 % of the spacing.
 GOLDEN, N_GOLDEN = 0.6180339887498949, 10
-# Pairs of a bar and a box that an edge may lean on.
+# Most pairs of a bar and a box in contact along an edge.
 MAX_PAIRS = 64
 PAIRS_ROOM = 4 * MAX_PAIRS
 
@@ -76,9 +76,9 @@ def gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points):
 @kernel(int64(VEC, VEC, float64, float64, float64, CHAIN, MAT, OUT_POOL, OUT_MAT, int64))
 def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, contacts, n):
     """
-    Append the contact of one pair that is closest near a share of the edge; return the total.
+    Append the contact of one pair, at its least gap near a share of the edge; return the total.
 
-    The place is narrowed down by golden section (Kiefer 1953), the slopes are differences.
+    The minimum is found by golden section (Kiefer 1953), the gradient by differences.
     """
     if n >= contacts.shape[0]:
         return n
@@ -111,30 +111,30 @@ def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, co
         chain(q, ray_length, points, 0)
         bar_gaps(points, 4 * bar, boxes, g, gaps)
         q[i] = here
-        contacts[n, SLOPES + i] = (ahead - gaps[j]) / (2.0 * STEP)
+        contacts[n, GRADIENT + i] = (ahead - gaps[j]) / (2.0 * STEP)
     return n + 1
 
 
 @kernel(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     """
-    Write where the edge leans on boxes; return how many rows.
+    Write the contacts of an edge with boxes; return their number.
 
-    contacts (capacity, 3 + dof): for each pair of bar and box, the places on the edge where they
-    are closer than on either side of it, the gap there [m], its slope by each joint [m/rad].
+    contacts (capacity, 3 + dof): for each pair of bar and box, the local minima of their gap along
+    the edge, the gap there [m], and its gradient by the joints [m/rad].
     """
     dof, n, n_pairs = q_from.shape[0], 0, 0
     points, q = scratch.floats(ENDS_ROOM), scratch.floats(MAX_DOF)
-    # Bar, group, lane and last look of each pair that came close; its gap then; is it falling?
+    # Bar, group, lane and last sample of each pair that came close; its gap then; is it falling?
     pairs, gaps = scratch.ints(PAIRS_ROOM), scratch.floats(MAX_PAIRS)
     now = scratch.floats(LANES)
     falling, waiting = scratch.ints(MAX_PAIRS), scratch.ints(MAX_GROUPS)
     ray_length = robot[robot.shape[0] - 1, D]
-    n_looks = int64(distance(q_from, q_to) / SPACING) + 2
-    spacing = 1.0 / (n_looks - 1)
-    for look in range(n_looks):
+    n_samples = int64(distance(q_from, q_to) / SPACING) + 2
+    spacing = 1.0 / (n_samples - 1)
+    for sample in range(n_samples):
         for k in range(dof):
-            q[k] = q_from[k] + look * spacing * (q_to[k] - q_from[k])
+            q[k] = q_from[k] + sample * spacing * (q_to[k] - q_from[k])
         n_bars = chain(q, ray_length, points, 0)
         for bar in range(n_bars):
             n_waiting, waiting[0] = 1, 0
@@ -144,7 +144,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                 bar_gaps(points, 4 * bar, boxes, g, now)
                 for j in range(LANES):
                     gap = now[j]
-                    # Also where it is no number: a lane that holds no box.
+                    # Also for NaN: a lane without a box.
                     if not gap < CLOSE:
                         continue
                     if LANES * g + 1 < boxes.shape[0]:
@@ -164,7 +164,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                         n_pairs += 1
                         pairs[4 * row], pairs[4 * row + 1], pairs[4 * row + 2] = bar, g, j
                         falling[row], gaps[row] = 1, math.inf
-                    elif falling[row] and (pairs[4 * row + 3] < look - 1 or gap > gaps[row]):
+                    elif falling[row] and (pairs[4 * row + 3] < sample - 1 or gap > gaps[row]):
                         share = pairs[4 * row + 3] * spacing
                         n = add_contact(
                             q_from,
@@ -179,9 +179,9 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                             n,
                         )
                         falling[row] = 0
-                    if gap < gaps[row] or pairs[4 * row + 3] < look - 1:
+                    if gap < gaps[row] or pairs[4 * row + 3] < sample - 1:
                         falling[row] = 1
-                    gaps[row], pairs[4 * row + 3] = gap, look
+                    gaps[row], pairs[4 * row + 3] = gap, sample
     for row in range(n_pairs):
         if falling[row]:
             share = pairs[4 * row + 3] * spacing
@@ -194,5 +194,5 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
 
 @kernel(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 def no_contacts(q_from, q_to, chain, robot, boxes, contacts):
-    """Find nothing to lean on: on a map with plane walls pulling taut is enough."""
+    """Find no contacts: on a map with plane walls shortcuts are enough."""
     return 0

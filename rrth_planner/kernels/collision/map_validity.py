@@ -8,9 +8,9 @@ from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, VEC
 
-# Obstacles of a map are rows lower corner, upper corner, (m, 2 dof). Touching is allowed: a wall
+# Obstacles of a map are rows lower corner, upper corner, (m, 2 dof). Contact is allowed: a wall
 # begins this far inside its faces.
-TOUCH = 1e-9
+CONTACT = 1e-9
 
 
 @kernel(boolean(VEC, VEC, MAT))
@@ -21,8 +21,8 @@ def is_edge_free_in_plane(q_from, q_to, obstacles):
     fx, fy = abs(dx), abs(dy)
     left, right, low, high = min(ax, bx), max(ax, bx), min(ay, by), max(ay, by)
     for j in range(obstacles.shape[0]):
-        x0, y0 = obstacles[j, 0] + TOUCH, obstacles[j, 1] + TOUCH
-        x1, y1 = obstacles[j, 2] - TOUCH, obstacles[j, 3] - TOUCH
+        x0, y0 = obstacles[j, 0] + CONTACT, obstacles[j, 1] + CONTACT
+        x1, y1 = obstacles[j, 2] - CONTACT, obstacles[j, 3] - CONTACT
         # One branch of the four: most edges are beside most rectangles.
         if (left < x1) & (right > x0) & (low < y1) & (high > y0):
             # Twice the distance of the middle from the line, and twice what the corners reach to.
@@ -49,13 +49,13 @@ def is_edge_free(q_from, q_to, resolution, chain, robot, obstacles):
         # Most boxes lie to one side of both ends.
         is_beside = False
         for k in range(dof):
-            is_beside |= max(q_from[k], q_to[k]) <= obstacles[j, k] + TOUCH
-            is_beside |= min(q_from[k], q_to[k]) >= obstacles[j, dof + k] - TOUCH
+            is_beside |= max(q_from[k], q_to[k]) <= obstacles[j, k] + CONTACT
+            is_beside |= min(q_from[k], q_to[k]) >= obstacles[j, dof + k] - CONTACT
         if is_beside:
             continue
         enter, leave = 0.0, 1.0
         for k in range(dof):
-            lower, upper = obstacles[j, k] + TOUCH, obstacles[j, dof + k] - TOUCH
+            lower, upper = obstacles[j, k] + CONTACT, obstacles[j, dof + k] - CONTACT
             step = q_to[k] - q_from[k]
             if step == 0.0:
                 if q_from[k] <= lower or q_from[k] >= upper:
@@ -80,7 +80,7 @@ def is_point_inside(q, obstacles):
     for j in range(obstacles.shape[0]):
         is_inside = True
         for k in range(dof):
-            is_inside &= obstacles[j, k] + TOUCH < q[k] < obstacles[j, dof + k] - TOUCH
+            is_inside &= obstacles[j, k] + CONTACT < q[k] < obstacles[j, dof + k] - CONTACT
         if is_inside:
             return True
     return False
@@ -92,7 +92,7 @@ def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, obstacles):
     Return whether no check point of the edge is inside a box: the paper's test.
 
     The check points are spread evenly, their number by the length of the edge (section 2), no
-    further apart than `resolution`. What lies between them is not seen.
+    further apart than `resolution`. Contacts between them are missed.
     """
     dof = q_from.shape[0]
     length = 0.0

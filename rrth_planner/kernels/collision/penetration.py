@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""How deep bars are in boxes, by separating axes."""
+"""Penetration depths of bars in boxes, by separating axes."""
 
 import math
 
@@ -8,14 +8,14 @@ from numba.core.types import void
 import numpy as np
 from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, CUBE, kernel, MAT, OUT_CUBE
 
-# A bar as good as parallel to a face of the box has no axis across both there.
+# Least sine for a cross axis: a bar parallel to an axis of the box has none.
 PARALLEL = 1e-12
 
 
 @kernel(void(MAT, CUBE, OUT_CUBE), is_short=True)
 def depths(boxes, points, found):
     """
-    Write by how much each box would have to be smaller on every side for each bar to be clear.
+    Write by how much each box would have to shrink on every side for each bar to be clear.
 
     boxes (15, m): a column for each box, its axes, offset and half sizes as in `obstacles`;
     points (n, n_bars + 1, 4): the corners of the arm in n configurations, each with the radius of

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The pieces of a timed motion, one after the other: what is left of it is proven in one go."""
+"""Continuous collision check of the remaining motion, piece by piece, in one call."""
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
@@ -23,7 +23,7 @@ from rrth_planner.kernels.trajectory.quintics import bound, fit
 @kernel(void(MAT, float64, OUT_MAT))
 def shift(curve, begin, rest):
     """
-    Write the rest of a polynomial from a share of it on, over u from 0 to 1 again.
+    Write the rest of a polynomial after a share of it, again over u from 0 to 1.
 
     curve, rest (degree + 1, dof), lowest power first. By Horner's scheme: q(begin + w u), w = 1 -
     begin (Taylor shift). Bounds of the derivatives of the whole hold for its rest, which is
@@ -43,29 +43,31 @@ def shift(curve, begin, rest):
 
 
 @kernel(int64(CUBE, MAT, MAT, int64, float64, float64, CHAIN, MAT, MAT))
-def prove_pieces(curves, speeds, bends, first, begin, resolution, chain, robot, boxes):
+def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, robot, boxes):
     """
     Return -1 where all pieces from `first` on are proven free, else 2 i + 1 or 2 i.
 
-    i is the first piece that is not: seen to touch (+ 1), or left undecided. curves (n, degree +
-    1, dof), speeds and bends (n, dof): as `prove_curve`. Of the first piece only what comes after
-    the share `begin` of it counts.
+    i is the first piece that is not: it collides (+ 1), or is undecided. curves (n, degree +
+    1, dof), speeds and curvatures (n, dof): as `prove_curve`. Of the first piece only the part
+    after the share `begin` is checked.
     """
     rest = np.empty((curves.shape[1], curves.shape[2]))
     for i in range(first, curves.shape[0]):
         if i == first and begin > 0.0:
             shift(curves[i], begin, rest)
-            proof = prove_curve(rest, speeds[i], bends[i], resolution, chain, robot, boxes)
+            proof = prove_curve(rest, speeds[i], curvatures[i], resolution, chain, robot, boxes)
         else:
-            proof = prove_curve(curves[i], speeds[i], bends[i], resolution, chain, robot, boxes)
+            proof = prove_curve(
+                curves[i], speeds[i], curvatures[i], resolution, chain, robot, boxes
+            )
         if proof != 1:
             return 2 * i + (1 if proof == 0 else 0)
     return -1
 
 
 @kernel(void(MAT, MAT, float64, int64, OUT_MAT))
-def pack_seen(boxes, T_arm_base, growth, depth, groups):
-    """Write boxes (m, 15) that were just seen as groups, as `rows_of` and `pack` in `boxes` do."""
+def pack_new(boxes, T_arm_base, growth, depth, groups):
+    """Write newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
     rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
     rows_of(boxes, T_arm_base, growth, rows)
@@ -74,9 +76,9 @@ def pack_seen(boxes, T_arm_base, growth, depth, groups):
 
 @kernel(boolean(VEC, float64, CHAIN, MAT, MAT, float64, int64), is_short=True)
 def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
-    """Return whether the arm at q (dof,) is free of boxes that were just seen, as below."""
+    """Return whether the arm at q (dof,) is free of newly received boxes, as below."""
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    pack_seen(boxes, T_arm_base, growth, depth, groups)
+    pack_new(boxes, T_arm_base, growth, depth, groups)
     return is_configuration_free(q, ray_length, chain, groups)
 
 
@@ -100,7 +102,7 @@ def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
     ),
     is_short=True,
 )
-def is_rest_free(
+def is_remaining_motion_free(
     times,
     positions,
     velocities,
@@ -118,9 +120,9 @@ def is_rest_free(
     cubic,
 ):
     """
-    Return whether what is left of a motion is proven free of boxes that were just seen.
+    Return whether the remaining motion is proven free of newly received boxes.
 
-    In one go, since a moving arm waits for it. At the end a ray of length `reach` has to be free
+    In one call, since it decides about a stop. At the end a ray of length `reach` has to be free
     too [m]. times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of
     the motion, of which only what comes after `begin` counts [s]; boxes (m, 15), T_arm_base
     (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`; quartic and cubic as for
@@ -130,7 +132,7 @@ def is_rest_free(
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    pack_seen(boxes, T_arm_base, growth, depth, groups)
+    pack_new(boxes, T_arm_base, growth, depth, groups)
     q_end = np.empty(dof)
     for k in range(dof):
         q_end[k] = 0.0
@@ -144,8 +146,10 @@ def is_rest_free(
     first = 0
     while first < n_pieces - 1 and times[first + 1] <= begin:
         first += 1
-    speeds, bends = np.empty((n_pieces, dof)), np.empty((n_pieces, dof))
-    bound(curves[first:], quartic, cubic, speeds[first:], bends[first:])
+    speeds, curvatures = np.empty((n_pieces, dof)), np.empty((n_pieces, dof))
+    bound(curves[first:], quartic, cubic, speeds[first:], curvatures[first:])
     share = max(0.0, (begin - times[first]) / (times[first + 1] - times[first]))
-    found = prove_pieces(curves, speeds, bends, first, share, resolution, chain, robot, groups)
+    found = prove_pieces(
+        curves, speeds, curvatures, first, share, resolution, chain, robot, groups
+    )
     return found == -1

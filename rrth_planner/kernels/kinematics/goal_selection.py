@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The free postures that aim at a target, nearest first."""
+"""The free goal configurations of a target, nearest first."""
 
 import math
 
@@ -25,7 +25,7 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.kinematics.pan_tilt_ik import is_goal_free
 from rrth_planner.kernels.vectors import copy, distance
 
-# Draws by which a first straight way is sought, which then bounds how far the others may be.
+# Draws for a first goal with a straight free edge, which bounds the distance of the others.
 FIRST_DRAWS = 16
 
 
@@ -83,7 +83,7 @@ def take_free(
     Take the free ones of the candidates, nearest first; return the row of the last one.
 
     It ends with the first that q_near reaches by a straight free edge: no path to a farther one is
-    shorter. Then counts[2] = 1. counts[0], counts[1]: how many are free, how many touched.
+    shorter. Then counts[2] = 1. counts[0], counts[1]: how many are free, how many collide.
     """
     keys, heap = np.empty(n_candidates), np.empty(n_candidates, np.int64)
     for i in range(n_candidates):
@@ -150,11 +150,11 @@ def find_goals(
     counts,
 ):
     """
-    Write the free postures that aim at a target, nearest to q_near first, and the touching ones.
+    Write the free goal configurations, nearest to q_near first, and those in collision.
 
-    The list ends with the first goal that a straight free edge reaches, if there is one. A few
-    draws that find one bound the distance at which it is worth to look at the others. counts (3,):
-    free ones, touching ones (without such a bound: all of them), whether the last is straight on.
+    The list ends with the first goal that a straight free edge reaches, if there is one. The
+    first few draws, if they find one, bound the distance of the others. counts (3,): free ones,
+    ones in collision (without such a bound: all), whether the last has a straight edge.
     """
     find_candidates = as_candidates(candidates_at)
     is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])

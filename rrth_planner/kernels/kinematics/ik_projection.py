@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The goal manifold of any arm: least steps onto it, and along it, by its slopes."""
+"""The goal manifold of any arm: least steps onto it, and along it, by its Jacobian."""
 
 import math
 
@@ -21,9 +21,9 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 
-# Rows of `work`, a column for each joint: how it moves the target past the tool (3), the slopes
+# Rows of `work`, a column for each joint: how it moves the target past the tool (3), the Jacobian
 # of the two equations (2), is the joint held at a limit, a wish, the step, a configuration.
-MOVES, SLOPES, HELD, WISH, STEP, BEFORE, WORK_ROWS = 0, 3, 5, 6, 7, 8, 9
+MOVES, JACOBIAN, HELD, WISH, STEP, BEFORE, WORK_ROWS = 0, 3, 5, 6, 7, 8, 9
 # A ray passes its target by this much at most, relative to 1 m and to the ray's length.
 ACCURACY = 1e-12
 # A target nearer to the tool than this has no direction [m].
@@ -32,7 +32,7 @@ NEAREST = 1e-6
 MAX_STEPS, MAX_STALLS = 32, 4
 # Damping relative to the square of the angle still to go, at first; then from try to try.
 DAMPING, RELAX, STIFFEN = 0.03, 0.2, 8.0
-# Damping that keeps the equations of a singular posture solvable.
+# Damping that keeps the equations of a singular configuration solvable.
 LEAST_DAMPING = 1e-12
 
 
@@ -42,7 +42,7 @@ def measure_aim(robot, target, q, work):
     Return the angle between ray and target seen from the tool [rad], and the target's distance.
 
     Joint k moves the target past the tool by -m, m = z_k x (target - o_k), or z_k if it slides.
-    The slopes are -m . u / distance: how it turns the target's direction n towards the ray
+    The Jacobian is -m . u / distance: how it turns the target's direction n towards the ray
     (u = the first axis), and square to that (the second one). The angle is infinite where a
     target has no direction (`docs/algorithms.md`, section 4).
     """
@@ -88,20 +88,20 @@ def measure_aim(robot, target, q, work):
     wx, wy, wz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
     for k in range(dof):
         mx, my, mz = work[MOVES, k], work[MOVES + 1, k], work[MOVES + 2, k]
-        work[SLOPES, k] = -(mx * ux + my * uy + mz * uz) / distance
-        work[SLOPES + 1, k] = -(mx * wx + my * wy + mz * wz) / distance
+        work[JACOBIAN, k] = -(mx * ux + my * uy + mz * uz) / distance
+        work[JACOBIAN + 1, k] = -(mx * wx + my * wy + mz * wz) / distance
     return math.atan2(sine, cosine), distance
 
 
 @kernel(UniTuple(float64, 2)(OUT_MAT, float64, float64, float64))
-def solve_slopes(work, rise, side, damping):
-    """Return (J J' + damping)^-1 (rise, side), J the slopes of the joints that are not held."""
+def solve_damped(work, rise, side, damping):
+    """Return (J J' + damping)^-1 (rise, side), J the Jacobian of the joints that are not held."""
     a, b, c = damping, 0.0, damping
     for k in range(work.shape[1]):
         if work[HELD, k] == 0.0:
-            a += work[SLOPES, k] * work[SLOPES, k]
-            b += work[SLOPES, k] * work[SLOPES + 1, k]
-            c += work[SLOPES + 1, k] * work[SLOPES + 1, k]
+            a += work[JACOBIAN, k] * work[JACOBIAN, k]
+            b += work[JACOBIAN, k] * work[JACOBIAN + 1, k]
+            c += work[JACOBIAN + 1, k] * work[JACOBIAN + 1, k]
     determinant = a * c - b * b
     return (c * rise - b * side) / determinant, (a * side - b * rise) / determinant
 
@@ -117,17 +117,17 @@ def least_step(bounds, q, angle, damping, work):
     rise, side = angle, 0.0
     work[HELD, :] = 0.0
     for _ in range(q.shape[0]):
-        f, g = solve_slopes(work, rise, side, damping)
+        f, g = solve_damped(work, rise, side, damping)
         is_inside = True
         for k in range(q.shape[0]):
             if work[HELD, k] != 0.0:
                 continue
-            step = work[SLOPES, k] * f + work[SLOPES + 1, k] * g
+            step = work[JACOBIAN, k] * f + work[JACOBIAN + 1, k] * g
             work[STEP, k] = min(max(step, bounds[0, k] - q[k]), bounds[1, k] - q[k])
             if work[STEP, k] != step:
                 work[HELD, k] = 1.0
-                rise -= work[SLOPES, k] * work[STEP, k]
-                side -= work[SLOPES + 1, k] * work[STEP, k]
+                rise -= work[JACOBIAN, k] * work[STEP, k]
+                side -= work[JACOBIAN + 1, k] * work[STEP, k]
                 is_inside = False
         if is_inside:
             break
@@ -183,14 +183,14 @@ def step_along(bounds, q, work):
         rise = side = 0.0
         for k in range(dof):
             if work[HELD, k] == 0.0:
-                rise += work[SLOPES, k] * work[WISH, k]
-                side += work[SLOPES + 1, k] * work[WISH, k]
-        f, g = solve_slopes(work, rise, side, LEAST_DAMPING)
+                rise += work[JACOBIAN, k] * work[WISH, k]
+                side += work[JACOBIAN + 1, k] * work[WISH, k]
+        f, g = solve_damped(work, rise, side, LEAST_DAMPING)
         is_inside = True
         for k in range(dof):
             if work[HELD, k] != 0.0:
                 continue
-            step = work[WISH, k] - work[SLOPES, k] * f - work[SLOPES + 1, k] * g
+            step = work[WISH, k] - work[JACOBIAN, k] * f - work[JACOBIAN + 1, k] * g
             is_low, is_high = q[k] <= bounds[0, k], q[k] >= bounds[1, k]
             if (is_low and step < 0.0) or (is_high and step > 0.0):
                 work[HELD, k] = 1.0

@@ -98,20 +98,20 @@ def slide_goal(is_edge_free, resolution, chain, robot, obstacles, bounds, target
                 steepest = before[k] - q[k]
                 work[WISH, k] = steepest if direction == 0 else float64(k == direction - 1)
             step_along(bounds, q, work)
-            length = slope = 0.0
+            length = gradient = 0.0
             for k in range(dof):
                 length += work[STEP, k] ** 2
-                slope += work[STEP, k] * (before[k] - q[k])
+                gradient += work[STEP, k] * (before[k] - q[k])
             length = math.sqrt(length)
             advance = min(step, length) if direction == 0 else step
             # A straight step would not shorten: |g - s u|^2 >= |g|^2.
-            if not (advance >= finest and 2.0 * abs(slope) > advance * length):
+            if not (advance >= finest and 2.0 * abs(gradient) > advance * length):
                 continue
             for k in range(dof):
-                q[k] += math.copysign(advance / length, slope) * work[STEP, k]
+                q[k] += math.copysign(advance / length, gradient) * work[STEP, k]
             reach = project(robot, bounds, target, q, work)
-            # Less than a fifth of what the slope promised is creeping (Armijo 1966).
-            promised = advance * abs(slope) / (length * cost)
+            # Less than a fifth of the predicted decrease is no progress (Armijo 1966).
+            promised = advance * abs(gradient) / (length * cost)
             if reach < 0.0 or not distance(before, q) < cost - 0.2 * promised:
                 continue
             if is_goal_free(chain, robot, obstacles, q, reach) and is_edge_free(

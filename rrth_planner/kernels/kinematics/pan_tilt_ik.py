@@ -28,10 +28,10 @@ from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
 from rrth_planner.kernels.vectors import copy, distance
 
 TURN = 2.0 * math.pi
-# Joints of an arm that aims in closed form, at most: the search for a nearer goal looks at all
+# Joints of an arm that aims in closed form, at most: the search for a nearer goal tries all
 # neighbours on a grid, three times as many with every joint.
 MAX_CLOSED_DOF = 8
-SLOPES_ROOM = SQUARE_ROOM = MAX_CLOSED_DOF * MAX_CLOSED_DOF
+GRADIENTS_ROOM = SQUARE_ROOM = MAX_CLOSED_DOF * MAX_CLOSED_DOF
 # Steps of the search for the nearest goal, and halvings of each; the step of its differences [rad
 # or m], and the least relative gain that another step follows.
 MAX_NEWTON, MAX_HALVINGS, DIFFERENCE, FINE = 12, 6, 1e-6, 1e-5
@@ -59,7 +59,7 @@ def unwrap(angle, near, lower, upper):
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))
-def look_from_elbow(robot, target, q, v):
+def target_from_elbow(robot, target, q, v):
     """Write where the target is (3,), seen from the pan joint at rest; its base is at q [m]."""
     dof = q.shape[0]
     frame = scratch.floats(12)
@@ -123,7 +123,7 @@ def aim(robot, bounds, target, q_near, branch, q):
     All joints but the last two are given in q; the target is in the arm's base frame.
     """
     v = scratch.floats(3)
-    look_from_elbow(robot, target, q, v)
+    target_from_elbow(robot, target, q, v)
     return pan_and_tilt(robot, bounds, v, q_near, branch, q)
 
 
@@ -151,10 +151,10 @@ def goal_candidates(
             squared += (candidates[n, k] - q_near[k]) ** 2
         if squared > longest * longest:
             continue
-        look_from_elbow(robot, target, candidates[n], v)
+        target_from_elbow(robot, target, candidates[n], v)
         n_before = n
         for branch in range(2):
-            # A refused branch leaves the free joints where they are.
+            # A rejected branch leaves the free joints unchanged.
             if n > n_before:
                 for k in range(n_free):
                     candidates[n, k] = q_near[k] if i == 0 else candidates[n - 1, k]
@@ -167,7 +167,7 @@ def goal_candidates(
 
 @kernel(boolean(CHAIN, MAT, MAT, VEC, float64))
 def is_goal_free(chain, robot, obstacles, q, reach):
-    """Return whether q is free with its ray out to the target, and as far as it is guarded."""
+    """Return whether q is free with its ray out to the target, and up to the guard length."""
     ray_length = max(reach, robot[robot.shape[0] - 1, D])
     return is_configuration_free(q, ray_length, chain, obstacles)
 
@@ -178,10 +178,10 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
     Move q along its branch of the goal manifold to where it is nearest to q_from.
 
     Returns the reach there [m]. Gauss and Newton on the squared distance over the free joints,
-    slopes by differences, the step halved until the distance falls. -1: it left the manifold.
+    derivatives by differences, the step halved until the distance falls. -1: it left the manifold.
     """
     dof, n_free = q.shape[0], q.shape[0] - 2
-    slopes, square = scratch.floats(SLOPES_ROOM), scratch.floats(SQUARE_ROOM)
+    gradients, square = scratch.floats(GRADIENTS_ROOM), scratch.floats(SQUARE_ROOM)
     step, q_try = scratch.floats(MAX_CLOSED_DOF), scratch.floats(MAX_CLOSED_DOF)
     # Views of the length of q, as the kernels expect them.
     trial = q_try[:dof]
@@ -196,15 +196,15 @@ def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
             if aim(robot, bounds, target, q, branch, trial) < 0.0:
                 return reach
             for k in range(dof):
-                slopes[MAX_CLOSED_DOF * i + k] = (trial[k] - q[k]) / h
+                gradients[MAX_CLOSED_DOF * i + k] = (trial[k] - q[k]) / h
         for i in range(n_free):
             step[i] = 0.0
             for k in range(dof):
-                step[i] -= slopes[MAX_CLOSED_DOF * i + k] * (q[k] - q_from[k])
+                step[i] -= gradients[MAX_CLOSED_DOF * i + k] * (q[k] - q_from[k])
             for j in range(n_free):
                 total = 1e-9 if i == j else 0.0
                 for k in range(dof):
-                    total += slopes[MAX_CLOSED_DOF * i + k] * slopes[MAX_CLOSED_DOF * j + k]
+                    total += gradients[MAX_CLOSED_DOF * i + k] * gradients[MAX_CLOSED_DOF * j + k]
                 square[MAX_CLOSED_DOF * i + j] = total
         # Gauss: the matrix is positive.
         for i in range(n_free):

@@ -1,11 +1,11 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Taut paths that lean on boxes, moved along them to where the way round is shortest."""
+"""Elastic band (Quinlan and Khatib 1993): corners move along contacts while the path shortens."""
 
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.edge_contacts import GAP, PRESSED, SHARE, SLOPES
+from rrth_planner.kernels.collision.edge_contacts import GAP, GRADIENT, MULTIPLIER, SHARE
 from rrth_planner.kernels.jit import (
     CHAIN,
     CONTACTS,
@@ -17,32 +17,32 @@ from rrth_planner.kernels.jit import (
     OUT_VEC,
     VEC,
 )
-from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES, pull_taut, SPACING
+from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES, shortcut_path, SPACING
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
-# Gap that a path is left with, for the proof of its edges to succeed [m].
+# Gap that is left at contacts, for the edge checks to succeed [m].
 LEFT = 1e-4
-# Most corners and contacts of a path that are moved; sweeps of the balance.
+# Most corners and contacts of a path, and sweeps of the dual ascent.
 MAX_CORNERS, MAX_CONTACTS, MAX_SWEEPS = 16, 96, 30
-# Tries of a move, each of a shorter one, and corrections of each.
+# Attempts at a move, each shorter by a factor, and corrections of each.
 N_TRIES, SHORTER, N_CORRECTIONS = 3, 0.3, 4
 SQUARE = MAX_CORNERS * MAX_CORNERS
 # How far beyond a joint's limit a move may end before it is corrected; it is cut off there [rad].
 BEYOND = 1e-9
-# A new corner is put no nearer than this to another one [rad].
-SHORTEST_BEND = 0.03
-# Shorter edges pull no harder than one of this length [rad].
+# Least distance of a new corner from its neighbours [rad].
+LEAST_EDGE = 0.03
+# Shorter edges are as stiff as one of this length [rad].
 SHORTEST = 1e-3
-# What a round must gain to be worth another one, relative.
+# Least relative gain of an iteration for another one.
 WORTH = 5e-4
 
 
 @kernel(void(MAT, int64, OUT_VEC))
 def invert_springs(path, n, inverse):
     """
-    Write the inverse of the matrix by which the corners of a path pull at one another.
+    Write the inverse of the stiffness matrix of the corners of a path.
 
-    The sum of lengths l has the majorant sum of (l^2 / l_0 + l_0) / 2 that touches it at the
+    The sum of lengths l has the majorant sum of (l^2 / l_0 + l_0) / 2 that equals it at the
     present path (as in Weiszfeld 1937): springs of stiffness 1 / l_0. Row i of the inverse stands
     at MAX_CORNERS i. Gauss and Jordan; the matrix is tridiagonal and positive.
     """
@@ -77,7 +77,7 @@ def invert_springs(path, n, inverse):
 
 @kernel(void(MAT, int64, OUT_VEC, float64, OUT_MAT))
 def relax(path, n, inverse, share, moves):
-    """Write a share of the moves (n - 2, dof) by which the corners come to rest without boxes."""
+    """Write a share of the moves (n - 2, dof) to the equilibrium of the corners without boxes."""
     m = n - 2
     first = 1.0 / max(SHORTEST, distance(path[0], path[1]))
     last = 1.0 / max(SHORTEST, distance(path[n - 2], path[n - 1]))
@@ -91,9 +91,9 @@ def relax(path, n, inverse, share, moves):
 @kernel(int64(CONTACTS, CHAIN, MAT, MAT, MAT, MAT, int64, OUT_MAT, OUT_INTS, OUT_VEC, int64))
 def add_constraints(find, chain, robot, obstacles, path, moved, e, contacts, edges, least, n):
     """
-    Append what keeps edge e off the boxes, to first order; return the number of constraints.
+    Append the linearized contact constraints of edge e; return the number of constraints.
 
-    The edge leans where it is in `moved`; the constraints are on the moves from `path`.
+    Contacts are those of the edge in `moved`; the constraints apply to the moves from `path`.
     """
     if n >= contacts.shape[0]:
         return n
@@ -105,13 +105,13 @@ def add_constraints(find, chain, robot, obstacles, path, moved, e, contacts, edg
         for k in range(path.shape[1]):
             move = (1.0 - share) * (moved[e, k] - path[e, k])
             move += share * (moved[e + 1, k] - path[e + 1, k])
-            least[i] += contacts[i, SLOPES + k] * move
+            least[i] += contacts[i, GRADIENT + k] * move
     return n + n_found
 
 
 @kernel(int64(MAT, MAT, int64, MAT, OUT_MAT, OUT_INTS, OUT_VEC, int64))
 def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
-    """Append a constraint for each joint limit that the moves pass; return the total."""
+    """Append a constraint for each joint limit that the moves exceed; return the total."""
     for i in range(n - 2):
         for k in range(path.shape[1]):
             q = path[i + 1, k] + moves[i, k]
@@ -122,7 +122,7 @@ def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
                 contacts[n_found, column] = 0.0
             # At the end of the edge before: the corner itself.
             edges[n_found], contacts[n_found, SHARE] = i, 1.0
-            contacts[n_found, SLOPES + k] = 1.0 if is_low else -1.0
+            contacts[n_found, GRADIENT + k] = 1.0 if is_low else -1.0
             at = path[i + 1, k]
             least[n_found] = bounds[0, k] - at if is_low else at - bounds[1, k]
             n_found += 1
@@ -132,18 +132,18 @@ def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
 @kernel(void(OUT_VEC, OUT_MAT, OUT_INTS, OUT_VEC, int64, int64, OUT_MAT))
 def constrain(inverse, contacts, edges, least, n, m, moves):
     """
-    Change the moves of m corners, least in the sense of the springs, to keep n constraints.
+    Correct the moves of m corners, by the least change in the spring norm, to keep n constraints.
 
     Dual ascent, a constraint at a time (Hildreth 1957).
     """
     dof = moves.shape[1]
     for i in range(n):
-        contacts[i, PRESSED] = 0.0
+        contacts[i, MULTIPLIER] = 0.0
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i in range(n):
             e, share = edges[i], contacts[i, SHARE]
-            # Corners before and behind the edge, and what they have to do with each other.
+            # Corners before and after the edge, and their coupling.
             a, b = e - 1, e
             own = along = 0.0
             if a >= 0:
@@ -154,18 +154,18 @@ def constrain(inverse, contacts, edges, least, n, m, moves):
                 own += 2.0 * share * (1.0 - share) * inverse[MAX_CORNERS * a + b]
             squared = 0.0
             for k in range(dof):
-                slope = contacts[i, SLOPES + k]
-                squared += slope * slope
+                gradient = contacts[i, GRADIENT + k]
+                squared += gradient * gradient
                 if a >= 0:
-                    along += (1.0 - share) * slope * moves[a, k]
+                    along += (1.0 - share) * gradient * moves[a, k]
                 if b < m:
-                    along += share * slope * moves[b, k]
+                    along += share * gradient * moves[b, k]
             own *= squared
             if own < 1e-9:
                 continue
-            raised = max(0.0, contacts[i, PRESSED] + (least[i] - along) / own)
-            step = raised - contacts[i, PRESSED]
-            contacts[i, PRESSED] = raised
+            raised = max(0.0, contacts[i, MULTIPLIER] + (least[i] - along) / own)
+            step = raised - contacts[i, MULTIPLIER]
+            contacts[i, MULTIPLIER] = raised
             for j in range(m):
                 lever = 0.0
                 if a >= 0:
@@ -173,7 +173,7 @@ def constrain(inverse, contacts, edges, least, n, m, moves):
                 if b < m:
                     lever += share * inverse[MAX_CORNERS * j + b]
                 for k in range(dof):
-                    moves[j, k] += step * lever * contacts[i, SLOPES + k]
+                    moves[j, k] += step * lever * contacts[i, GRADIENT + k]
             change = max(change, abs(step) * own)
         # Of the gap, in metres.
         if change < 1e-7:
@@ -194,16 +194,16 @@ def shift(bounds, path, n, moves, moved):
 @kernel(
     int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, OUT_MAT, OUT_INTS)
 )
-def lean(
+def relax_band(
     is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, contacts, edges
 ):
     """
     Move all corners of a path to where it is shorter, without entering a box.
 
-    Springs between the corners pull them straight, the places where edges lean on boxes push
-    back; where the moved path finds new such places, they are added and the balance is sought
-    again. The new edges are proven before they are taken. Returns the number of contacts that the
-    balance knew, less than 0 where no such move was found.
+    Springs between the corners straighten the path, contacts of edges with boxes constrain it.
+    New contacts of the moved path are added, and the equilibrium is solved again. New edges are
+    checked before they are accepted. Returns the number of contacts, less than 0 where no such
+    move was found.
     """
     m, length = n - 2, path_length(path, n)
     inverse, least = scratch.floats(SQUARE), scratch.floats(MAX_CONTACTS)
@@ -249,27 +249,27 @@ def lean(
                 for i in range(1, n - 1):
                     copy(moved[i], path[i])
                 return n_found
-        # The images of the boxes bend away: of a shorter move with the square of its length.
+        # The error of the linearized contacts grows with the square of the move.
         share *= SHORTER
     return -1 - n_found
 
 
 @kernel(int64(OUT_MAT, int64, MAT, OUT_INTS, int64))
-def bend(path, n, contacts, edges, n_found):
+def insert_corner(path, n, contacts, edges, n_found):
     """
-    Put a corner where the path presses hardest within an edge; return the new number of waypoints.
+    Insert a corner at the contact within an edge with the greatest multiplier; return the new n.
 
-    A straight edge cannot give way to what presses on its middle, two edges can.
+    A straight edge cannot deform at a contact in its middle, two edges can.
     """
-    hardest, row = 0.0, -1
+    greatest, row = 0.0, -1
     for i in range(n_found):
         share = contacts[i, SHARE]
         if edges[i] + 1 >= n:
             continue
         length = distance(path[edges[i]], path[edges[i] + 1])
-        is_inside = min(share, 1.0 - share) * length > SHORTEST_BEND
-        if is_inside and contacts[i, PRESSED] > hardest:
-            hardest, row = contacts[i, PRESSED], i
+        is_inside = min(share, 1.0 - share) * length > LEAST_EDGE
+        if is_inside and contacts[i, MULTIPLIER] > greatest:
+            greatest, row = contacts[i, MULTIPLIER], i
     if row < 0 or n >= min(path.shape[0], MAX_CORNERS + 2):
         return n
     e, share = edges[row], contacts[row, SHARE]
@@ -281,21 +281,21 @@ def bend(path, n, contacts, edges, n_found):
 
 
 @kernel(int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC))
-def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how):
+def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how):
     """
-    Pull a path taut and let it lean, in turn, until it gets no shorter (`SHORTEN`).
+    Alternate shortcuts and the elastic band until a path gets no shorter (`SHORTEN`).
 
-    how: settings by the indices of `taut`.
+    how: settings, entries as in `shortcut`.
     """
     spacing, enough = how[SPACING], how[ENOUGH]
-    n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
-    contacts = np.empty((MAX_CONTACTS, SLOPES + path.shape[1]))
+    n = shortcut_path(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
+    contacts = np.empty((MAX_CONTACTS, GRADIENT + path.shape[1]))
     edges = np.empty(MAX_CONTACTS, np.int64)
-    length, is_bent = path_length(path, n), False
+    length, has_new_corner = path_length(path, n), False
     for _ in range(int64(how[MOVES])):
         if n < 3 or n > MAX_CORNERS + 2:
             break
-        n_found = lean(
+        n_found = relax_band(
             is_edge_free,
             find,
             resolution,
@@ -309,24 +309,26 @@ def tighten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
             edges,
         )
         if n_found >= 0:
-            n = pull_taut(
+            n = shortcut_path(
                 is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough
             )
         shorter = path_length(path, n)
         is_done = shorter > length * (1.0 - WORTH)
         length = shorter
         if not is_done:
-            is_bent = False
+            has_new_corner = False
             continue
-        # It leans as well as it can with these corners: one more try with another corner.
-        if is_bent:
+        # Converged with these corners: try once more with another one.
+        if has_new_corner:
             break
         n_before = n
-        n = bend(path, n, contacts, edges, n_found if n_found >= 0 else -1 - n_found)
-        is_bent = n > n_before
-        if not is_bent:
+        n = insert_corner(path, n, contacts, edges, n_found if n_found >= 0 else -1 - n_found)
+        has_new_corner = n > n_before
+        if not has_new_corner:
             break
-    if is_bent:
-        # A corner that brought nothing goes again.
-        n = pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
+    if has_new_corner:
+        # A corner without a gain is removed again.
+        n = shortcut_path(
+            is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough
+        )
     return n

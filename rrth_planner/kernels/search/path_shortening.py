@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Paths made shorter, quickly at first and well later, while their goal slides."""
+"""Path shortening, coarse at first and fine later, with goals that slide along the manifold."""
 
 from numba.core.types import float64, int64
 from rrth_planner.kernels import scratch
@@ -18,16 +18,16 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES
 from rrth_planner.kernels.vectors import path_length
 
-# Entries of the settings of `shorten`: those of `taut`, and, for the steps as printed, the
+# Entries of the settings of `shorten`: those of `shortcut`, and, for the steps as printed, the
 # spacings of the points P_T and P_C.
 N_HOW = 5
-# What pulling must gain to go on where a path is only compared with others, relative.
+# Least relative gain of a round of shortcuts while paths are only compared.
 LOOSE = 1e-2
 # Finest step of a goal along its manifold [rad].
 FINEST_SLIDE = 2e-3
-# Slides of a goal, those of a path that leans; what a slide must gain to be worth another one,
-# relative.
-MAX_SLIDES, MAX_LEANS, SLID = 30, 1, 1e-3
+# Most slides of a goal, and most with the elastic band; least relative gain of a slide for another
+# one.
+MAX_SLIDES, MAX_BAND_SLIDES, SLID = 30, 1, 1e-3
 
 
 @kernel(
@@ -47,7 +47,7 @@ MAX_SLIDES, MAX_LEANS, SLID = 30, 1, 1e-3
         int64,
     )
 )
-def pull(
+def shorten_coarsely(
     is_edge_free,
     find,
     shorten,
@@ -63,18 +63,18 @@ def pull(
     n,
 ):
     """
-    Pull a path taut and slide its goal, in turn, until little is gained; return its size.
+    Alternate shortcuts and slides of the goal until little is gained; return n.
 
-    Loosely where it is to lean later: enough to tell which of some paths is the shortest.
+    Coarse where the elastic band follows later: enough to compare paths by length.
     """
-    quick = scratch.floats(N_HOW)
+    coarse = scratch.floats(N_HOW)
     for i in range(N_HOW):
-        quick[i] = how[i]
+        coarse[i] = how[i]
     if how[MOVES] > 0.0:
-        quick[MOVES], quick[ENOUGH] = 0.0, LOOSE
+        coarse[MOVES], coarse[ENOUGH] = 0.0, LOOSE
     for _ in range(MAX_SLIDES):
         n = shorten(
-            is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, quick
+            is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, coarse
         )
         gain = slide_goal(
             is_edge_free,
@@ -110,7 +110,7 @@ def pull(
         int64,
     )
 )
-def settle(
+def shorten_finely(
     is_edge_free,
     find,
     shorten,
@@ -125,10 +125,10 @@ def settle(
     path,
     n,
 ):
-    """Let a path that is pulled lean on the boxes, its goal about where it will be; same."""
+    """Apply the elastic band to a path from `shorten_coarsely`, and slide its goal; return n."""
     if how[MOVES] == 0.0:
         return n
-    for _ in range(MAX_LEANS):
+    for _ in range(MAX_BAND_SLIDES):
         n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
         gain = slide_goal(
             is_edge_free,

@@ -162,7 +162,7 @@ def advance(
             step = adapted_step(
                 free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
             )
-            # What is left of the way is known to be blocked.
+            # The rest of the extension is known to be blocked.
             if distance(q_near, q_new) <= step:
                 break
             steer(q_near, q_new, step, q)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H: grow, pull taut, and begin again round another way (Zou et al. 2024)."""
+"""RRT-H: grow, shortcut, and repeat while avoiding earlier paths (Zou et al. 2024)."""
 
 import math
 
@@ -28,21 +28,21 @@ from rrth_planner.kernels.jit import (
     RNG,
     VEC,
 )
-from rrth_planner.kernels.search.path_shortening import pull, settle
+from rrth_planner.kernels.search.path_shortening import shorten_coarsely, shorten_finely
 from rrth_planner.kernels.search.rrt import advance as grow
-from rrth_planner.kernels.search.shortcut import TAUT
+from rrth_planner.kernels.search.shortcut import LEAST_GAIN
 from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Entries of `settings`: those of the options, and by when improvement ends [s].
 STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)
 MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, HOW = range(8, 13)
-# Entries of `state`: growths begun, whether one is on its way, draws of it and in all, waypoints
+# Entries of `state`: growths begun, whether one is active, draws of it and in all, waypoints
 # of the best and of the first raw path, points of the club, rows of the history, in which of the
 # two pairs of trees growth goes on, which one led to the best path, why the search ended, whether
-# the best path is still to settle.
+# the best path is still to be shortened finely.
 BEGUN, GROWING, DRAWN, SAMPLES, N_BEST, N_RAW, N_CLUB, N_HISTORY, PAIR, BEST_PAIR, END = range(11)
-TO_SETTLE, STATE_SIZE = 11, 12
+TO_SHORTEN, STATE_SIZE = 11, 12
 # Values of state[END]: not yet, all growths done, no path found, no time left to improve.
 RUNNING, DONE, FAILED, CLOCK = range(4)
 # Rows of `paths`.
@@ -51,25 +51,24 @@ WORK, BEST, RAW = range(3)
 COST, DRAWS, TIME = range(3)
 # Roots of the goal tree: more goals than this only slow its nearest-neighbour search.
 MAX_ROOTS = 64
-# Draws between two looks at the clock.
+# Draws between two checks of the clock.
 BATCH = 100
-# Draws of later growths lie where a path this much longer than the best one can lead: what is
-# first found is longer than what becomes of it.
+# Draws of later growths may lead to paths this much longer than the best one: shortening follows.
 WIDER = 1.3
-# The paths of so many first growths are only pulled; then the shortest one settles, which takes
-# as long as several growths. Later paths settle at once, where they are no longer than this times
-# the best one.
-N_QUICK, PROMISING = 4, 1.2
-# Waypoints nearer than this are one [rad].
+# The paths of so many first growths are shortened coarsely; then the shortest one finely, which
+# takes as long as several growths. Later paths are shortened finely at once, if they are no longer
+# than this times the best one.
+N_COARSE, PROMISING = 4, 1.2
+# Waypoints closer than this are merged [rad].
 TWIN = 1e-9
 
 
 @kernel(void(OUT_CUBE, int64, int64, OUT_INTS, OUT_MAT))
 def keep_best(paths, n, pair, state, history):
-    """Keep the path at work as the best one, without twins of its waypoints, and note when."""
+    """Store the working path as the best one, without duplicate waypoints, and its time."""
     m = 0
     for i in range(n):
-        # The last waypoint stays, and what is its twin goes.
+        # The last waypoint stays, its duplicates are dropped.
         is_twin = i < n - 1 and distance(paths[WORK, i], paths[WORK, n - 1]) < TWIN and i > 0
         is_twin |= m > 0 and i < n - 1 and distance(paths[WORK, i], paths[BEST, m - 1]) < TWIN
         if is_twin:
@@ -78,7 +77,7 @@ def keep_best(paths, n, pair, state, history):
             paths[BEST, m, k] = paths[WORK, i, k]
         m += 1
     state[N_BEST], state[BEST_PAIR] = m, pair
-    # The last row is that of the best path, also where there is no room for another one.
+    # The last row is that of the best path, even if the buffer is full.
     row = min(state[N_HISTORY], history.shape[0] - 1)
     history[row, COST] = path_length(paths[BEST], m)
     history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
@@ -122,10 +121,10 @@ def go_straight(
     history,
 ):
     """
-    Take the straight edge to the nearest goal that has a free one as the best path.
+    Store the straight edge to the nearest goal that has a free one as the best path.
 
     goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
-    first n_bent are known to have none.
+    first n_bent are known to have no free edge.
     """
     is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
     find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
@@ -134,7 +133,7 @@ def go_straight(
         if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
             for k in range(goals.shape[1]):
                 paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
-            n = pull(
+            n = shorten_coarsely(
                 is_edge_free,
                 find,
                 shorten,
@@ -158,7 +157,7 @@ def count_useful(goals, q_start, cost):
     """Return how many of the goals, nearest first, a path shorter than that can lead to."""
     n = 0
     while n < min(goals.shape[0], MAX_ROOTS):
-        if distance(goals[n], q_start) >= cost * (1.0 - TAUT):
+        if distance(goals[n], q_start) >= cost * (1.0 - LEAST_GAIN):
             break
         n += 1
     return n
@@ -176,7 +175,7 @@ def plant(goals, q_start, n_goals, tree_q, parents, sizes):
 
 
 @kernel(void(OUT_CUBE, int64, OUT_MAT, OUT_INTS))
-def remember(paths, n, club, state):
+def store_raw(paths, n, club, state):
     """Add the inner points of a raw path to the path club, and keep the first raw path."""
     if state[N_RAW] == 0:
         for i in range(n):
@@ -239,11 +238,11 @@ def advance(
     history,
 ):
     """
-    Grow first paths and pull each taut, until state[END] says why it ended or time is `until` [s].
+    Grow and shorten paths until state[END] holds the reason why it ended, or until a time [s].
 
-    Growths after the first path keep away from the path club, the points of all raw paths, and
-    draw only where a shorter path can lead. Of the first ones only the shortest path settles.
-    tree_q (2, 2, capacity, dof): the pair of trees at work and the one that led to the best path.
+    Growths after the first path avoid the path club, the points of all raw paths, and draw only
+    where a shorter path is possible. Of the first paths only the shortest is shortened finely.
+    tree_q (2, 2, capacity, dof): the growing pair of trees, and the pair of the best path.
     """
     is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
     find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
@@ -263,7 +262,7 @@ def advance(
                 state[END] = DONE
             elif state[N_BEST] > 0 and now() > settings[IMPROVE_UNTIL]:
                 state[END] = CLOCK
-            if state[TO_SETTLE] == 1 and (state[END] != RUNNING or state[BEGUN] >= N_QUICK):
+            if state[TO_SHORTEN] == 1 and (state[END] != RUNNING or state[BEGUN] >= N_COARSE):
                 n, pair, is_new = state[N_BEST], state[BEST_PAIR], False
                 for i in range(n):
                     copy(paths[BEST, i], paths[WORK, i])
@@ -305,9 +304,9 @@ def advance(
             if meeting[0] >= 0:
                 state[GROWING] = 0
                 n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
-                remember(paths, n, club, state)
+                store_raw(paths, n, club, state)
             if n > 0:
-                n = pull(
+                n = shorten_coarsely(
                     is_edge_free,
                     find,
                     shorten,
@@ -324,9 +323,9 @@ def advance(
                 )
             elif state[DRAWN] >= budget or n_nodes >= tree_q.shape[2] - 1:
                 state[GROWING] = 0
-        is_quick = is_new and state[BEGUN] <= N_QUICK
-        if n > 0 and not is_quick and path_length(paths[WORK], n) <= PROMISING * cost:
-            n = settle(
+        is_coarse = is_new and state[BEGUN] <= N_COARSE
+        if n > 0 and not is_coarse and path_length(paths[WORK], n) <= PROMISING * cost:
+            n = shorten_finely(
                 is_edge_free,
                 find,
                 shorten,
@@ -342,9 +341,9 @@ def advance(
                 n,
             )
         if not is_new:
-            state[TO_SETTLE] = 0
+            state[TO_SHORTEN] = 0
         if n > 0 and path_length(paths[WORK], n) < cost:
             keep_best(paths, n, pair, state, history)
-            state[PAIR], state[TO_SETTLE] = 1 - pair, int64(is_quick)
+            state[PAIR], state[TO_SHORTEN] = 1 - pair, int64(is_coarse)
         if now() > until:
             break

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""RRT-H's three steps as printed (Zou et al. 2024, section 2), to check the paper by."""
+"""RRT-H's three steps as printed (Zou et al. 2024, section 2), to reproduce the paper."""
 
 from numba.core.types import float64, int64
 import numpy as np
@@ -27,7 +27,7 @@ def first_contact(is_edge_free, resolution, chain, robot, obstacles, q_from, q_t
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
-def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks):
+def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks):
     """
     Do step 1 in place: the lines from P_i to the points P_T on P_i+1 -> P_i+2, one by one.
 
@@ -119,9 +119,13 @@ def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     [rad].
     """
     least, targets, checks = how[SPACING], how[3], how[4]
-    n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
+    n = shortcut_forward(
+        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks
+    )
     reverse_path(path, n)
-    n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks)
+    n = shortcut_forward(
+        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks
+    )
     reverse_path(path, n)
     return cut_corners(
         is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least

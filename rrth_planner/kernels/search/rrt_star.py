@@ -141,7 +141,7 @@ def add_node(
     Add q to a tree of n nodes, then rewire; return 1 and how many were rewired, 0: not reached.
 
     nodes (capacity, dof), links (3, capacity), costs (capacity,). `near`, the nearest node, is the
-    parent unless one within the radius makes a shorter way (ChooseParent); afterwards q becomes
+    parent unless one within the radius gives a shorter path (ChooseParent); afterwards q becomes
     the parent of those to which it makes one (Rewire).
     """
     if not is_edge_free(nodes[near], q, resolution, chain, robot, obstacles):

@@ -9,7 +9,7 @@ from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, RNG, VEC
 from rrth_planner.kernels.search.random import normal, uniform
 from rrth_planner.kernels.vectors import distance
 
-# Draws near an end: from this share of the way to the other end on.
+# Least distance of draws near an end, as a share of the distance to the other end.
 NEAREST = 0.1
 
 
@@ -35,7 +35,7 @@ def draw_ball(centre, radius, bounds, rng, q):
 @kernel(boolean(VEC, VEC, float64, MAT, RNG, OUT_VEC))
 def draw_near(q_end, q_far, best_cost, bounds, rng, q):
     """
-    Draw at any scale round one end of a path: the way out of a tight place is short.
+    Draw at any scale around one end of a path, for starts and goals in narrow places.
 
     The logarithm of the distance is uniform, up to the distance of the other end. False where 8
     draws all fell outside the bounds, or beyond what could shorten a path of best_cost.

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The three steps of RRT-H that pull a path taut (Zou et al. 2024, section 2, corrected)."""
+"""Path shortcutting by the three steps of RRT-H (Zou et al. 2024, section 2, corrected)."""
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
@@ -14,11 +14,11 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
-# Entries of the settings of `shorten` (kernels.jit.SHORTEN): k of the paper [rad], rounds at most
-# in which corners move, what pulling must gain to go on, relative.
+# Entries of the settings of `shorten` (kernels.jit.SHORTEN): k of the paper [rad], most
+# iterations of the elastic band, least relative gain of a round of shortcuts.
 SPACING, MOVES, ENOUGH = range(3)
-# What a gain in length must exceed to count, relative.
-TAUT = 1e-5
+# Least relative gain in length that counts.
+LEAST_GAIN = 1e-5
 # Rounds of the three steps; they stop by themselves when nothing is gained.
 MAX_ROUNDS = 100
 
@@ -40,16 +40,16 @@ def reverse_path(path, n):
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
     """
-    Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 as far as P_i sees it.
+    Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 while P_i -> P_i+1 is free.
 
-    Where P_i sees all of the segment, P_i+1 goes and P_i stays for the next pair (moving on, as
-    printed, leaves corners). The farthest P_T still seen is found by bisection, to `spacing`.
+    Where P_i -> P_i+2 is free, P_i+1 is removed and P_i stays for the next pair (moving on, as
+    printed, leaves corners). The farthest free P_T is found by bisection, to `spacing`.
     Step 2 is the same on the reversed path.
     """
     dof = path.shape[1]
-    q_seen, q_try = np.empty(dof), np.empty(dof)
+    q_free, q_try = np.empty(dof), np.empty(dof)
     i = 0
     while i + 2 < n:
         if is_edge_free(path[i], path[i + 2], resolution, chain, robot, obstacles):
@@ -61,16 +61,16 @@ def pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spa
             share = 0.5 * (low + high)
             for k in range(dof):
                 q_try[k] = path[i + 1, k] + share * (path[i + 2, k] - path[i + 1, k])
-            # The rest of the old segment stays an edge, so it is proven again on its own.
+            # The rest of the old segment becomes an edge of its own, so it is checked too.
             if is_edge_free(path[i], q_try, resolution, chain, robot, obstacles) and is_edge_free(
                 q_try, path[i + 2], resolution, chain, robot, obstacles
             ):
                 low = share
-                copy(q_try, q_seen)
+                copy(q_try, q_free)
             else:
                 high = share
         if low > 0.0:
-            copy(q_seen, path[i + 1])
+            copy(q_free, path[i + 1])
         i += 1
     return n
 
@@ -148,21 +148,21 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
 
 
 @kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
-def pull_taut(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough):
+def shortcut_path(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough):
     """
     Repeat the three steps until the path gets no shorter; return its number of waypoints.
 
-    spacing: k of the paper [rad]. enough: what a round must gain to be worth another one,
-    relative; TAUT: next to nothing. Every edge that enters the path has been proven by the edge
+    spacing: k of the paper [rad]. enough: least relative gain of a round for another one; at
+    least LEAST_GAIN. Every edge that enters the path has been proven by the edge
     check; the path never gets longer.
     """
     length = path_length(path, n)
     for _ in range(MAX_ROUNDS):
         if n < 3:
             break
-        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        n = shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         reverse_path(path, n)
-        n = pull_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        n = shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         reverse_path(path, n)
         n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
         shorter = path_length(path, n)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trees in joint space: nearest node, one step towards a point, the way back to the root."""
+"""Trees in joint space: nearest node, one step towards a point, the path back to the root."""
 
 import math
 
@@ -20,7 +20,7 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.vectors import copy, distance
 
-# Nodes that the search for the nearest one looks at in one go.
+# Nodes that the nearest-neighbour search checks at once.
 CHUNK = 256
 ROOM = CHUNK + 8
 
@@ -69,7 +69,7 @@ def nearest(nodes, size, q):
 
 @kernel(void(VEC, VEC, float64, OUT_VEC))
 def steer(q_near, q_towards, step_size, q_new):
-    """Write the point at most `step_size` from q_near on the way to q_towards."""
+    """Write the point at most `step_size` from q_near towards q_towards."""
     length = distance(q_near, q_towards)
     share = 1.0 if length <= step_size else step_size / length
     for k in range(q_new.shape[0]):

@@ -1,14 +1,14 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A quick search for a stop along a motion, for when there is no time for a proof."""
+"""The fail-safe stop along a motion: a fast search, without a certificate."""
 
 import math
 
 from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, VEC
-from rrth_planner.kernels.trajectory.lookahead import derivatives_on, look_ahead, MOST, TIME, WAY
-from rrth_planner.kernels.trajectory.stop_profile import stop_way
+from rrth_planner.kernels.trajectory.lookahead import derivatives_on, look_ahead, MOST, S, TIME
+from rrth_planner.kernels.trajectory.stop_profile import stop_s
 from rrth_planner.kernels.trajectory.stop_search import soonest_stop
 from rrth_planner.kernels.trajectory.stop_trajectory import (
     CLOSEST,
@@ -21,22 +21,22 @@ from rrth_planner.kernels.trajectory.stop_trajectory import (
     TICK,
 )
 
-# How far is looked ahead at first, in times that a stop on a line takes; then so many times
-# further. Cells are no longer than this [s], but for their number.
+# First window of the search, in durations of a stop on a line; its growth; greatest length of a
+# cell [s], and greatest number of cells, which has priority.
 AHEAD, FURTHER, CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
-# The shares of the limits that may be used: at first a little more, since the motion itself may be
-# at one when it begins to stop; less where the points of the stop turn out to take too much.
+# Shares of the limits that are tried: at first a little more than 1, since the motion may itself
+# be at a limit when the stop begins; less where the points of the stop exceed the limits.
 RESERVES = (1.003, 0.985, 0.95, 0.85)
 
 
 @kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE))
-def rest_of_motion(curves, times, now, last, points, states):
-    """Write the points of a motion from now up to one at which it rests; return their number."""
+def remaining_motion(curves, times, now, last, points, states):
+    """Write the points of a motion from now to one at which it is at rest; return their number."""
     state, n, dof, kept = np.empty((4, curves.shape[2])), 0, curves.shape[2], now
     for i in range(last + 1):
         if i < last and times[i + 1] - now < CLOSEST_FIRST:
             continue
-        # Points that are closer than whole nanoseconds can tell are none.
+        # Skip points too close to be represented in whole nanoseconds.
         is_close = times[i] - kept < CLOSEST_FIRST or times[last] - times[i] < CLOSEST_FIRST
         if n > 0 and i < last and is_close:
             continue
@@ -54,7 +54,7 @@ def rest_of_motion(curves, times, now, last, points, states):
 
 @kernel(int64(CUBE, VEC, float64))
 def first_rest(curves, times, now):
-    """Return the first point of a motion after some time [s] at which it stands still."""
+    """Return the first point of a motion after some time [s] at which it is at rest."""
     n = curves.shape[0]
     for i in range(1, n):
         if times[i] > now and not curves[i, 1:3].any():
@@ -63,8 +63,8 @@ def first_rest(curves, times, now):
 
 
 @kernel(float64(VEC, float64))
-def off_points(times, begin):
-    """Return the next time that is at a point of a motion, or not close to any [s]."""
+def avoid_points(times, begin):
+    """Return the next time that is a point of a motion, or not close to any [s]."""
     for i in range(times.shape[0]):
         if abs(times[i] - begin) < CLOSEST:
             begin = times[i] if times[i] >= begin else times[i] + CLOSEST
@@ -72,8 +72,8 @@ def off_points(times, begin):
 
 
 @kernel(float64(CUBE, VEC, float64, MAT))
-def first_look(curves, times, time, limits):
-    """Return how far to look ahead from a time for a stop, as if the arm moved on a line [s]."""
+def first_window(curves, times, time, limits):
+    """Return the first window of the search for a stop, as if the arm moved on a line [s]."""
     state, window, piece = np.empty((4, curves.shape[2])), 0.0, 0
     while times[piece + 1] < time:
         piece += 1
@@ -97,7 +97,7 @@ def points_between(times, begin, end):
 @kernel(int64(CUBE, VEC, float64, float64, VEC, VEC, VEC, OUT_VEC, OUT_CUBE), is_short=True)
 def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, points, states):
     """
-    Write the points of the soonest stop that is found; return their number.
+    Write the points of the soonest stop found; return their number.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     times : array, shape (n + 1,)
         [s].
     now, lead : float
-        When the stop is asked for, within the motion, and how long it goes on as it is [s].
+        Time of the request within the motion, and time for which it continues unchanged [s].
     velocity, acceleration, jerk : array, shape (dof,)
         Limits.
     points : array, shape (m,)
@@ -119,10 +119,10 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     limits = np.empty((3, dof))
     limits[0], limits[1], limits[2] = velocity, acceleration, jerk
     rest = first_rest(curves, times, now)
-    end, begin = times[rest], off_points(times, now + lead)
+    end, begin = times[rest], avoid_points(times, now + lead)
     window = 0.0
     while begin + window < end:
-        window = FURTHER * window if window > 0.0 else first_look(curves, times, begin, limits)
+        window = FURTHER * window if window > 0.0 else first_window(curves, times, begin, limits)
         until = min(begin + window, end)
         step = max(CELL, (until - now) / MOST_CELLS)
         # A piece of the motion may end with a shorter cell, and so may the lead.
@@ -137,8 +137,8 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
             row = soonest_stop(rows, geometry, pieces, first, n, limits, end, reserve, phases)
             if row < 0:
                 break
-            last, reached = row, stop_way(phases)
-            while rows[last + 1, WAY] < reached:
+            last, reached = row, stop_s(phases)
+            while rows[last + 1, S] < reached:
                 last += 1
             for spacing in SPACINGS:
                 m = stop_times(rows, pieces, phases, row, spacing, points)
@@ -148,4 +148,4 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
                     break
                 if is_on_path(curves, times, rows, pieces, phases, row, limits, at, states):
                     return m
-    return rest_of_motion(curves, times, now, rest, points, states)
+    return remaining_motion(curves, times, now, rest, points, states)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What lies ahead on a running motion: its way, cut into cells, and what it asks of the joints."""
+"""The remaining motion by its path parameter s, in cells: s_dot, s_ddot, derivatives by s."""
 
 import math
 
@@ -10,19 +10,19 @@ from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBES, OUT_INTS, OUT
 
 CUBES = Array(float64, 4, 'C', readonly=True)
 # Columns of `rows`, one for the begin of each cell and one for the end of the last: time within
-# the motion [s], way [-], speed along the way and its slope [1/s, 1/s^2].
-TIME, WAY, SPEED, SLOPE = range(4)
-# `geometry` (cells, 3, 3, dof): of a cell at its begin, then at its end, the direction of the way
-# and how that bends with the way, once and twice derived; then what the motion has done from the
-# first cell on: the greatest velocity, acceleration and jerk, or the limits where those are more.
+# the motion [s], path parameter s [-], s_dot and s_ddot [1/s, 1/s^2].
+TIME, S, S_DOT, S_DDOT = range(4)
+# `geometry` (cells, 3, 3, dof): of a cell at its begin, then at its end, the first, second and
+# third derivative of q by s; then the greatest velocity, acceleration and jerk of the motion since
+# the first cell, or the limits where those are more.
 BEGIN, END, MOST = range(3)
-# Abscissae and weights of Gauss and Legendre: exact for the speed on a straight edge, which is a
+# Abscissae and weights of Gauss and Legendre: exact for s_dot on a straight edge, which is a
 # polynomial of degree 4.
 NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
-# Rounds that turn a way into a time: each doubles the digits.
+# Newton iterations from s to a time: each doubles the digits.
 ROUNDS = 6
-# A speed that counts as none, so that nothing is divided by zero [1/s].
+# Least divisor s_dot [1/s].
 TINY = 1e-9
 
 
@@ -31,7 +31,7 @@ def derivatives_on(curves, times, piece, time, states):
     """
     Write position, velocity, acceleration and jerk of one piece at a time, (4, dof).
 
-    A little before and after it the piece goes on, but by no more than half of itself.
+    The piece is extrapolated to both sides by at most half of its width.
     """
     width = times[piece + 1] - times[piece]
     u, scale = min(max((time - times[piece]) / width, -0.5), 1.5), 1.0 / width
@@ -45,8 +45,8 @@ def derivatives_on(curves, times, piece, time, states):
 
 
 @kernel(float64(CUBE, VEC, int64, float64, MAT))
-def way_speed(curves, times, piece, time, limits):
-    """Return the speed along the way: joints are weighed by their greatest accelerations."""
+def s_dot_at(curves, times, piece, time, limits):
+    """Return s_dot, the norm of the velocities, each over the acceleration limit of its joint."""
     width = times[piece + 1] - times[piece]
     u, total = (time - times[piece]) / width, 0.0
     for k in range(curves.shape[2]):
@@ -58,22 +58,22 @@ def way_speed(curves, times, piece, time, limits):
 
 
 @kernel(float64(CUBE, VEC, int64, float64, float64, MAT))
-def way_between(curves, times, piece, begin, end, limits):
-    """Return the way between two times of one piece [-]."""
+def s_between(curves, times, piece, begin, end, limits):
+    """Return the change of s between two times of one piece [-]."""
     width, total = end - begin, 0.0
     for i in range(3):
         time = begin + NODES[i] * width
-        total += WEIGHTS[i] * way_speed(curves, times, piece, time, limits)
+        total += WEIGHTS[i] * s_dot_at(curves, times, piece, time, limits)
     return total * width
 
 
 @kernel(float64(CUBE, VEC, int64, float64, float64, float64, MAT))
-def time_after(curves, times, piece, begin, end, way, limits):
-    """Return when a motion has come so much further than at `begin`, within a cell [s]."""
+def time_after(curves, times, piece, begin, end, s, limits):
+    """Return the time within a cell at which s has grown by so much since `begin` [s]."""
     time = begin
     for _ in range(ROUNDS):
-        lacks = way - way_between(curves, times, piece, begin, time, limits)
-        step = lacks / max(way_speed(curves, times, piece, time, limits), TINY)
+        lacks = s - s_between(curves, times, piece, begin, time, limits)
+        step = lacks / max(s_dot_at(curves, times, piece, time, limits), TINY)
         time = min(max(time + step, begin), end)
         if abs(step) < 1e-14:
             break
@@ -81,12 +81,12 @@ def time_after(curves, times, piece, begin, end, way, limits):
 
 
 @kernel(void(MAT, MAT, OUT_MAT, OUT_VEC))
-def along_way(states, limits, bends, speeds):
+def path_derivatives(states, limits, q_s, speeds):
     """
-    Write direction of the way and its two derivatives by it, (3, dof); speed, slope, bend, (3,).
+    Write three derivatives of q by s, (3, dof), and s_dot, s_ddot and s_dddot, (3,).
 
-    With x the way, q' = t x', q'' = t x'' + k x'^2 and q''' = t x''' + 3 k x' x'' + k' x'^3, where
-    t is the direction, k and k' its derivatives.
+    q' = t s', q'' = t s'' + k s'^2 and q''' = t s''' + 3 k s' s'' + k' s'^3, where t is the first
+    derivative of q by s, k and k' the second and the third.
     """
     dof = states.shape[1]
     vv, va, aa, vj = 0.0, 0.0, 0.0, 0.0
@@ -94,16 +94,16 @@ def along_way(states, limits, bends, speeds):
         scale = 1.0 / limits[1, k]
         v, a, j = states[1, k] * scale, states[2, k] * scale, states[3, k] * scale
         vv, va, aa, vj = vv + v * v, va + v * a, aa + a * a, vj + v * j
-    speed = max(math.sqrt(vv), TINY)
-    slope = va / speed
-    bend = (aa + vj - slope * slope) / speed
-    speeds[0], speeds[1], speeds[2] = speed, slope, bend
-    one, square = 1.0 / speed, 1.0 / (speed * speed)
+    s_dot = max(math.sqrt(vv), TINY)
+    s_ddot = va / s_dot
+    s_dddot = (aa + vj - s_ddot * s_ddot) / s_dot
+    speeds[0], speeds[1], speeds[2] = s_dot, s_ddot, s_dddot
+    one, square = 1.0 / s_dot, 1.0 / (s_dot * s_dot)
     for k in range(dof):
         t = states[1, k] * one
-        turn = (states[2, k] - t * slope) * square
-        bends[0, k], bends[1, k] = t, turn
-        bends[2, k] = (states[3, k] - t * bend - 3.0 * turn * speed * slope) * square * one
+        turn = (states[2, k] - t * s_ddot) * square
+        q_s[0, k], q_s[1, k] = t, turn
+        q_s[2, k] = (states[3, k] - t * s_dddot - 3.0 * turn * s_dot * s_ddot) * square * one
 
 
 @kernel(int64(CUBE, VEC, float64, float64, float64, float64, MAT, OUT_MAT, OUT_INTS, OUT_CUBES))
@@ -133,29 +133,29 @@ def look_ahead(curves, times, now, begin, end, step, limits, rows, pieces, geome
     """
     dof = curves.shape[2]
     states, speeds, most = np.empty((4, dof)), np.empty(3), limits.copy()
-    piece, n, time, way = 0, 0, now, 0.0
+    piece, n, time, s = 0, 0, now, 0.0
     while times[piece + 1] <= now:
         piece += 1
     while time < end and n < geometry.shape[0]:
         stop = min(times[piece + 1], end)
         if time < begin:
             stop = min(stop, begin)
-        # What is left of the piece in equal parts.
+        # The rest of the piece in equal parts.
         parts = math.ceil((stop - time) / step - 1e-9)
         until = stop if parts <= 1 else time + (stop - time) / parts
         for side in range(2):
             at = time if side == 0 else until
             derivatives_on(curves, times, piece, at, states)
-            along_way(states, limits, geometry[n, side], speeds)
+            path_derivatives(states, limits, geometry[n, side], speeds)
             row = n + side
-            rows[row, TIME], rows[row, SPEED], rows[row, SLOPE] = at, speeds[0], speeds[1]
+            rows[row, TIME], rows[row, S_DOT], rows[row, S_DDOT] = at, speeds[0], speeds[1]
             for order in range(3):
                 for k in range(dof):
                     most[order, k] = max(most[order, k], abs(states[order + 1, k]))
         geometry[n, MOST] = most
-        rows[n, WAY] = way
-        way += way_between(curves, times, piece, time, until, limits)
-        rows[n + 1, WAY] = way
+        rows[n, S] = s
+        s += s_between(curves, times, piece, time, until, limits)
+        rows[n + 1, S] = s
         pieces[n] = piece
         n += 1
         time = until

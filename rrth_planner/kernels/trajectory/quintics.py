@@ -8,10 +8,10 @@ from numba.core.types import float64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_MAT, OUT_VEC, VEC
 
-# Newton's steps to where the arm is nearest to.
+# Newton iterations to the nearest point of the motion.
 STEPS = 3
 
-# Bounds of derivatives are by so much larger, for rounding: a share, and [rad].
+# Allowance of bounds of derivatives for rounding: relative, and absolute [rad].
 SHARE, LEAST = 1e-12, 1e-15
 
 
@@ -20,13 +20,13 @@ def fit(times, positions, velocities, accelerations, curves):
     """
     Write the quintics that fit both ends of each piece, (n - 1, 6, dof), lowest power first.
 
-    As `trajectory.piece_coefficients`, which does without compiled code: a playback has none.
+    As `trajectory.piece_coefficients`, which needs no compiled code, for the playback.
     """
     for i in range(curves.shape[0]):
         T = times[i + 1] - times[i]
         for k in range(curves.shape[2]):
             c1, a0 = velocities[i, k] * T, accelerations[i, k] * T * T
-            # What position, velocity and acceleration at the end still lack after three terms.
+            # Remainders of position, velocity and acceleration at the end after three terms.
             p = positions[i + 1, k] - positions[i, k] - c1 - 0.5 * a0
             v = velocities[i + 1, k] * T - c1 - a0
             a = accelerations[i + 1, k] * T * T - a0
@@ -38,12 +38,12 @@ def fit(times, positions, velocities, accelerations, curves):
 
 @kernel(float64(float64, float64))
 def larger(a, b):
-    """Return the larger of two numbers; NaN where one is that, which `max` may pass over."""
+    """Return the larger of two numbers; NaN if one is NaN, which `max` may ignore."""
     return a if a >= b or math.isnan(a) else b
 
 
 @kernel(void(CUBE, MAT, MAT, OUT_MAT, OUT_MAT), is_short=True)
-def bound(curves, quartic, cubic, speeds, bends):
+def bound(curves, quartic, cubic, speeds, curvatures):
     """
     Write bounds of |dq/du| and |d2q/du2| of quintic pieces over u in [0, 1], (n, dof) each.
 
@@ -52,7 +52,7 @@ def bound(curves, quartic, cubic, speeds, bends):
     """
     for i in range(curves.shape[0]):
         for k in range(curves.shape[2]):
-            speed, bend = 0.0, 0.0
+            speed, curvature = 0.0, 0.0
             for row in range(5):
                 value = 0.0
                 for power in range(5):
@@ -63,14 +63,17 @@ def bound(curves, quartic, cubic, speeds, bends):
                 for power in range(4):
                     factor = (power + 1) * (power + 2)
                     value += cubic[row, power] * factor * curves[i, power + 2, k]
-                bend = larger(bend, abs(value))
-            speeds[i, k], bends[i, k] = speed * (1 + SHARE) + LEAST, bend * (1 + SHARE) + LEAST
+                curvature = larger(curvature, abs(value))
+            speeds[i, k], curvatures[i, k] = (
+                speed * (1 + SHARE) + LEAST,
+                curvature * (1 + SHARE) + LEAST,
+            )
 
 
 @kernel(void(CUBE, VEC, float64, OUT_VEC, OUT_VEC))
 def state_at(curves, times, time, position, velocity):
     """
-    Write position and velocity of a motion at a time, (dof,); outside of it, it stands still.
+    Write position and velocity of a motion at a time, (dof,); at rest before and after it.
 
     curves (n, 6, dof): its pieces, as from `trajectory.piece_coefficients`; times (n + 1,) [s].
     """
@@ -92,21 +95,21 @@ def state_at(curves, times, time, position, velocity):
 @kernel(float64(CUBE, VEC, float64, VEC, float64, float64, float64), is_short=True)
 def time_on(curves, times, guess, q, same, slow, latest):
     """
-    Return the time within a motion that an arm at q, (dof,), is at; NaN where it is elsewhere.
+    Localize an arm at q, (dof,), on a motion: return its time, NaN where it is off the path.
 
     Parameters
     ----------
     curves, times : array
         As for `state_at`.
     guess : float
-        The time that it would be at if it were exact [s].
+        The time that is expected without delay [s].
     q : array, shape (dof,)
     same : float
-        It is elsewhere where a joint is further than this from where it is nearest to [rad].
+        Greatest distance of a joint from the nearest point of the motion [rad].
     slow : float
-        How late it is cannot be told where no joint is faster than this [rad/s].
+        Where no joint is faster than this, `guess` is not corrected [rad/s].
     latest : float
-        By how much it may be late, or early [s].
+        Greatest delay or lead [s].
 
     """
     p, v = np.empty_like(q), np.empty_like(q)

@@ -1,26 +1,26 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The soonest of many stops along the way ahead: first on a grid, then near the best of that."""
+"""The soonest of many stops along the path ahead: a grid search, then a local one."""
 
 import math
 
 from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
-from rrth_planner.kernels.trajectory.lookahead import BEGIN, CUBES, SLOPE, SPEED, TIME, WAY
-from rrth_planner.kernels.trajectory.stop_profile import line_stop, seems_to_hold
+from rrth_planner.kernels.trajectory.lookahead import BEGIN, CUBES, S, S_DDOT, S_DOT, TIME
+from rrth_planner.kernels.trajectory.stop_profile import keeps_limits, line_stop
 
-# What is tried, as shares of what the limits leave along the way: decelerations, jerks; and how
-# long after another delay the next one is tried, or one that ends at a point of the motion [s].
+# The grid: decelerations and jerks as shares of their limits along the path; and the spacing of
+# the delays, and of those that end at a point of the motion [s].
 DECELERATIONS = (1.0, 0.9, 0.8, 0.7, 0.55, 0.4, 0.25, 0.12)
 JERKS = (1.0, 0.9, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
 DELAY, DELAY_TO_POINT = 0.025, 0.01
-# Then what is near the best, twice: by how many cells its delay changes, by which factors its
-# shares: both, one of them, or one up and the other down.
+# The local search, twice: changes of the delay in cells, and factors of the shares: of both, of
+# one of them, or of one up and the other down.
 ROUNDS, CELLS_NEAR, FACTORS = 2, (4, -4, 2, -2, 1, -1), (1.15, 1.07, 1.03, 1.01)
 POWERS = ((1, 1), (0, 1), (1, 0), (-1, 1), (1, -1))
-# Entries of `best`: when it ends [s], the row that it begins with, shares of deceleration, jerk;
-# and when the one ends that was tried last.
+# Entries of `best`: its end [s], the row that it begins with, shares of deceleration and jerk; and
+# the end of the stop that was tried last.
 ENDS, ROW, DECELERATION, JERK, TRIED = range(5)
 
 
@@ -49,14 +49,14 @@ def try_stop(
         t = abs(geometry[row, BEGIN, 0, k]) + 1e-300
         a_max, j_max = min(a_max, limits[1, k] / t), min(j_max, limits[2, k] / t)
     a_max, j_max = a_max * deceleration, j_max * jerk
-    way, speed, slope = rows[row, WAY], rows[row, SPEED], rows[row, SLOPE]
-    end = rows[row, TIME] + line_stop(way, speed, slope, a_max, j_max, tried)
-    # Stops that do not get to their decelerations are the same one.
+    s, s_dot, s_ddot = rows[row, S], rows[row, S_DOT], rows[row, S_DDOT]
+    end = rows[row, TIME] + line_stop(s, s_dot, s_ddot, a_max, j_max, tried)
+    # Stops that do not reach their decelerations are equal.
     is_twin = end == best[TRIED]
     best[TRIED] = end
     if is_twin or not end < best[ENDS]:
         return False
-    if not seems_to_hold(tried, rows, geometry, pieces, row, n, reserve):
+    if not keeps_limits(tried, rows, geometry, pieces, row, n, reserve):
         return False
     best[ENDS], best[ROW], best[DECELERATION], best[JERK] = end, row, deceleration, jerk
     phases[:] = tried
@@ -73,13 +73,13 @@ def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phas
     rows, geometry, pieces : array
         The cells ahead, as from `look_ahead`.
     first, n : int
-        The first row that it may begin with; number of cells.
+        The first row that it may begin with; the number of cells.
     limits : array, shape (3, dof)
         Velocity, acceleration, jerk.
     before : float
-        When it has to have ended: a time within the motion, if that went on as it is [s].
+        It has to end before this time of the unchanged motion [s].
     reserve : float
-        The share of the limits that it may use.
+        Share of the limits that it may use.
     phases : array, shape (3, 5)
         Written.
 

@@ -1,44 +1,44 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A stop along a motion as points of a trajectory, and whether that keeps limits."""
+"""A stop along a motion as points of a trajectory, and the check of its limits and path."""
 
 import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_INTS, VEC
-from rrth_planner.kernels.trajectory.lookahead import derivatives_on, TIME, time_after, WAY
-from rrth_planner.kernels.trajectory.stop_profile import A, J, LASTS, stop_way, V, X
+from rrth_planner.kernels.trajectory.lookahead import derivatives_on, S, TIME, time_after
+from rrth_planner.kernels.trajectory.stop_profile import A, J, LASTS, stop_s, V, X
 
-# Points of a stop are no further apart, where that keeps it on its path, and no closer [s]: the
-# closer, the more of the jerk between them is rounding, and the further from its place a jump of
-# the jerk that gets no point.
+# Points of a stop are no further apart, where that keeps it on its path, and no closer [s]:
+# between close points the jerk is mostly rounding, and between distant ones a jump of the jerk
+# without a point is displaced.
 SPACINGS, CLOSEST, CLOSEST_FIRST = (0.05, 0.0125, 0.003125), 5e-5, 1e-5
-# Instants of a piece, as shares of it, at which a stop is held against its path; how far it may be
-# away there, in one joint [rad]: so nowhere further than 1e-4 rad.
+# Samples of a piece, as shares of it, at which a stop is compared with its path; tolerance of each
+# joint there [rad], so that it is nowhere further than 1e-4 rad.
 SHARES, OFF_PATH = (0.25, 0.5, 0.75), 8e-5
 # Messages carry whole nanoseconds [s].
 TICK = 1e-9
-# Halvings of a phase to find when a stop has come so far.
+# Bisections of a phase to find the time at which a stop passes a value of s.
 HALVINGS = 45
-# Instants of a piece at which limits are looked at, what may be missed between them, and by which
-# factor it may be too fast: less than 1 % of its acceleration and jerk.
+# Samples of a piece at which limits are checked, factor of what may be missed between them, and
+# allowed factor of speed: less than 1 % of its acceleration and jerk.
 INSTANTS, ALLOWED, WITHIN = 17, 1.002, 1.0025
-# Of a jerk times the cube of the time between two points, in shares of a position.
+# Rounding of a jerk times the cube of the time between two points, relative to a position.
 ROUNDING = 300 * 2.3e-16
 
 
 @kernel(float64(MAT, float64))
-def passing_time(phases, way):
-    """Return how long after its begin a stop has come so far [s]; it does."""
+def passing_time(phases, s):
+    """Return the time since the begin of a stop at which it passes s, before its end [s]."""
     before = 0.0
     for p in range(3):
         x, v, a, j = phases[p, X], phases[p, V], phases[p, A], phases[p, J]
         low, high = 0.0, phases[p, LASTS]
-        if p == 2 or x + high * (v + high * (0.5 * a + high * j / 6.0)) >= way:
+        if p == 2 or x + high * (v + high * (0.5 * a + high * j / 6.0)) >= s:
             for _ in range(HALVINGS):
                 t = 0.5 * (low + high)
-                if x + t * (v + t * (0.5 * a + t * j / 6.0)) < way:
+                if x + t * (v + t * (0.5 * a + t * j / 6.0)) < s:
                     low = t
                 else:
                     high = t
@@ -49,22 +49,22 @@ def passing_time(phases, way):
 
 @kernel(int64(MAT, READ_INTS, MAT, int64, float64, OUT_VEC))
 def stop_times(rows, pieces, phases, begin, spacing, points):
-    """Write when a stop that begins with a row has its points, from the first row on [s]."""
+    """Write the times of the points of a stop that begins with a row, since the first row [s]."""
     marks, m, now = np.empty(rows.shape[0] + 5), 1, rows[0, TIME]
     marks[0] = 0.0
-    start, end = rows[begin, TIME] - now, stop_way(phases)
+    start, end = rows[begin, TIME] - now, stop_s(phases)
     after = start
     for p in range(3):
         marks[m], m = after, m + 1
         after += phases[p, LASTS]
     row = 1
-    # Where the motion passes from one piece to the next its jerk jumps.
-    while row < pieces.shape[0] and (row <= begin or rows[row, WAY] < end):
+    # Between two pieces of the motion the jerk jumps.
+    while row < pieces.shape[0] and (row <= begin or rows[row, S] < end):
         if pieces[row] != pieces[row - 1]:
             if row <= begin:
                 marks[m] = rows[row, TIME] - now
             else:
-                marks[m] = start + passing_time(phases, rows[row, WAY])
+                marks[m] = start + passing_time(phases, rows[row, S])
             m += 1
         row += 1
     marks[:m].sort()
@@ -89,11 +89,11 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
     states, cell, phase = np.empty((4, dof)), 0, 0
     start, now = rows[begin, TIME] - rows[0, TIME], rows[0, TIME]
     phase_begin = start
-    # From a piece that ends at once there is no point but this.
+    # Skip a piece that ends immediately.
     while rows[cell + 1, TIME] - now < CLOSEST_FIRST:
         cell += 1
     for i in range(n):
-        rate, slope = 1.0, 0.0
+        ratio, ratio_dot = 1.0, 0.0
         if points[i] <= start:
             time = now + points[i]
             while cell < begin and rows[cell + 1, TIME] <= time:
@@ -106,7 +106,7 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
             t = min(points[i] - phase_begin, phases[phase, LASTS])
             v0, a0, j = phases[phase, V], phases[phase, A], phases[phase, J]
             x = phases[phase, X] + t * (v0 + t * (0.5 * a0 + t * j / 6.0))
-            while cell < pieces.shape[0] - 1 and (cell < begin or rows[cell + 1, WAY] <= x):
+            while cell < pieces.shape[0] - 1 and (cell < begin or rows[cell + 1, S] <= x):
                 cell += 1
             time = time_after(
                 curves,
@@ -114,7 +114,7 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
                 pieces[cell],
                 rows[cell, TIME],
                 rows[cell + 1, TIME],
-                x - rows[cell, WAY],
+                x - rows[cell, S],
                 limits,
             )
             derivatives_on(curves, times, pieces[cell], time, states)
@@ -123,13 +123,13 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
                 vv += (states[1, k] / limits[1, k]) ** 2
                 va += states[1, k] * states[2, k] / limits[1, k] ** 2
             w = math.sqrt(vv)
-            rate = (v0 + t * (a0 + 0.5 * t * j)) / w
-            slope = (a0 + t * j - va / w * rate * rate) / w
+            ratio = (v0 + t * (a0 + 0.5 * t * j)) / w
+            ratio_dot = (a0 + t * j - va / w * ratio * ratio) / w
         if i == n - 1:
-            rate, slope = 0.0, 0.0
+            ratio, ratio_dot = 0.0, 0.0
         for k in range(dof):
-            out[0, i, k], out[1, i, k] = states[0, k], states[1, k] * rate
-            out[2, i, k] = states[2, k] * rate * rate + states[1, k] * slope
+            out[0, i, k], out[1, i, k] = states[0, k], states[1, k] * ratio
+            out[2, i, k] = states[2, k] * ratio * ratio + states[1, k] * ratio_dot
 
 
 @kernel(boolean(VEC, CUBE, float64, MAT))
@@ -151,7 +151,7 @@ def is_within(points, states, begin, most):
             v = states[1, i + 1, k] * T - c1 - 2.0 * c2
             a = states[2, i + 1, k] * T * T - 2.0 * c2
             c3, c4, c5 = 10 * p - 4 * v + 0.5 * a, -15 * p + 7 * v - a, 6 * p - 3 * v + 0.5 * a
-            # What positions of so many digits leave of a piece so short.
+            # Rounding of positions in a piece so short.
             noise = ROUNDING * abs(states[0, i, k])
             top = most[0, k] * ALLOWED * WITHIN * T - between * (
                 6 * abs(c3) + 24 * abs(c4) + 60 * abs(c5)
@@ -176,8 +176,7 @@ def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, state
     """
     Return whether the quintics through the points of a stop, (3, n, dof), stay on its path.
 
-    At each instant that is looked at a joint is no further from where the stop leads it than
-    `OFF_PATH`.
+    At each sample no joint is further from the path of the stop than `OFF_PATH`.
     """
     n, dof = points.shape[0], states.shape[2]
     between = np.empty(len(SHARES) * (n - 1))
@@ -185,7 +184,7 @@ def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, state
         for k in range(len(SHARES)):
             between[len(SHARES) * i + k] = points[i] + SHARES[k] * (points[i + 1] - points[i])
     exact = np.empty((3, between.shape[0] + 1, dof))
-    # What is asked for last is taken for the end, where the stop rests.
+    # The last time is taken as the end, where the stop is at rest.
     asked = np.append(between, points[n - 1])
     stop_states(curves, times, rows, pieces, phases, begin, limits, asked, exact)
     for m in range(between.shape[0]):

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper says of the arm (Table 1, section 6.2) and of its collision test."""
+"""The claims of the paper about the arm (Table 1, section 6.2) and its collision test."""
 
 import numpy as np
 from rrth_planner.io.map_file import load_map
@@ -70,7 +70,7 @@ def arm_table(rows: Rows, extent: Extent) -> str:
 
 
 def target_table(rows: Rows, extent: Extent) -> str:
-    """Return what RRT and RRT-H brought for each target."""
+    """Return the results of RRT and RRT-H for each target."""
     lines = []
     for target in extent.targets:
         for name in (RRT, RRT_H):

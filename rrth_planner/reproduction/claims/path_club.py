@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper's section 4 says of the escape from local traps, and what the rows say to it."""
+"""The claims of the paper's section 4 about the escape from local traps, and their evaluation."""
 
 import numpy as np
 from rrth_planner.io.map_file import load_map

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper's section 3 claims of planning in the plane, and what the rows say to it."""
+"""The claims of the paper's section 3 about planning in the plane, and their evaluation."""
 
 from collections.abc import Callable, Sequence
 import math
@@ -44,7 +44,7 @@ Measure = Callable[[Rows, str, int], str]
 
 
 def plane_table(rows: Rows, extent: Extent, n: int) -> str:
-    """Return what each planner brought on each map in the first n runs."""
+    """Return the results of each planner on each map in the first n runs."""
     lines = []
     for problem in with_near(extent.maps):
         exact = shortest_path(load_map(problem))[0]
@@ -174,7 +174,7 @@ def verdict(holds: bool) -> str:
 def verdict_of_pairs(is_so: NDArray[np.bool_]) -> str:
     """Return whether a claim holds of pairs, or neither it nor its contrary (a sign test)."""
     n = len(is_so)
-    # Two standard errors of what a fair coin would bring.
+    # Two standard errors of a fair coin.
     if abs(2 * int(is_so.sum()) - n) <= 2.0 * math.sqrt(n):
         return '**undecided**'
     return verdict(bool(is_so.mean() > 0.5))
@@ -230,10 +230,10 @@ def _sooner(rows: Rows, problem: str, n: int) -> str:
         is_sooner = mine.aligned('time_total') < theirs.aligned('time_total')
         ratio = theirs.median('time_total') / mine.median('time_total')
         holds = holds and float(np.mean(is_shorter & is_sooner)) > 0.5
-        told = f'takes {ratio:.1f} times as long'
+        text = f'takes {ratio:.1f} times as long'
         if not theirs.n_solved():
-            told += ' and finds no path'
-        parts.append(f'against {name}, which {told}: {share_of(is_shorter & is_sooner)}')
+            text += ' and finds no path'
+        parts.append(f'against {name}, which {text}: {share_of(is_shorter & is_sooner)}')
     return f'{verdict(holds)} ' + '; '.join(parts)
 
 

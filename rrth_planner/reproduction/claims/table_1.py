@@ -16,7 +16,7 @@ PAPER = (
     (0.038, 0.0, 0.5, 0.0),
     (np.nan, 0.0, -0.5, 0.0),
 )
-# Of the four joints [pi rad]. One end is open there where ours is closed: the same postures.
+# Of the four joints [pi rad]. One end is open there where ours is closed: the same configurations.
 PAPER_RANGES = ((-1.0, 1.0), (-1.0, 0.0), (-1.0, 1.0), (-1.0, 1.0))
 # Values that the file has in more digits than the paper.
 TOLERANCE = 1e-9

@@ -75,13 +75,13 @@ def draw_pictures(rows: Rows, extent: Extent, output: Path) -> dict[str, list[st
         'figure_09',
         trees_figure([load_map(problem) for problem in maps], results, FIVE),
     )
-    told = f'medians and quartiles of {n} runs'
-    caption = f'Figure 10a: cost against the number of P_random, {told}'
+    note = f'medians and quartiles of {n} runs'
+    caption = f'Figure 10a: cost against the number of P_random, {note}'
     save(caption, 'figure_10a', convergence_figure(rows, maps, DRAWS, n))
     if NEAR in with_near(maps):
-        caption = f'Figure 10b: the same, start and goal in favour of Informed RRT*, {told}'
+        caption = f'Figure 10b: the same, start and goal in favour of Informed RRT*, {note}'
         save(caption, 'figure_10b', convergence_figure(rows, (NEAR,), DRAWS, n))
-    caption = f'Figure 11: cost against time, {told}'
+    caption = f'Figure 11: cost against time, {note}'
     save(caption, 'figure_11', convergence_figure(rows, maps, TIME, n))
     caption = f'Figure 12: histograms of cost and of time, {n} runs (triangles: medians)'
     save(caption, 'figure_12', histogram_figure(rows, maps, n))

@@ -55,7 +55,7 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
         )
         axes.grid(color='#e4e6ea', lw=0.8)
         if k >= len(pairs) - n_columns:
-            axes.set_xlabel('way along the path [rad]')
+            axes.set_xlabel('length along the path [rad]')
         if k % n_columns == 0:
             axes.set_ylabel('position [rad]')
         for side in ('top', 'right'):

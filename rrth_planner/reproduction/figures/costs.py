@@ -24,7 +24,7 @@ def convergence_figure(rows: Rows, maps: Sequence[str], axis: str, n: int) -> Fi
     """
     Return the cost of the best path against draws or time, medians and quartiles over runs.
 
-    RRT and RRT-H stop at their first path: a point each, joined by how far shortening brings it.
+    RRT and RRT-H stop at their first path: a point each, joined to the result of shortening.
 
     Parameters
     ----------
@@ -66,8 +66,8 @@ def convergence_figure(rows: Rows, maps: Sequence[str], axis: str, n: int) -> Fi
         axes.set_ylabel('cost of the best path')
         _plain(axes)
         if absent:
-            told = 'no path in 2,000 steps:\n' + '\n'.join(absent)
-            axes.text(0.05, 0.3, told, transform=axes.transAxes, fontsize=9, color=EXACT)
+            note = 'no path in 2,000 steps:\n' + '\n'.join(absent)
+            axes.text(0.05, 0.3, note, transform=axes.transAxes, fontsize=9, color=EXACT)
     _shared_legend(figure)
     return figure
 

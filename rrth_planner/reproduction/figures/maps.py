@@ -45,12 +45,12 @@ def trees_figure(
                 draw_tree(axes, tree)
             if result.raw_path is not None and name.startswith('RRT-H'):
                 draw_path(axes, result.raw_path.waypoints, FIRST, 1.4)
-            told = 'no path'
+            note = 'no path'
             if result.path is not None:
                 draw_path(axes, result.path.waypoints, FINAL, 2.2)
-                told = f'cost {result.path.length:.1f}'
+                note = f'cost {result.path.length:.1f}'
             draw_ends(axes, box_map)
-            axes.set_title(f'{name}\n{told}, {result.n_samples} P_random', fontsize=9)
+            axes.set_title(f'{name}\n{note}, {result.n_samples} P_random', fontsize=9)
         row[0].set_ylabel(box_map.name.replace('_', ' '), fontsize=11, fontweight='bold')
     _legend(figure, ('tree', TREE), ("RRT-H's path before shortening", FIRST), ('path', FINAL))
     return figure
@@ -71,7 +71,7 @@ def escape_figure(
     with_club, without : sequence of ndarray, shape (n, 2), or None
         First paths of successive growths, before shortening [map units].
     shares : mapping
-        By label, the share of runs that have found both ways after 1, 2, ... growths.
+        By label, the share of runs that have found both homotopy classes after 1, 2, ... growths.
 
     """
     figure = Figure(figsize=(12.5, 4.6), layout='constrained', dpi=100)

@@ -20,26 +20,26 @@ def tool_positions(arm: ArmModel, q: Array) -> Array:
 
 
 def edge_curves(arm: ArmModel, q_from: Array, q_to: Array, n_pieces: int) -> Array:
-    """Return the tool's way along joint edges, two (n, dof) [rad] -> (n, n_pieces + 1, 3) [m]."""
+    """Return the tool's path along joint edges, two (n, dof) [rad] -> (n, n_pieces + 1, 3) [m]."""
     share = np.linspace(0.0, 1.0, n_pieces + 1)[:, None]
     return tool_positions(arm, q_from[:, None] + share * (q_to - q_from)[:, None])
 
 
 def path_curve(arm: ArmModel, waypoints: Array) -> Array:
-    """Return the tool's way along a path, (n, dof) [rad] -> (m, 3) [m]."""
+    """Return the tool's path along a path, (n, dof) [rad] -> (m, 3) [m]."""
     if len(waypoints) < 2:
         return tool_positions(arm, waypoints)
     return edge_curves(arm, waypoints[:-1], waypoints[1:], PATH_PIECES).reshape(-1, 3)
 
 
 def trajectory_curve(arm: ArmModel, trajectory: Trajectory) -> Array:
-    """Return the tool's way along a trajectory, (m, 3) [m]."""
+    """Return the tool's path along a trajectory, (m, 3) [m]."""
     times = np.linspace(0.0, trajectory.duration, TRAJECTORY_POINTS)
     return tool_positions(arm, sample(trajectory, times)[0])
 
 
 def tree_segments(arm: ArmModel, tree: Tree) -> Array:
-    """Return the tool's way along all edges of a tree as pieces, (m, 2, 3) [m]."""
+    """Return the tool's path along all edges of a tree as pieces, (m, 2, 3) [m]."""
     children = np.flatnonzero(tree.parents >= 0)
     if not len(children):
         return np.empty((0, 2, 3))

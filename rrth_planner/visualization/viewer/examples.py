@@ -32,7 +32,7 @@ def example_target(name: str) -> Array:
 
 
 def start_of(arm: ArmModel) -> Array:
-    """Return the folded posture of the examples; for an arm it is not of, mid-range, (dof,)."""
+    """Return the folded configuration of the examples; for other arms the mid-range, (dof,)."""
     try:
         state = load_yaml(resource_path('msg_examples/joint_states_folded.yaml'))
         positions = dict(zip(state['name'], state['position'], strict=True))

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The page that follows the nodes: it shows what their topics say, and asks the planner."""
+"""The page of the running nodes: it shows their topics, and sends requests to the planner."""
 
 from collections.abc import Callable
 from html import escape
@@ -23,7 +23,7 @@ WIDTH = 0.010
 
 
 class Feed(Protocol):
-    """What the nodes said last; the same value as long as nothing new was said."""
+    """Latest messages of the nodes; the same value until a new message arrives."""
 
     arm: ArmModel
     margin: float
@@ -43,19 +43,19 @@ class Feed(Protocol):
 
     @property
     def trajectory(self) -> Trajectory | None:
-        """The last motion that was published."""
+        """The commanded motion."""
 
     @property
     def said(self) -> str:
-        """The last answer of the planner, and what is missing."""
+        """The last response of the planner, and what is missing."""
 
     def ask(self, target: Array | None = None) -> None:
-        """Publish a target (3,) [m], and ask for a plan."""
+        """Publish a target (3,) [m], and request a plan."""
 
 
 class LivePage:
     """
-    Show what a feed heard; dragging the target publishes it and asks for a plan.
+    Show the messages of a feed; dragging the target publishes it and requests a plan.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class LivePage:
         self.panel.plan.on_click(lambda _: feed.ask())
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Draw what the nodes say until it is over, or the thread is interrupted."""
+        """Draw the messages until `is_over`, or the thread is interrupted."""
         while not is_over():
             self.draw()
             time.sleep(FRAME)
@@ -94,7 +94,7 @@ class LivePage:
             self.panel.target.value = tuple(target.round(4).tolist())
         positions = feed.positions
         if positions is not None and self._is_new('positions', positions):
-            self.view.show_posture(positions, target)
+            self.view.show_configuration(positions, target)
         trajectory = feed.trajectory
         if trajectory is not None and self._is_new('trajectory', trajectory):
             curve = trajectory_curve(feed.arm, trajectory)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The page that plans itself: controls change the question, one thread draws what comes of it."""
+"""The page that plans itself: controls change the request, one thread draws the response."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,39 +13,39 @@ from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.curves import path_curve, tool_positions, trajectory_curve
 from rrth_planner.visualization.viewer.examples import example_body, example_target
-from rrth_planner.visualization.viewer.panel import answer_html, OWN, Panel
-from rrth_planner.visualization.viewer.planning_worker import Answer, ViewerModel
+from rrth_planner.visualization.viewer.panel import OWN, Panel, response_html
+from rrth_planner.visualization.viewer.planning_worker import Response, ViewerModel
 from rrth_planner.visualization.viewer.player import Player
 from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
-# Pictures of a motion that plays, and how long a page at rest may sleep [s].
+# Frame period of a playing motion, and longest sleep of an idle page [s].
 FRAME, NAP = 1.0 / 30.0, 0.5
-# Widths of the ways of the tool [m].
+# Widths of the paths of the tool [m].
 FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.007, 0.007, 0.010
 
 
 class ViewerPage:
     """
-    Show a question, let it be changed, and show and play the motion that answers it.
+    Show a request, let it be changed, and show and play the resulting motion.
 
     Parameters
     ----------
     server : viser.ViserServer
     question : PlanQuestion
-        Asked at once.
+        The first request.
 
     """
 
     def __init__(self, server: viser.ViserServer, question: PlanQuestion) -> None:
-        """Draw what is known, and ask."""
+        """Draw what is known, and request a plan."""
         self._own = question
         self._arm = question.arm
         self._lock, self._wake = Lock(), Event()
         # Both are written by the callbacks of the page, and drawn by `run`.
         self._player = Player()
         self._trajectory: Trajectory | None = None
-        self._drawn: Answer | None = None
+        self._drawn: Response | None = None
         self._body: Any = None
         self.view = SceneView(server, question.arm, question.ray_guard_length)
         self.panel = Panel(server, is_live=False, on_layer=self._on_layer)
@@ -58,12 +58,12 @@ class ViewerPage:
         panel.step_size.max = max(panel.step_size.max, question.options.step_size)
         panel.step_size.value = question.options.step_size
         self.view.target.position = question.goal.target
-        self.model = ViewerModel(question, lambda answer: self._wake.set())
+        self.model = ViewerModel(question, lambda response: self._wake.set())
         self._connect()
         self.model.ask()
 
     def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Draw what changes until it is over, or the thread is interrupted."""
+        """Draw all changes until `is_over`, or the thread is interrupted."""
         before = time.monotonic()
         while not is_over():
             now = time.monotonic()
@@ -76,36 +76,36 @@ class ViewerPage:
             self._wake.clear()
 
     def draw(self) -> None:
-        """Draw the newest answer, and the arm where the motion is."""
-        question, answer = self.model.question, self.model.answer
+        """Draw the newest response, and the arm at the present time of the motion."""
+        question, response = self.model.question, self.model.response
         body = (question.scene, question.margin)
         if body != self._body:
             self._body = body
             self.view.show_body(*body)
-        if answer is not self._drawn:
-            self._drawn = answer
-            self._draw_answer(answer)
+        if response is not self._drawn:
+            self._drawn = response
+            self._draw_response(response)
         with self._lock:
             player, trajectory = self._player, self._trajectory
         q = question.q_start
         if trajectory is not None:
             q = positions_at(trajectory, [player.time])[0]
-        self.view.show_posture(q, question.goal.target)
+        self.view.show_configuration(q, question.goal.target)
         self.panel.play.label = 'Pause' if player.is_playing else 'Play'
         self.panel.time.value = round(player.time, 3)
 
     def show_end(self) -> None:
-        """Show where the motion comes to."""
+        """Show the end of the motion."""
         self._play(Player.at_end)
 
     def close(self) -> None:
-        """End the thread that plans."""
+        """End the planning thread."""
         self.model.close()
 
-    def _draw_answer(self, answer: Answer) -> None:
-        plan, question = answer.plan, answer.question
+    def _draw_response(self, response: Response) -> None:
+        plan, question = response.plan, response.question
         trajectory = None if plan is None else plan.trajectory
-        self.panel.said.content = answer_html(answer)
+        self.panel.said.content = response_html(response)
         if question is not None:
             self.view.start.move(question.q_start)
         nothing = np.empty((0, 3))
@@ -123,7 +123,7 @@ class ViewerPage:
         self._load(trajectory)
 
     def _load(self, trajectory: Trajectory | None) -> None:
-        """Have another motion played; with none the arm stays at the start."""
+        """Load another motion; with none the arm stays at the start."""
         duration = 0.0 if trajectory is None else trajectory.duration
         with self._lock:
             self._trajectory = trajectory
@@ -132,7 +132,7 @@ class ViewerPage:
         self.panel.time.disabled = self.panel.play.disabled = trajectory is None
 
     def _connect(self) -> None:
-        """Have the controls change the question and the player."""
+        """Connect the controls to the request and the player."""
         panel, view = self.panel, self.view
         for control, change in (
             (panel.target, self._on_numbers),
@@ -151,7 +151,7 @@ class ViewerPage:
         view.target.on_update(self._by_hand(self._on_drag))
 
     def _by_hand(self, change: Callable[[], Any]) -> Callable[[Any], None]:
-        """Return a callback that answers to people only, not to what this program writes."""
+        """Return a callback for changes by the user only, not for those by this program."""
 
         def on_event(event: Any) -> None:
             if event.client is not None:
@@ -161,7 +161,7 @@ class ViewerPage:
         return on_event
 
     def _on_drag(self) -> None:
-        # Read late: callbacks may overtake each other, the position does not go back.
+        # Read late: callbacks may overtake each other, the position is always the newest.
         target = np.asarray(self.view.target.position, dtype=np.float64)
         self.panel.target.value = tuple(target.round(4).tolist())
         self.panel.target_example.value = OWN

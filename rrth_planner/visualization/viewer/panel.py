@@ -1,25 +1,25 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The page's controls, and what it says of an answer."""
+"""The controls of the page, and its description of a response."""
 
 from collections.abc import Callable
 from html import escape
 from typing import Any
 
 from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
-from rrth_planner.visualization.viewer.planning_worker import Answer
+from rrth_planner.visualization.viewer.planning_worker import Response
 from rrth_planner.visualization.viewer.scene_view import FIRST, LAYERS, SHORT, TIMED, TREES
 import viser
 
 OWN = 'own'
-# What the checkboxes call the layers.
+# Labels of the layers at their checkboxes.
 SHOWN = {
-    'margin': 'margin round the boxes',
+    'margin': 'margin around the boxes',
     'start': 'arm at the start',
     'tree': 'tree',
     'first': 'first path',
-    'short': 'path after shortening',
-    'timed': 'path after rounding, in time',
+    'short': 'path after shortcuts',
+    'timed': 'trajectory with corner blends',
 }
 BRAND = (59, 111, 182)
 GOOD, BAD = '#14804a', '#b3261e'
@@ -27,10 +27,10 @@ SPEEDS = ('0.1', '0.25', '0.5', '1')
 MOST_SEEDS, STEP_SIZES, MOST_MARGIN, FARTHEST = 99, (0.05, 1.5), 0.1, 5.0
 
 
-def answer_html(answer: Answer) -> str:
-    """Return what an answer says, as HTML: planning time, sentence, and the three steps."""
-    sentence = escape(answer.sentence)
-    plan = answer.plan
+def response_html(response: Response) -> str:
+    """Return a response as HTML: planning time, sentence, and the three steps."""
+    sentence = escape(response.sentence)
+    plan = response.plan
     if plan is None:
         return _page('no motion', BAD, sentence, [])
     took = f'planning time {1e3 * plan.planning_time:.2f} ms'
@@ -40,17 +40,17 @@ def answer_html(answer: Answer) -> str:
     rows = [
         (
             FIRST,
-            'first path: a straight joint motion'
+            'first path: one straight edge'
             if raw is None
             else f'first path: {len(raw.waypoints)} waypoints, {raw.length:.3f} rad',
         ),
         (
             SHORT,
-            f'after shortening: {len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad',
+            f'after shortcuts: {len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad',
         ),
         (
             TIMED,
-            f'after rounding, in time: {len(plan.trajectory.times)} points, '
+            f'trajectory with corner blends: {len(plan.trajectory.times)} points, '
             f'{plan.trajectory.duration:.2f} s',
         ),
     ]
@@ -76,22 +76,22 @@ def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -
 
 class Panel:
     """
-    The controls; each calls back with nothing, and is read by whom it calls.
+    The controls; their callbacks have no arguments and read the values from here.
 
     Parameters
     ----------
     server : viser.ViserServer
     is_live : bool
-        Where nodes plan: without what only a plan of this process has.
+        The nodes plan: without the controls that need a plan of this process.
     on_layer : callable
-        Gets a layer's name and whether it is shown.
+        Called with a layer's name and whether it is shown.
 
     """
 
     def __init__(
         self, server: viser.ViserServer, *, is_live: bool, on_layer: Callable[[str, bool], None]
     ) -> None:
-        """Make them."""
+        """Create the controls."""
         gui = server.gui
         gui.configure_theme(
             control_layout='fixed',
@@ -101,8 +101,8 @@ class Panel:
             brand_color=BRAND,
         )
         gui.set_panel_label('rrth_planner')
-        with gui.add_folder('Answer'):
-            self.said = gui.add_html(answer_html(Answer()))
+        with gui.add_folder('Response'):
+            self.said = gui.add_html(response_html(Response()))
         with gui.add_folder('Target'):
             self.target_example = gui.add_dropdown('example', (OWN, *TARGETS))
             self.target = gui.add_vector3(
@@ -113,14 +113,14 @@ class Panel:
                 step=0.01,
             )
             self.plan = gui.add_button('Plan', visible=is_live)
-        with gui.add_folder('Question', visible=not is_live):
+        with gui.add_folder('Request', visible=not is_live):
             self.body_example = gui.add_dropdown('body', (OWN, *BODIES))
             self.margin = gui.add_slider('margin [m]', 0.0, MOST_MARGIN, 0.005, 0.02)
             self.seed = gui.add_slider('seed', 0, MOST_SEEDS, 1, 0)
             self.step_size = gui.add_slider(
                 'tree step [rad]', *STEP_SIZES, 0.05, STEP_SIZES[1], hint='step_size'
             )
-            self.start_here = gui.add_button('Start from where the arm is')
+            self.start_here = gui.add_button('Start from the present configuration')
         with gui.add_folder('Motion', visible=not is_live):
             self.play = gui.add_button('Play')
             self.time = gui.add_slider('time [s]', 0.0, 1.0, 0.01, 0.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the page asks and what it is answered: plans in a thread, of which the newest counts."""
+"""Plans for the page in a thread; only the newest request counts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,30 +18,30 @@ from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Waiting for an answer looks at the clock so often [s].
+# Waiting for a response checks the clock so often [s].
 LONGEST_NAP = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Answer:
+class Response:
     """
-    What came of one question.
+    Response to one request.
 
     Parameters
     ----------
     number : int
-        Of the question, counted from 1; 0: none was asked yet.
+        Number of the request, from 1; 0: none yet.
     sentence : str
-        What happened: the figures of a motion, or why there is none.
+        The figures of a motion, or the reason why there is none.
     question : PlanQuestion or None
-        None where what was asked is no question.
+        None where the request was invalid.
     plan : MotionPlan or None
         None where nothing was planned.
 
     """
 
     number: int = 0
-    sentence: str = 'nothing was asked yet'
+    sentence: str = 'no request yet'
     question: PlanQuestion | None = None
     plan: MotionPlan | None = None
 
@@ -53,23 +53,25 @@ class Answer:
 
 class ViewerModel:
     """
-    Plan for the newest question; a plan whose question is outdated is cancelled.
+    Plan for the newest request; the plan of an outdated request is cancelled.
 
     Parameters
     ----------
     question : PlanQuestion
-        What later questions change; it is asked by `ask()`.
-    on_answer : callable
-        Gets each answer that is not outdated, in the thread that plans.
+        The first request, which later ones change; requested by `ask()`.
+    on_response : callable
+        Called with each response that is not outdated, in the planning thread.
 
     """
 
     def __init__(
-        self, question: PlanQuestion, on_answer: Callable[[Answer], None] = lambda answer: None
+        self,
+        question: PlanQuestion,
+        on_response: Callable[[Response], None] = lambda response: None,
     ) -> None:
         """Start the thread that plans."""
-        self.question, self.answer = question, Answer()
-        self._on_answer = on_answer
+        self.question, self.response = question, Response()
+        self._on_response = on_response
         self._condition = Condition()
         self._n_asked, self._wanted, self._is_closed = 0, False, False
         self._thread = Thread(target=self._work, name='viewer plans', daemon=True)
@@ -86,7 +88,7 @@ class ViewerModel:
         step_size: float | None = None,
     ) -> int:
         """
-        Ask anew with some changes and return the question's number; does not wait.
+        Request a plan with some changes and return the number of the request; does not wait.
 
         Parameters
         ----------
@@ -113,7 +115,7 @@ class ViewerModel:
             if value is not None
         }
         with self._condition:
-            answer: Answer | None = None
+            response: Response | None = None
             self._n_asked += 1
             try:
                 if target is not None:
@@ -122,24 +124,24 @@ class ViewerModel:
                     changes['options'] = replace(self.question.options, step_size=step_size)
                 self.question = replace(self.question, **changes)
             except RrthError as problem:
-                # The page goes on with the last question that was one.
+                # The page keeps its last valid request.
                 self._wanted = False
-                answer = Answer(number=self._n_asked, sentence=str(problem))
+                response = Response(number=self._n_asked, sentence=str(problem))
             else:
                 self._wanted = True
                 self._condition.notify_all()
             number = self._n_asked
-        if answer is not None:
-            self._tell(answer)
+        if response is not None:
+            self._respond(response)
         return number
 
-    def wait(self, number: int, timeout: float) -> Answer:
-        """Return the answer to a question or to a newer one; the last one after a time [s]."""
+    def wait(self, number: int, timeout: float) -> Response:
+        """Return the response to a request or to a newer one; the last one after a time [s]."""
         end = time.monotonic() + timeout
         with self._condition:
-            while self.answer.number < number and time.monotonic() < end:
+            while self.response.number < number and time.monotonic() < end:
                 self._condition.wait(LONGEST_NAP)
-            return self.answer
+            return self.response
 
     def close(self) -> None:
         """Cancel the plan in progress and end the thread."""
@@ -156,12 +158,12 @@ class ViewerModel:
                 if self._is_closed:
                     return
                 question, number, self._wanted = self.question, self._n_asked, False
-            answer = self._answer(question, number)
-            if answer is not None:
-                self._tell(answer)
+            response = self._response(question, number)
+            if response is not None:
+                self._respond(response)
 
-    def _answer(self, question: PlanQuestion, number: int) -> Answer | None:
-        """Return the answer to a question; None where a newer one was asked meanwhile."""
+    def _response(self, question: PlanQuestion, number: int) -> Response | None:
+        """Return the response to a request; None where a newer one was made meanwhile."""
 
         def is_outdated() -> bool:
             return self._is_closed or self._n_asked != number
@@ -169,20 +171,20 @@ class ViewerModel:
         try:
             plan = plan_motion(**question.arguments, should_stop=is_outdated)
         except RrthError as problem:
-            return Answer(number=number, sentence=str(problem), question=question)
+            return Response(number=number, sentence=str(problem), question=question)
         except Exception as problem:
-            # The page stays, and says it; what it was goes where the program was started.
+            # The page shows it and continues; the traceback is printed.
             traceback.print_exc()
-            sentence = f'nobody expected this: {type(problem).__name__}: {problem}'
-            return Answer(number=number, sentence=sentence, question=question)
+            sentence = f'unexpected error: {type(problem).__name__}: {problem}'
+            return Response(number=number, sentence=sentence, question=question)
         if plan.status is PlanStatus.CANCELLED and is_outdated():
             return None
-        return Answer(number=number, sentence=plan.sentence, question=question, plan=plan)
+        return Response(number=number, sentence=plan.sentence, question=question, plan=plan)
 
-    def _tell(self, answer: Answer) -> None:
+    def _respond(self, response: Response) -> None:
         with self._condition:
-            if answer.number < self.answer.number:
+            if response.number < self.response.number:
                 return
-            self.answer = answer
+            self.response = response
             self._condition.notify_all()
-        self._on_answer(answer)
+        self._on_response(response)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where in a motion the page is, and how it goes on."""
+"""Playback of a motion on the page."""
 
 from dataclasses import dataclass, replace
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Player:
     """
-    A place in a motion; a value, never changed.
+    Playback state within a motion; immutable.
 
     Parameters
     ----------
     duration, time : float
         Of the motion, and within it [s].
     share : float
-        How far along the last motion was left, where there is none now [-].
+        Share of the last motion that was played, where there is none now [-].
     speed : float
         How much faster than the clock, > 0 [-].
     is_playing, is_repeating : bool
@@ -30,7 +30,7 @@ class Player:
     is_repeating: bool = False
 
     def advanced(self, elapsed: float) -> 'Player':
-        """Return the place after so long by the clock [s]; playing ends at the end."""
+        """Return the state after some time by the clock [s]; playing stops at the end."""
         if not self.is_playing:
             return self
         if self.time >= self.duration and self.is_repeating:
@@ -39,7 +39,7 @@ class Player:
         return replace(self, time=time, is_playing=time < self.duration or self.is_repeating)
 
     def toggled(self) -> 'Player':
-        """Return it playing, from the begin where it was at the end, or not playing any more."""
+        """Return it with playing toggled; at the end it restarts from the beginning."""
         at_end = self.time >= self.duration
         return replace(
             self,
@@ -56,11 +56,11 @@ class Player:
         return replace(self, time=self.duration, share=1.0)
 
     def aimed(self) -> 'Player':
-        """Return it for another target: from the begin it goes to where the arm points."""
+        """Return it for another target: at the end if paused at the beginning."""
         return self if self.is_playing or self.time > 0.0 else self.at_end()
 
     def loaded(self, duration: float) -> 'Player':
-        """Return it in another motion [s]: at its begin when playing, else as far along."""
+        """Return it in another motion [s]: restarted when playing, else at the same share."""
         share = self.time / self.duration if self.duration > 0.0 else self.share
         time = 0.0 if self.is_playing else share * duration
         return replace(self, duration=duration, time=time, share=share)

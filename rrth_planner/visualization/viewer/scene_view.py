@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the page shows in space: wearer, margin, arm, ray, target, tree and paths."""
+"""The 3-D scene of the page: wearer, margin, arm, ray, target, tree and paths."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,7 +23,7 @@ TREES: tuple[Color, Color] = ((59, 111, 182), (200, 60, 140))
 FIRST, SHORT, TIMED = (224, 123, 0), (20, 140, 80), (123, 63, 160)
 # Thinnest bar, and the ray [m].
 BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
-# A ray that passes so near to the target points at it [m].
+# A ray closer to the target than this meets it [m].
 AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
 CAMERA, LOOK_AT = (-1.45, -1.3, 1.15), (0.25, 0.05, 0.24)
@@ -31,12 +31,12 @@ LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
 
 
 class ArmShape:
-    """Bars and joints of the arm in one posture, which moves."""
+    """Bars and joints of the arm in one configuration."""
 
     def __init__(
         self, server: viser.ViserServer, name: str, arm: ArmModel, opacity: float | None = None
     ) -> None:
-        """Begin with all bars of length zero."""
+        """Create all bars with length zero."""
         self._arm = arm
         bar, joint = (BAR, JOINT) if opacity is None else (GHOST, GHOST)
         radii = np.repeat(np.maximum(arm.radii, BAR_RADIUS), 2)
@@ -51,7 +51,7 @@ class ArmShape:
         ]
 
     def move(self, q: Array) -> None:
-        """Take a posture, (dof,) [rad]."""
+        """Move to a configuration, (dof,) [rad]."""
         points = arm_points(self._arm, q)
         for k, bar in enumerate(self._bars):
             place_bar(bar, points[k], points[k + 1])
@@ -68,7 +68,7 @@ class SceneView:
     server : viser.ViserServer
     arm : ArmModel
     ray_guard_length : float
-        How much of the ray is drawn where it does not point at the target [m].
+        Drawn length of a ray that does not meet the target [m].
 
     """
 
@@ -93,7 +93,7 @@ class SceneView:
         self._drawn: dict[str, list[Any]] = {}
 
     def show_body(self, scene: Scene, margin: float) -> None:
-        """Draw the wearer's boxes, and round each the shell of the margin [m]."""
+        """Draw the wearer's boxes, each in a shell of the margin [m]."""
         boxes: list[Any] = []
         shells: list[Any] = []
         for k, box in enumerate(scene.boxes):
@@ -116,7 +116,7 @@ class SceneView:
         self._replace('body', boxes)
         self._replace('margin', shells)
 
-    def show_posture(self, q: Array, target: Array | None) -> None:
+    def show_configuration(self, q: Array, target: Array | None) -> None:
         """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""
         self.arm.move(q)
         T = tool_pose(self._arm, q)
@@ -126,7 +126,7 @@ class SceneView:
         place_bar(self._ray, T[:3, 3], T[:3, 3] + length * T[:3, 2])
 
     def show_trees(self, trees: Sequence[Tree]) -> None:
-        """Draw where the tool is along the edges of the trees."""
+        """Draw the paths of the tool along the edges of the trees."""
         handles: list[Any] = []
         for k, (tree, colour) in enumerate(zip(trees, TREES, strict=False)):
             handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.0035)
@@ -140,7 +140,7 @@ class SceneView:
 
     def show_path(self, layer: str, curve: Array, corners: Array, width: float) -> None:
         """
-        Draw a way of the tool in a layer.
+        Draw a path of the tool in a layer.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class SceneView:
         return [self._scene.add_line_segments(name, segments, colour, thickness=width)]
 
     def _replace(self, what: str, handles: list[Any]) -> None:
-        """Remove what was drawn before and has not been drawn anew under its name."""
+        """Remove what was drawn before and not redrawn under its name."""
         kept = {handle.name for handle in handles}
         for handle in self._drawn.get(what, []):
             if handle.name not in kept:

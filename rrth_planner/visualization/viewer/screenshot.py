@@ -23,9 +23,9 @@ ARGUMENTS = (
     '--enable-unsafe-swiftshader',
     '--hide-scrollbars',
 )
-# The page's remark that there is no graphics card, which is nothing to show.
+# The page's notification that there is no graphics card, closed before the picture.
 REMARK = 'Software WebGL rendering detected'
-# A page that has not come to rest after this time is not waited for [s].
+# Longest wait for a page to stop changing [s].
 PATIENCE, PAUSE = 120.0, 1.5
 
 
@@ -44,7 +44,7 @@ def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
     OptionsError
         Playwright or a browser is missing.
     RrthError
-        The page does not come.
+        The page does not load.
 
     """
     if find_spec('playwright') is None:
