@@ -155,7 +155,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     Raises
     ------
     OptionsError
-        A margin or a guard length that is negative, not a number or beyond 1e4 m.
+        A margin or a ray_guard_length that is negative, not a number or beyond 1e4 m.
 
     """
     for name, value in (('margin', margin), ('ray_guard_length', ray_guard_length)):

@@ -29,7 +29,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 
 # Version of the record's layout; others are rejected.
-FORMAT = 1
+FORMAT = 2
 PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 
 
@@ -57,7 +57,7 @@ class Incident:
         The request of the plan.
     trajectory : Trajectory or None
         The motion concerned, if there was one already.
-    touch : Violation or None
+    violation : Violation or None
         The clearance violation that python-fcl found.
     present : Scene or None
         The wearer that the motion was checked against, where that is not the one it was planned
@@ -81,7 +81,7 @@ class Incident:
     time: str
     question: PlanQuestion
     trajectory: Trajectory | None = None
-    touch: Violation | None = None
+    violation: Violation | None = None
     present: Scene | None = None
     escape_time: float = 0.0
     error: str = ''
@@ -90,8 +90,8 @@ class Incident:
 
     def __post_init__(self) -> None:
         """Validate."""
-        if self.kind is IncidentKind.DISAGREEMENT and None in (self.trajectory, self.touch):
-            raise RecordError('incident: a disagreement without trajectory and touch')
+        if self.kind is IncidentKind.DISAGREEMENT and None in (self.trajectory, self.violation):
+            raise RecordError('incident: a disagreement without trajectory and violation')
         if self.trajectory is not None:
             width, dof = self.trajectory.positions.shape[1], self.question.arm.dof
             if width != dof:
@@ -108,7 +108,7 @@ def disagreement_incident(
         time=_now(),
         question=question,
         trajectory=found.trajectory,
-        touch=found.violation,
+        violation=found.violation,
         present=present,
         escape_time=found.escape_time,
         versions=versions(),
@@ -154,14 +154,15 @@ def incident_from_mapping(data: Any) -> Incident:
         raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
     if not isinstance(given['versions'], Mapping):
         raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
-    trajectory, touch, present = given['trajectory'], given['touch'], given['present']
+    trajectory, present = given['trajectory'], given['present']
+    violation = given['violation']
     return Incident(
         kind=IncidentKind(given['kind']),
         question=question_from_mapping(given['question']),
         trajectory=(
             None if trajectory is None else trajectory_from_mapping(trajectory, 'trajectory')
         ),
-        touch=None if touch is None else violation_from_mapping(touch),
+        violation=None if violation is None else violation_from_mapping(violation),
         present=None if present is None else scene_from_mapping(present, 'present'),
         escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
         traceback=text(given['traceback'], 'traceback', RecordError),

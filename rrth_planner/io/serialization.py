@@ -96,12 +96,12 @@ def trajectory_from_mapping(data: Any, name: str) -> Trajectory:
 
 def violation_from_mapping(data: Any) -> Violation:
     """Return the violation that `plain` wrote, or raise RrthError."""
-    given = fields_of(data, Violation, 'touch')
+    given = fields_of(data, Violation, 'violation')
     return Violation(
-        time=number(given['time'], 'touch: time', 's', RecordError),
-        distance=number(given['distance'], 'touch: distance', 'm', RecordError),
-        bar=printable(given['bar'], 'touch: bar', RecordError),
-        box=printable(given['box'], 'touch: box', RecordError),
+        time=number(given['time'], 'violation: time', 's', RecordError),
+        distance=number(given['distance'], 'violation: distance', 'm', RecordError),
+        bar=printable(given['bar'], 'violation: bar', RecordError),
+        box=printable(given['box'], 'violation: box', RecordError),
     )
 
 

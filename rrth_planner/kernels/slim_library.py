@@ -12,8 +12,8 @@ class SlimLibrary(JITCodeLibrary):
     """
     What numba has of a kernel: its code, and its module when others are compiled against it.
 
-    numba unpacks that module of each kernel that it loads, and keeps it: a tenth of the memory of
-    a node that never compiles anything.
+    numba unpacks that module of each kernel that it loads, and keeps it: 45 MB of the 235
+    MB of a process that plans, and never compiles anything.
     """
 
     _bitcode: bytes | None = None

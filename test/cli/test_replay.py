@@ -147,7 +147,7 @@ def test_a_motion_with_an_escape_is_checked_as_one(monkeypatch, capsys):
             break
     incident = disagreement(monkeypatch, question)
     assert incident.escape_time == plan.escape_time
-    assert incident.touch.time == plan.escape_time + TOUCH.time
+    assert incident.violation.time == plan.escape_time + TOUCH.time
     assert replay.replay(incident) == 1
     out = capsys.readouterr().out
     assert 'certificate: proven free' in out
@@ -231,7 +231,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         (None, 'No such file'),
         ('a: [', 'expected a readable YAML file'),
         ('', 'incident: None, expected a mapping'),
-        ('format: 9', 'format: 9, expected 1'),
+        ('format: 9', 'format: 9, expected 2'),
         ('\x00', 'expected a readable YAML file'),
         ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],

@@ -208,7 +208,7 @@ LENGTHS = {
         ('question', 'scene', 'boxes', 0, 'size', 1),
         ('question', 'goal', 'target', 0),
         ('trajectory', 'positions', 0, 0),
-        ('touch', 'distance'),
+        ('violation', 'distance'),
     ],
     'motion': [('points', 0, 'time'), ('points', 1, 'positions', 0)],
     'messages': [('boxes', 0, 'center', 0)],

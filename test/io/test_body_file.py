@@ -68,7 +68,7 @@ def test_settings_come_from_the_file_of_the_node(tmp_path):
     assert mine.margin == 0.03
     assert mine.limits.jerk.tolist() == [20.0] * 4
     assert isinstance(mine.options, RRTOptions)
-    with pytest.raises(OptionsError, match='speed: no parameter'):
+    with pytest.raises(OptionsError, match='speed: unknown parameter'):
         load_settings(4, speed=1.0)
     with pytest.raises(OptionsError, match='max_velocity: .* expected 4 values'):
         load_settings(4, max_velocity=[1.0, 2.0])

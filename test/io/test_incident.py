@@ -107,7 +107,7 @@ def incidents(draw):
         time=draw(LINES),
         question=question,
         trajectory=draw(trajectories()) if is_disagreement else None,
-        touch=touch if is_disagreement else None,
+        violation=touch if is_disagreement else None,
         present=draw(st.none() | scenes),
         escape_time=draw(st.floats(0.0, 9.0)),
         error=draw(LINES),
@@ -222,7 +222,7 @@ del_ = object()
 @pytest.mark.parametrize(
     ('path', 'value', 'sentence'),
     [
-        (('format',), 2, 'format: 2, expected 1'),
+        (('format',), 1, 'format: 1, expected 2'),
         (('kind',), 'storm', "kind: 'storm', expected disagreement or error"),
         (('kind',), [], 'kind: '),
         (('question',), None, 'question: None, expected a mapping'),
@@ -241,9 +241,9 @@ del_ = object()
         (('question', 'scene', 'boxes'), 7, 'scene: boxes: 7, expected a list'),
         (('question', 'scene', 'boxes'), [7], 'scene: box 0: 7, expected a mapping'),
         (('question', 'moving'), {}, 'moving: no state, running, time, expected'),
-        (('trajectory',), None, 'incident: a disagreement without trajectory and touch'),
+        (('trajectory',), None, 'incident: a disagreement without trajectory and violation'),
         (('trajectory', 'times'), [1.0], 'times: expected at least one, from 0'),
-        (('touch', 'bar'), 3, 'touch: bar: 3, expected a text'),
+        (('violation', 'bar'), 3, 'violation: bar: 3, expected a text'),
         (('versions',), [], 'versions: [], expected a mapping'),
     ],
 )

@@ -93,7 +93,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
     incident = read_incident(file)
     question = incident.question
     assert incident.kind is IncidentKind.DISAGREEMENT
-    assert incident.touch == VIOLATION
+    assert incident.violation == VIOLATION
     assert incident.present is None
     assert (question.seed, question.margin, question.ray_guard_length) == (5, 0.02, 1.0)
     assert question.options == RRTStarOptions(max_samples=500)
@@ -147,7 +147,7 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     stranger.wait_until(lambda: stranger.value('last incident') == str(file))
     assert stranger.value('incidents') == '1'
     incident = read_incident(file)
-    assert incident.touch == VIOLATION
+    assert incident.violation == VIOLATION
     np.testing.assert_array_equal(incident.trajectory.positions, stop.positions)
     assert replayed(file)[0] == 1
 

@@ -147,7 +147,7 @@ def project(robot, bounds, target, q, work):
     angle, distance = measure_aim(robot, target, q, work)
     damping, n_stalls = DAMPING, 0
     for _ in range(MAX_STEPS):
-        # The angle tells the ray from its backward extension.
+        # The angle distinguishes the ray from its backward extension.
         if angle * distance <= ACCURACY * (1.0 + distance):
             return distance
         if n_stalls == MAX_STALLS or not angle < math.inf:

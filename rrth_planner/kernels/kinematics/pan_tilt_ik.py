@@ -167,7 +167,7 @@ def goal_candidates(
 
 @kernel(boolean(CHAIN, MAT, MAT, VEC, float64))
 def is_goal_free(chain, robot, obstacles, q, reach):
-    """Return whether q is free with its ray out to the target, and up to the guard length."""
+    """Return whether q is free with its ray out to the target, and up to ray_guard_length."""
     ray_length = max(reach, robot[robot.shape[0] - 1, D])
     return is_configuration_free(q, ray_length, chain, obstacles)
 

@@ -115,7 +115,7 @@ def advance(
             meetings,
             best,
         )
-        # Trees that were taken over may have brought a path along.
+        # Reused trees may have brought a path along.
         if is_better or best[0] < math.inf and best[3] == math.inf:
             row = int64(best[1])
             n = trace_path(tree_q, links, meetings[row, 0], meetings[row, 1], path)
