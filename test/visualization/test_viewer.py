@@ -142,9 +142,9 @@ def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
     file.write_text('markers: 5\n')
     for arguments, words in (
         (['--ros-args', '-r', '__ns:=/a'], 'expected only with --live'),
-        (['--set', 'speed=3'], 'speed: no parameter'),
+        (['--set', 'speed=3'], 'speed: unknown parameter'),
         (['--set', 'speed'], 'expected NAME=VALUE'),
-        (['--set', 'dof=4'], 'dof: no parameter'),
+        (['--set', 'dof=4'], 'dof: unknown parameter'),
         (['--set', 'margin=[0.1]'], 'margin: [0.1], expected a number [m]'),
         (['--set', 'margin="1"'], "margin: '1', expected a number [m]"),
         (['--set', 'margin=*a'], '--set margin: line 1: '),
