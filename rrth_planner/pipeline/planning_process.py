@@ -5,6 +5,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+import io
 from multiprocessing.connection import Connection, Pipe
 import os
 import pickle
@@ -13,7 +14,6 @@ import subprocess
 import sys
 from typing import Any, Protocol
 
-import numpy as np
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import RrthError
@@ -25,8 +25,8 @@ from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
-# Of the arrays in a message [bytes].
-ALIGNMENT = 16
+# A channel remembers so many arms and scenes: more than any message holds.
+SENT_ONCE, REMEMBERED = (ArmModel, Scene), 64
 # A process that has not ended by itself after this time is killed [s].
 LONGEST_END = 5.0
 WORKER = 'rrth_planner.pipeline.planning_worker'
@@ -173,7 +173,7 @@ class PlanningProcess:
 
     def close(self) -> None:
         """End it."""
-        self._line.close()
+        self._channel.line.close()
         try:
             self._process.wait(LONGEST_END)
         except subprocess.TimeoutExpired:
@@ -186,7 +186,8 @@ class PlanningProcess:
         return self._process.pid
 
     def _start(self) -> None:
-        self._line, end = Pipe()
+        line, end = Pipe()
+        self._channel = Channel(line)
         # Ctrl-C is sent to all processes of a terminal; this one, which inherits the signal mask,
         # ends with its parent instead. In a session of its own it would be scheduled apart from
         # its parent, and could starve.
@@ -223,17 +224,17 @@ class PlanningProcess:
         self._is_busy = True
         # A dead process is detected while waiting for the answer.
         with suppress(OSError):
-            send(self._line, (name, arguments))
+            self._channel.send((name, arguments))
 
     def _end(self, should_stop: Callable[[], bool]) -> Any:
         """Return the answer to the last call, or raise its error."""
         is_stopped = False
         try:
-            while not self._line.poll(POLL_PERIOD):
+            while not self._channel.line.poll(POLL_PERIOD):
                 if not is_stopped and should_stop():
                     is_stopped = True
-                    send(self._line, STOP)
-            answer = receive(self._line)
+                    self._channel.send(STOP)
+            answer = self._channel.receive()
         except (EOFError, OSError) as problem:
             raise PlanningProcessError(self._restart('while working')) from problem
         self._is_busy = False
@@ -243,7 +244,7 @@ class PlanningProcess:
 
     def _restart(self, when: str) -> str:
         """Replace a process that has died; return the sentence for the log."""
-        self._line.close()
+        self._channel.line.close()
         try:
             code = self._process.wait(LONGEST_END)
         except subprocess.TimeoutExpired:
@@ -255,27 +256,73 @@ class PlanningProcess:
         return sentence
 
 
-def send(line: Connection, value: Any) -> None:
-    """Send a value: its arrays, which a receiver may not write to, follow it in the message."""
-    found: list[pickle.PickleBuffer] = []
-    data = pickle.dumps(value, protocol=5, buffer_callback=found.append)
-    parts = [data, *(buffer.raw() for buffer in found)]
-    sizes = [len(part) for part in parts]
-    head = np.array([len(parts), *sizes], dtype=np.int64).tobytes()
-    # Compiled code takes aligned arrays only.
-    padded = (bytes(part) + bytes(-len(part) % ALIGNMENT) for part in (head, *parts))
-    # In one call: each one releases the interpreter, and waits for it again.
-    line.send_bytes(b''.join(padded))
+class Channel:
+    """
+    One end of a pipe to another process.
+
+    Arms and scenes are sent once: much is derived from each, and kept for as long as it is the
+    same object. Both ends remember the last ones, by their identity at the sender.
+
+    Parameters
+    ----------
+    line : Connection
+        It is written and read only here.
+
+    """
+
+    def __init__(self, line: Connection) -> None:
+        """Begin without arms and scenes."""
+        self.line = line
+        self._sent: dict[int, Any] = {}
+        self._received: dict[int, Any] = {}
+
+    def send(self, value: Any) -> None:
+        """Send a value."""
+        out = io.BytesIO()
+        pickler = _Pickler(out, self._sent)
+        pickler.dump(value)
+        # In one call: each one releases the interpreter, and waits for it again.
+        self.line.send_bytes(pickle.dumps((pickler.news, out.getvalue()), protocol=5))
+        _forget_first(self._sent)
+
+    def receive(self) -> Any:
+        """Return the next value; what was read-only is read-only."""
+        news, data = pickle.loads(self.line.recv_bytes())
+        self._received.update(news)
+        value = _Unpickler(data, self._received).load()
+        _forget_first(self._received)
+        return value
 
 
-def receive(line: Connection) -> Any:
-    """Return the next value; its arrays are read-only."""
-    message = memoryview(line.recv_bytes())
-    n_parts = int.from_bytes(message[:8], sys.byteorder)
-    sizes = np.frombuffer(message, dtype=np.int64, count=n_parts, offset=8)
-    parts, begin = [], 8 * (1 + n_parts)
-    for size in sizes.tolist():
-        begin += -begin % ALIGNMENT
-        parts.append(message[begin : begin + size])
-        begin += size
-    return pickle.loads(parts[0], buffers=parts[1:])
+class _Pickler(pickle.Pickler):
+    """Writes the identity of what is sent once; what was not sent yet is its news."""
+
+    def __init__(self, out: io.BytesIO, sent: dict[int, Any]) -> None:
+        super().__init__(out, protocol=5)
+        self._sent = sent
+        self.news: dict[int, Any] = {}
+
+    def persistent_id(self, part: Any) -> int | None:
+        if type(part) not in SENT_ONCE:
+            return None
+        if id(part) not in self._sent:
+            # Kept alive, so that no other one takes over its identity.
+            self._sent[id(part)] = self.news[id(part)] = part
+        return id(part)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads what `_Pickler` writes."""
+
+    def __init__(self, data: bytes, received: dict[int, Any]) -> None:
+        super().__init__(io.BytesIO(data))
+        self._received = received
+
+    def persistent_load(self, identity: int) -> Any:
+        return self._received[identity]
+
+
+def _forget_first(parts: dict[int, Any]) -> None:
+    """Forget what was sent first, beyond what is remembered."""
+    while len(parts) > REMEMBERED:
+        del parts[next(iter(parts))]

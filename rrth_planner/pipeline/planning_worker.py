@@ -17,7 +17,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import one_line
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.planning_process import Raised, receive, send, STOP
+from rrth_planner.pipeline.planning_process import Channel, Raised, STOP
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import TreeOptions
 
@@ -25,10 +25,10 @@ from rrth_planner.planning.options import TreeOptions
 def main() -> None:
     """Serve the connection of the given file descriptor until it is closed."""
     _lower_priority()
-    line, planner = Connection(int(sys.argv[1])), InProcessPlanner()
+    channel, planner = Channel(Connection(int(sys.argv[1]))), InProcessPlanner()
     # A hundred times as fast as the connection's own method, and asked as often while planning.
     readable = select.poll()
-    readable.register(line, select.POLLIN)
+    readable.register(channel.line, select.POLLIN)
 
     def plan(question: PlanQuestion) -> MotionPlan:
         # Whatever comes meanwhile is a STOP, or the end of the owner.
@@ -45,14 +45,14 @@ def main() -> None:
         'plan': plan,
         'violation_seen': planner.violation_seen,
     }
-    serve(line, work)
+    serve(channel, work)
 
 
-def serve(line: Connection, work: Mapping[str, Callable[..., Any]]) -> None:
+def serve(channel: Channel, work: Mapping[str, Callable[..., Any]]) -> None:
     """Serve requests, functions by their names, one after the other."""
     while True:
         try:
-            request = receive(line)
+            request = channel.receive()
             if request is STOP:
                 # It came after the answer was sent.
                 continue
@@ -61,7 +61,7 @@ def serve(line: Connection, work: Mapping[str, Callable[..., Any]]) -> None:
                 answer = work[name](*arguments)
             except Exception as problem:
                 answer = _portable(problem)
-            send(line, answer)
+            channel.send(answer)
         except (EOFError, OSError):
             return
 

@@ -19,11 +19,11 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.pipeline.planning_process import (
+    Channel,
     PlanningProcess,
     PlanningProcessError,
     PlanningTraceback,
-    receive,
-    send,
+    REMEMBERED,
     STOP,
 )
 from rrth_planner.pipeline.request import PlanQuestion
@@ -123,16 +123,40 @@ def test_cancelled_requests_end(process):
 
 
 def test_a_stop_that_comes_after_the_answer_stops_nothing():
-    ours, theirs = Pipe()
+    ours, theirs = map(Channel, Pipe())
     thread = Thread(target=worker.serve, args=(theirs, {'double': lambda k: 2 * k}))
     thread.start()
     for k in range(3):
-        send(ours, ('double', (k,)))
-        assert receive(ours) == 2 * k
-        send(ours, STOP)
-    ours.close()
+        ours.send(('double', (k,)))
+        assert ours.receive() == 2 * k
+        ours.send(STOP)
+    ours.line.close()
     thread.join(LONGEST_WAIT)
     assert not thread.is_alive()
+
+
+def test_arms_and_scenes_are_sent_once():
+    ours, theirs = map(Channel, Pipe())
+    arm, scenes = worlds.table_1_arm(), [Scene(()) for _ in range(REMEMBERED + 1)]
+
+    def sent(*parts):
+        ours.send(parts)
+        return theirs.receive()
+
+    first, scene = sent(arm, scenes[0])
+    assert first is not arm
+    np.testing.assert_array_equal(first.dh, arm.dh)
+    for values in (first.dh, first.bounds):
+        assert not values.flags.writeable
+        assert values.flags.aligned
+    assert sent(scenes[0], arm) == (scene, first)
+    # What was sent long ago is sent anew, and nothing is mistaken for something else.
+    others = [sent(other)[0] for other in scenes[1:]]
+    (again,) = sent(arm)
+    assert again is not first
+    np.testing.assert_array_equal(again.dh, arm.dh)
+    assert sent(*scenes[-9:]) == tuple(others[-9:])
+    ours.line.close()
 
 
 def test_one_that_dies_over_a_question_says_so_and_another_one_goes_on(process, said):
@@ -185,13 +209,13 @@ def test_an_error_that_cannot_be_sent_becomes_a_sentence():
     def fail():
         raise LocalError('out of paper')
 
-    ours, theirs = Pipe()
+    ours, theirs = map(Channel, Pipe())
     Thread(target=worker.serve, args=(theirs, {'fail': fail}), daemon=True).start()
-    send(ours, ('fail', ()))
-    raised = receive(ours)
+    ours.send(('fail', ()))
+    raised = ours.receive()
     assert isinstance(raised.problem, RuntimeError)
     assert str(raised.problem) == 'LocalError: out of paper'
-    ours.close()
+    ours.line.close()
 
 
 def test_an_arm_that_cannot_point_is_rejected(process):
