@@ -112,13 +112,13 @@ def plan_again(incident: Incident) -> Replanned:
     from rrth_planner.kernels.precompile import prepare_kernels
 
     prepare_kernels(partial(say, 'replay'))
-    from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+    from rrth_planner.pipeline.plan_motion import plan_question, warm_up
 
     question = incident.question
     try:
         # Compilation must not count as planning time.
         warm_up(question.arm, question.options)
-        return Replanned(plan_motion(**question.arguments))
+        return Replanned(plan_question(question))
     except Exception as problem:
         return Replanned(None, type(problem).__name__, str(problem), traceback.format_exc())
 

@@ -13,6 +13,7 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.rejection import CANCELLED, depth_sentence, Rejection
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.timing.lead_in import LeadIn
 from rrth_planner.timing.parameterization import parameterize
 
@@ -56,14 +57,10 @@ class Escape:
 
 
 def plan_escape(
+    question: PlanQuestion,
     world: World,
     q_start: Array,
-    limits: MotionLimits,
-    *,
-    margin: float,
     spares: tuple[float, ...],
-    escape_depth: float,
-    seed: int,
     should_stop: Callable[[], bool],
 ) -> Escape | Rejection:
     """
@@ -71,32 +68,27 @@ def plan_escape(
 
     Parameters
     ----------
+    question : PlanQuestion
     world : World
         Its boxes grown by the margin.
     q_start : ndarray, shape (dof,)
         Where the arm is, at rest, within its limits and in a box [rad].
-    limits : MotionLimits
-    margin : float
-        [m].
     spares : tuple of float
         Clearance beyond the margin to end with; the next where there is no room for one [m].
-    escape_depth : float
-        From this penetration depth on there is no escape [m].
-    seed : int
-        Of the random directions.
     should_stop : callable
-        True cancels.
+        Polled; True cancels.
 
     """
+    escape_depth, limits = question.escape_depth, question.limits
     depths = box_depths(world, q_start)
-    sentence = depth_sentence(world, depths, margin)
+    sentence = depth_sentence(world, depths, question.margin)
     if not max(0.0, float(depths.max())) < escape_depth:
         return Rejection(
             PlanStatus.START_IN_COLLISION,
             f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
         )
     for spare in spares:
-        roomy, rng = grown(world, spare), np.random.default_rng(seed)
+        roomy, rng = grown(world, spare), np.random.default_rng(question.seed)
         best, longest = None, LONGEST
         # The direct solution is mostly the shortest escape.
         for search in (_pushed, _scattered):

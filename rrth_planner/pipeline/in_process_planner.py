@@ -9,7 +9,7 @@ import gc
 from rrth_planner.collision.trajectory_validation import violation_seen
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
+from rrth_planner.pipeline.plan_motion import plan_question, warm_up
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import TreeOptions
 
@@ -29,8 +29,8 @@ class InProcessPlanner:
     def plan(
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
-        """Return what `plan_motion` answers to a question, without the search behind it."""
-        return replace(plan_motion(**question.arguments, should_stop=should_stop), search=None)
+        """Return what `plan_question` returns, without the search behind it."""
+        return replace(plan_question(question, should_stop), search=None)
 
     def close(self) -> None:
         """Do nothing."""

@@ -18,7 +18,6 @@ class MotionPlan:
 
     Parameters
     ----------
-    status : PlanStatus
     sentence : str
         The result, with figures and units, for the caller.
     seed : int

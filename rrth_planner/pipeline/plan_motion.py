@@ -33,6 +33,7 @@ from rrth_planner.pipeline.rejection import (
     target_rejection,
     within_limits,
 )
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.pipeline.time_path import time_path
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import PlanResult
@@ -69,8 +70,6 @@ def plan_motion(
         The wearer in the base frame.
     q_start : ndarray, shape (dof,)
         Where the arm is, at rest [rad].
-    goal : PointingGoal
-    limits : MotionLimits
     options : TreeOptions
         Their class is the choice of the algorithm.
     margin : float
@@ -90,10 +89,36 @@ def plan_motion(
         first [m]; 0: never. The depth is by how much a box would have to be smaller on every
         side.
 
+    Raises
+    ------
+    OptionsError
+        A number out of its range, or values of another number of joints than the arm's.
+
     """
+    question = PlanQuestion(
+        arm=arm,
+        scene=scene,
+        q_start=q_start,
+        goal=goal,
+        limits=limits,
+        options=options,
+        margin=margin,
+        ray_guard_length=ray_guard_length,
+        seed=seed,
+        moving=moving,
+        escape_depth=escape_depth,
+    )
+    return plan_question(question, should_stop)
+
+
+def plan_question(
+    question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
+) -> MotionPlan:
+    """Return the certified motion of a question, as `plan_motion` does for its arguments."""
     begin = time.perf_counter()
-    q_start = within_limits(arm, q_start)
-    world = _world_of(arm, scene, margin, ray_guard_length)
+    arm, scene, margin, moving = question.arm, question.scene, question.margin, question.moving
+    q_start = within_limits(arm, question.q_start)
+    world = _world_of(arm, scene, margin, question.ray_guard_length)
     escape, disagreement = None, None
     leads: Iterable[LeadIn | None | Rejection] = (None,)
     rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
@@ -104,40 +129,29 @@ def plan_motion(
                 rejection, sentence=f'{sentence}, expected an arm at rest or clear of it'
             )
         else:
-            out = plan_escape(
-                world,
-                q_start,
-                limits,
-                margin=margin,
-                spares=SPARES,
-                escape_depth=escape_depth,
-                seed=seed,
-                should_stop=should_stop,
-            )
+            out = plan_escape(question, world, q_start, SPARES, should_stop)
             if isinstance(out, Escape):
                 rejection, escape = None, out
-                leads = (out.lead_in(limits),)
+                leads = (out.lead_in(question.limits),)
             else:
                 rejection = out
     if rejection is None:
-        rejection = CANCELLED if should_stop() else target_rejection(scene, goal, margin)
+        rejection = CANCELLED if should_stop() else target_rejection(scene, question.goal, margin)
     if moving is not None:
-        leads = _leads(arm, world, moving, limits)
+        leads = _leads(arm, world, moving, question.limits)
     for lead in leads if rejection is None else ():
         if isinstance(lead, Rejection):
             rejection = lead
             break
         q_from = q_start if lead is None else lead.q_stop
-        found = find_path(arm, goal, world, q_from, options, seed, should_stop, begin)
+        found = find_path(question, world, q_from, should_stop, begin)
         if isinstance(found, Rejection):
             rejection = found
             break
         assert found.path is not None
-        timed = time_path(
-            arm, scene, goal, world, found.path, limits, margin, lead, escape, should_stop
-        )
+        timed = time_path(question, world, found.path, lead, escape, should_stop)
         if isinstance(timed, Trajectory):
-            return _solved(arm, goal, world, found, timed, margin, seed, begin, escape)
+            return _solved(question, world, found, timed, begin, escape)
         if isinstance(timed, Disagreement):
             disagreement = timed
             rejection = Rejection(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
@@ -148,8 +162,8 @@ def plan_motion(
     assert rejection is not None
     return MotionPlan(
         status=rejection.status,
-        sentence=f'{rejection.sentence}, seed {seed}',
-        seed=seed,
+        sentence=f'{rejection.sentence}, seed {question.seed}',
+        seed=question.seed,
         planning_time=time.perf_counter() - begin,
         disagreement=disagreement,
     )
@@ -206,13 +220,10 @@ def _leads(
 
 
 def _solved(
-    arm: ArmModel,
-    goal: PointingGoal,
+    question: PlanQuestion,
     world: World,
     result: PlanResult,
     trajectory: Trajectory,
-    margin: float,
-    seed: int,
     begin: float,
     escape: Escape | None,
 ) -> MotionPlan:
@@ -220,7 +231,7 @@ def _solved(
     assert path is not None
     # The world's boxes are the body's grown by margin and slack.
     escape_time = 0.0 if escape is None else escape.trajectory.duration
-    clearance = least_clearance(trajectory, grown(world, -margin), escape_time)
+    clearance = least_clearance(trajectory, grown(world, -question.margin), escape_time)
     planning_time = time.perf_counter() - begin
     note = '' if result.is_reproducible else '; improvement ended by the time limit'
     if escape is not None:
@@ -232,14 +243,14 @@ def _solved(
         sentence=(
             f'{len(path.waypoints)} waypoints, duration {trajectory.duration:.3f} s, path length '
             f'{path.length:.4f} rad, least clearance {clearance:.4f} m, planning time '
-            f'{planning_time * 1e3:.2f} ms, seed {seed}{note}'
+            f'{planning_time * 1e3:.2f} ms, seed {question.seed}{note}'
         ),
-        seed=seed,
+        seed=question.seed,
         planning_time=planning_time,
         path=path,
         trajectory=trajectory,
         clearance=clearance,
-        target_distance=reach_to(arm, goal.target, path.waypoints[-1]),
+        target_distance=reach_to(question.arm, question.goal.target, path.waypoints[-1]),
         escape_time=escape_time,
         search=result,
     )

@@ -8,12 +8,10 @@ import time
 
 import numpy as np
 from rrth_planner.collision.world import grown, World
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.pipeline.rejection import CANCELLED, goal_rejection, Rejection
-from rrth_planner.planning.options import TreeOptions
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.planner import plan, PlanResult
 from rrth_planner.planning.pointing_goals import (
     FEW,
@@ -29,12 +27,9 @@ SPARES = (5e-3, 1e-5)
 
 
 def find_path(
-    arm: ArmModel,
-    goal: PointingGoal,
+    question: PlanQuestion,
     world: World,
     q_start: Array,
-    options: TreeOptions,
-    seed: int,
     should_stop: Callable[[], bool],
     begin: float,
 ) -> PlanResult | Rejection:
@@ -43,20 +38,18 @@ def find_path(
 
     Parameters
     ----------
-    arm : ArmModel
-    goal : PointingGoal
+    question : PlanQuestion
     world : World
         Its boxes grown by the margin.
     q_start : ndarray, shape (dof,)
-        [rad].
-    options : TreeOptions
-    seed : int
+        Where the path begins, which need not be where the arm is [rad].
     should_stop : callable
         Polled; True cancels.
     begin : float
         When the request came, by `time.perf_counter`: its time limit counts from there [s].
 
     """
+    arm, goal, options = question.arm, question.goal, question.options
     goals: GoalSet | None = None
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
@@ -74,7 +67,7 @@ def find_path(
         share = 0.5 if spare == SPARES[0] else 1.0
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
         problem = pointing_problem(arm, goal, roomy, q_start, goals)
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(question.seed)
         result = plan(problem, replace(options, time_limit=left), rng, should_stop)
         n_samples += result.n_samples
         is_clocked |= result.status is PlanStatus.TIMEOUT

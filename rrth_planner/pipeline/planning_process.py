@@ -59,7 +59,7 @@ class Planner(Protocol):
     def plan(
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
-        """Return what `plan_motion` answers to a question, without the search behind it."""
+        """Return what `plan_question` returns, without the search behind it."""
 
     def violation_seen(
         self,
@@ -86,7 +86,6 @@ class PlanningProcess:
 
     Parameters
     ----------
-    arm : ArmModel
     options : TreeOptions
         The kernels are loaded for these.
     on_death : callable
@@ -123,11 +122,10 @@ class PlanningProcess:
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
         """
-        Return what `plan_motion` answers to a question, without the search behind it.
+        Return what `plan_question` returns, without the search behind it.
 
         Parameters
         ----------
-        question : PlanQuestion
         should_stop : callable
             Polled while it plans; True cancels.
 
@@ -306,7 +304,7 @@ class _Pickler(pickle.Pickler):
         if type(part) not in SENT_ONCE:
             return None
         if id(part) not in self._sent:
-            # Kept alive, so that no other one takes over its identity.
+            # Kept alive, so that nothing else can have its identity.
             self._sent[id(part)] = self.news[id(part)] = part
         return id(part)
 

@@ -31,7 +31,6 @@ class Rejection:
 
     Parameters
     ----------
-    status : PlanStatus
     sentence : str
         For the caller, with figures and units.
 
@@ -56,7 +55,6 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
 
     Parameters
     ----------
-    arm : ArmModel
     world : World
         Its boxes grown by the margin and the least clearance beyond it.
     q_start : ndarray, shape (dof,)

@@ -2,8 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """All inputs of a plan in one value: the same question has the same answer."""
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
@@ -22,13 +21,8 @@ class PlanQuestion:
 
     Parameters
     ----------
-    arm : ArmModel
-    scene : Scene
     q_start : array_like, shape (dof,)
         [rad].
-    goal : PointingGoal
-    limits : MotionLimits
-    options : TreeOptions
     margin, ray_guard_length : float
         From 0 to 1e4 [m].
     seed : int
@@ -77,8 +71,3 @@ class PlanQuestion:
                 )
         if self.seed < 0:
             raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """The arguments of `plan_motion` by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}

@@ -11,14 +11,13 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.trajectory_validation import violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import grown, World
-from rrth_planner.model.arm import ArmModel, reach_to
-from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.arm import reach_to
 from rrth_planner.model.path import Path
-from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape
 from rrth_planner.pipeline.rejection import CANCELLED, Rejection
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.timing.corner_blends import Blend, round_corners
 from rrth_planner.timing.lead_in import LeadIn, reserved
 from rrth_planner.timing.parameterization import excess, parameterize, TooFastError
@@ -33,13 +32,9 @@ FIRST_SHARES = (0.5, 0.2, 0.0)
 
 
 def time_path(
-    arm: ArmModel,
-    scene: Scene,
-    goal: PointingGoal,
+    question: PlanQuestion,
     world: World,
     path: Path,
-    limits: MotionLimits,
-    margin: float,
     lead: LeadIn | None,
     escape: Escape | None,
     should_stop: Callable[[], bool],
@@ -49,17 +44,11 @@ def time_path(
 
     Parameters
     ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame, for the second checker.
-    goal : PointingGoal
+    question : PlanQuestion
     world : World
-        The same, grown by the margin [m].
+        Its boxes grown by the margin.
     path : Path
         Proven free.
-    limits : MotionLimits
-    margin : float
-        [m].
     lead : LeadIn or None
         Precedes the path.
     escape : Escape or None
@@ -68,6 +57,7 @@ def time_path(
         Polled; True cancels.
 
     """
+    limits = question.limits
     if lead is not None and lead.speed > 0.0:
         path = _straight_on(lead, path)
     if should_stop():
@@ -99,9 +89,14 @@ def time_path(
         )
     if should_stop():
         return CANCELLED
-    target_distance = reach_to(arm, goal.target, path.waypoints[-1])
     violation = violation_seen(
-        arm, scene, trajectory, margin, world.ray_length, target_distance, escape_time
+        question.arm,
+        question.scene,
+        trajectory,
+        question.margin,
+        question.ray_guard_length,
+        reach_to(question.arm, question.goal.target, path.waypoints[-1]),
+        escape_time,
     )
     if should_stop():
         return CANCELLED
@@ -118,10 +113,8 @@ def in_time(
 
     Parameters
     ----------
-    path : Path
     choices : sequence of tuple of Blend
         Blends of the corners.
-    limits : MotionLimits
     lead : LeadIn or None
         What comes before the path, whose first edge is then followed from its speed on.
 

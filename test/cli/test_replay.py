@@ -51,7 +51,7 @@ def disagreement(monkeypatch, question=QUESTION):
     """Return the record of a plan that python-fcl, patched, had something against."""
     with monkeypatch.context() as patch:
         disagree(patch)
-        plan = pipeline.plan_motion(**question.arguments)
+        plan = pipeline.plan_question(question)
     assert plan.status is PlanStatus.NOT_CERTIFIED
     assert plan.trajectory is None
     when = plan.disagreement.escape_time + TOUCH.time
@@ -114,7 +114,7 @@ def test_another_motion_is_no_reproduction(monkeypatch, capsys):
 
 
 def test_a_motion_of_an_arm_that_moves_is_planned_again_to_the_bit(monkeypatch, capsys, tmp_path):
-    running = pipeline.plan_motion(**QUESTION.arguments).trajectory
+    running = pipeline.plan_question(QUESTION).trajectory
     moving = predict_start_state(running.positions[0], running.velocities[0], None, 0.0)
     state = replace(moving.state, velocities=np.array([0.2, 0.0, 0.1, 0.0]))
     moving = replace(moving, state=state, running=running, time=0.0)
@@ -142,7 +142,7 @@ def test_a_motion_with_an_escape_is_checked_as_one(monkeypatch, capsys):
         question = replace(QUESTION, q_start=rng.uniform(*world.bounds))
         if world.is_valid(question.q_start):
             continue
-        plan = pipeline.plan_motion(**question.arguments)
+        plan = pipeline.plan_question(question)
         if plan.escape_time > 0.0:
             break
     incident = disagreement(monkeypatch, question)
@@ -201,13 +201,13 @@ def test_an_error_is_reproduced_by_an_error_of_the_same_kind(monkeypatch, capsys
     assert (
         'not reproduced: recorded was ZeroDivisionError, now: solved: ' in capsys.readouterr().out
     )
-    monkeypatch.setattr('rrth_planner.pipeline.plan_motion.plan_motion', fail)
+    monkeypatch.setattr('rrth_planner.pipeline.plan_motion.plan_question', fail)
     assert replay.main([str(path)]) == 0
     assert 'reproduced: ZeroDivisionError, as recorded' in capsys.readouterr().out
 
 
 def test_an_error_after_the_plan_says_so(capsys):
-    trajectory = pipeline.plan_motion(**QUESTION.arguments).trajectory
+    trajectory = pipeline.plan_question(QUESTION).trajectory
     incident = error_incident(QUESTION, OSError('no publisher'), 'Traceback ...', trajectory)
     assert replay.replay(incident) == 1
     out = capsys.readouterr().out

@@ -13,6 +13,7 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.kinematics.pan_tilt_ik import aim
 from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.start_state import MotionState, StartState
@@ -230,7 +231,8 @@ def test_a_start_beyond_a_limit_is_rejected_with_joint_and_limits():
             assert 'rad' in plan.sentence
         q = FOLDED.copy()
         q[k] = np.nan
-        assert ask(wearer(), q, [1.5, 0.0, 0.3]).status is PlanStatus.START_OUT_OF_BOUNDS
+        with pytest.raises(OptionsError, match='q_start: .*nan.*, expected finite numbers'):
+            ask(wearer(), q, [1.5, 0.0, 0.3])
 
 
 def test_an_arm_that_points_already_holds_still():

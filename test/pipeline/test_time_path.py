@@ -13,6 +13,7 @@ from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.pipeline import time_path as path_timing
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.pipeline.time_path import HAIR, time_path
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
@@ -44,7 +45,18 @@ def timed(path):
     """Return the motion of a path; its goal is on the part of the ray that is kept clear."""
     T = tool_pose(ARM, path.waypoints[-1])
     goal = PointingGoal(T[:3, 3] + 0.9 * RAY * T[:3, 2])
-    return time_path(ARM, WEARER, goal, WORLD, path, limits(), MARGIN, None, None, lambda: False)
+    question = PlanQuestion(
+        arm=ARM,
+        scene=WEARER,
+        q_start=path.waypoints[0],
+        goal=goal,
+        limits=limits(),
+        options=RRTHOptions(),
+        margin=MARGIN,
+        ray_guard_length=RAY,
+        seed=0,
+    )
+    return time_path(question, WORLD, path, None, None, lambda: False)
 
 
 def test_a_corner_without_room_is_a_stop_and_no_failure():

@@ -65,7 +65,6 @@ FCL_USERS = {
     'rrth_planner.collision.trajectory_validation',
     'rrth_planner.collision.checker_comparison',
     'rrth_planner.pipeline.collision_escape',
-    'rrth_planner.ros.requests.stop_validation',
 }
 # Modules that import of the project below their top: the node says that it compiles before it
 # imports what has to be compiled, a command so too, and which libraries it misses before it

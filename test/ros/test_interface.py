@@ -298,9 +298,9 @@ def test_a_playback_in_simulated_time_stays_where_it_is_when_the_clock_is_set_ba
 def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
     planner, stranger = start(seed=5)
     say_all(planner, stranger)
-    jerks, plan_motion = [], in_process_planner.plan_motion
+    jerks, plan_motion = [], in_process_planner.plan_question
 
-    def plan_while_it_is_set(*args, **kwargs):
+    def plan_while_it_is_set(question, should_stop):
         if not jerks:
             planner.set_parameters(
                 [
@@ -309,10 +309,10 @@ def test_a_plan_keeps_to_the_parameters_of_its_begin(start, monkeypatch):
                     Parameter('margin', value=0.03),
                 ]
             )
-        jerks.append(kwargs['limits'].jerk[0])
-        return plan_motion(*args, **kwargs)
+        jerks.append(question.limits.jerk[0])
+        return plan_motion(question, should_stop)
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_is_set)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_it_is_set)
     # They monitor the motion, too.
     for seed, margin in ((5, 0.02), (6, 0.03)):
         assert stranger.answer().message.endswith(f'seed {seed}')

@@ -42,7 +42,7 @@ from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
 from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
-from rrth_planner.ros.requests import wait_for_rest  # noqa: E402
+from rrth_planner.ros.requests import request_queue  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -312,7 +312,7 @@ def test_deeper_than_escape_depth_is_rejected(start):
 def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
     moves = iter((leaned(), fenced()))
 
     def plan_while_the_body_changes(*args, **kwargs):
@@ -323,7 +323,7 @@ def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_the_body_changes)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_body_changes)
     assert stranger.answer().success
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
@@ -336,7 +336,7 @@ def test_no_escape_is_published_once_the_arm_is_too_deep(
     # It is 0.0275 m deep at first.
     planner, stranger = start(escape_depth=depth)
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
 
     def plan_while_the_wearer_leans(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
@@ -344,7 +344,7 @@ def test_no_escape_is_published_once_the_arm_is_too_deep(
         wait_until(lambda: inputs.body.value is not body)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_the_wearer_leans)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_leans)
     assert stranger.answer().message.startswith(answer)
 
 
@@ -353,7 +353,7 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
 ):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger, body_boxes=leaned())
-    inputs, plan_motion, violations = inputs_of(planner), in_process_planner.plan_motion, []
+    inputs, plan_motion, violations = inputs_of(planner), in_process_planner.plan_question, []
 
     def plan_while_a_box_comes(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -367,7 +367,7 @@ def test_both_checkers_check_an_escape_when_the_wearer_moved(
             )
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_box_comes)
     with monkeypatch.context() as patch:
         patch.setattr(trajectory_validation, 'leads_out', lambda *_: False)
         message = stranger.answer().message
@@ -441,7 +441,7 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
         raise ZeroDivisionError('of a test')
 
     with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_motion', fail)
+        patch.setattr(in_process_planner, 'plan_question', fail)
         message = stranger.answer().message
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
@@ -467,7 +467,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
 ):
     planner, stranger = start()
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
 
     def plan_while_things_move(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -476,7 +476,7 @@ def test_a_plan_for_what_is_no_longer_there_is_not_published(
         wait_until(lambda: inputs.body.value is not body or inputs.joints.value is not positions)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_things_move)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_things_move)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): ')
     assert sentence in message
@@ -518,7 +518,7 @@ def test_there_is_no_handover_of_an_arm_above_its_limits(start):
 def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger)
-    source, plan_motion = inputs_of(planner).joints, in_process_planner.plan_motion
+    source, plan_motion = inputs_of(planner).joints, in_process_planner.plan_question
 
     def plan_while_it_starts(*args, **kwargs):
         plan = plan_motion(*args, **kwargs)
@@ -526,7 +526,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
         wait_until(lambda: source.value.velocities[1] == 0.3)
         return plan
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_it_starts)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_it_starts)
     message = stranger.answer().message
     assert message.startswith('START_STATE_INVALID (-26): joint_2 moves at 0.300 rad/s')
     assert not stranger.received['joint_trajectory']
@@ -535,7 +535,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
 @pytest.mark.parametrize(
     ('owner', 'step', 'topic', 'msg', 'answer'),
     [
-        (in_process_planner, 'plan_motion', 'body_boxes', fenced(), 'the wearer moved'),
+        (in_process_planner, 'plan_question', 'body_boxes', fenced(), 'the wearer moved'),
         (Revalidation, 'disagreement', 'body_boxes', fenced(), 'the wearer moved'),
         (
             Revalidation,
@@ -661,7 +661,7 @@ def stop_for(planner):
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
-    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     stop_for(planner)
@@ -679,14 +679,14 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
 def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    plan_motion = in_process_planner.plan_motion
+    plan_motion = in_process_planner.plan_question
 
     def plan_while_the_arm_is_stopped(*args, **kwargs):
         planner._monitor.n_stops += 1
         return plan_motion(*args, **kwargs)
 
     with monkeypatch.context() as patch:
-        patch.setattr(in_process_planner, 'plan_motion', plan_while_the_arm_is_stopped)
+        patch.setattr(in_process_planner, 'plan_question', plan_while_the_arm_is_stopped)
         message = stranger.answer().message
     assert message.startswith(
         'MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the arm was stopped while its motion'
@@ -696,7 +696,7 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
 
 
 def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
-    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 30.0)
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
     stop_for(planner)
@@ -710,7 +710,7 @@ def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, 
 
 
 def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, monkeypatch):
-    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 300.0)
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 300.0)
     planner, stranger = start()
     say_all(planner, stranger)
     # No joint state comes that would show it at rest.
@@ -724,7 +724,7 @@ def test_a_request_does_not_wait_for_the_rest_of_an_arm_that_was_stopped(start, 
 
 
 def test_a_request_without_a_motion_leaves_the_plan_after_a_stop_to_be_made(start, monkeypatch):
-    monkeypatch.setattr(wait_for_rest, 'LONGEST_SETTLING', 300.0)
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 300.0)
     planner, stranger = start()
     say_all(planner, stranger)
     queue = planner._queue
@@ -771,7 +771,7 @@ def test_broken_joint_positions_are_not_replaced_by_those_before(start):
 def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_until, tmp_path):
     planner, stranger = start(incident_folder=str(tmp_path))
     say_all(planner, stranger)
-    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_motion
+    inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
     asked = []
 
     def plan_while_a_box_comes(*args, **kwargs):
@@ -786,7 +786,7 @@ def test_both_checkers_are_asked_when_the_wearer_moved(start, monkeypatch, wait_
         asked.append(args)
         return Violation(0.1, 0.01, 'ray', 'torso') if len(asked) == 1 else None
 
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_while_a_box_comes)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_box_comes)
     monkeypatch.setattr(planner._planner, 'violation_seen', disagree)
     message = stranger.answer().message
     assert message.startswith('FAILURE (99999): the two collision checks disagree: ray is 0.0100')
@@ -907,7 +907,7 @@ def test_nothing_is_published_once_the_node_closes(start, monkeypatch):
 def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch):
     planner, stranger = start()
     say_all(planner, stranger)
-    order, plan_motion = [], in_process_planner.plan_motion
+    order, plan_motion = [], in_process_planner.plan_question
 
     def warm_up(_, options):
         time.sleep(0.2)
@@ -918,7 +918,7 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
         return plan_motion(*args, **kwargs)
 
     monkeypatch.setattr(planner._planner, 'warm_up', warm_up)
-    monkeypatch.setattr(in_process_planner, 'plan_motion', plan_in_turn)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_in_turn)
     planner.set_parameters([Parameter(name='margin', value=0.03)])
     planner.set_parameters([Parameter(name='algorithm', value='rrt')])
     assert stranger.answer().success

@@ -65,7 +65,6 @@ class Stop:
 
     Parameters
     ----------
-    trajectory : Trajectory
     goal : PointingGoal or None
         Of the stopped motion.
     parameters : PlannerParameters
@@ -94,14 +93,6 @@ class ExecutionMonitor:
     So does any error during that check, a rejected or stale input, and a body that is checked too
     late. A stop that could not be published is tried again; meanwhile liveliness is not asserted,
     so that an arm that supervises it stops by itself.
-
-    Parameters
-    ----------
-    node : Node
-    inputs : Inputs
-    reporter : Reporter
-    publishers : PlanPublishers
-
     """
 
     def __init__(

@@ -1,17 +1,20 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where a node keeps its incident files, and how it reports them."""
+"""Incidents of requests and stops: what is recorded, and where its file is kept."""
 
 from pathlib import Path
 import shlex
 import traceback
 
 from rclpy.logging import get_logging_directory
-from rrth_planner.io.incident import error_incident, Incident
+from rrth_planner.collision.violation import Disagreement
+from rrth_planner.io.incident import disagreement_incident, error_incident, Incident
 from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.ros.monitor.execution_monitor import Stop
 
 
 class PlanError(RrthError):
@@ -68,3 +71,31 @@ def sentence_of(problem: BaseException) -> str:
     """Return the sentence of an unexpected error."""
     cause = cause_of(problem)
     return f'planning failed unexpectedly: {type(cause).__name__}: {cause}'
+
+
+def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
+    """
+    Return the record of a stop that is proven free but violates for the second checker, or None.
+
+    That is asked after the stop is published: a moving arm does not wait for it.
+    """
+    if stop.scene is None or stop.goal is None:
+        return None
+    parameters, trajectory = stop.parameters, stop.trajectory
+    arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
+    violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray)
+    if violation is None:
+        return None
+    question = PlanQuestion(
+        arm=arm,
+        scene=stop.scene,
+        q_start=trajectory.positions[0],
+        goal=stop.goal,
+        limits=parameters.limits,
+        options=parameters.options,
+        margin=margin,
+        ray_guard_length=ray,
+        seed=max(0, parameters.seed),
+        escape_depth=parameters.escape_depth,
+    )
+    return disagreement_incident(question, Disagreement(trajectory, violation))

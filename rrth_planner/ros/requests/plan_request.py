@@ -28,7 +28,6 @@ class PlanOutcome:
 
     Parameters
     ----------
-    code : ErrorCode
     sentence : str
     plan : MotionPlan or None
     snapshot : InputSnapshot or None
@@ -73,10 +72,8 @@ def plan_request(
     ----------
     inputs : Inputs
         Copied at the beginning; checked again before the motion is published.
-    parameters : PlannerParameters
     clock : callable
         Returns the present time [s].
-    planner : Planner
     should_stop : callable
         Polled while planning; True cancels.
     publish : callable

@@ -10,11 +10,13 @@ import time
 import traceback
 
 from nav_msgs.msg import Path
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.diagnostics import PlanReport
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
@@ -22,17 +24,18 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
+from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
-from rrth_planner.ros.requests.incidents import incident_of, keep, sentence_of
+from rrth_planner.ros.requests.incidents import incident_of, incident_of_stop, keep, sentence_of
 from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, require_not_cancelled
 from rrth_planner.ros.requests.revalidation import Revalidation
-from rrth_planner.ros.requests.stop_validation import incident_of_stop
-from rrth_planner.ros.requests.wait_for_rest import Rest
 from trajectory_msgs.msg import JointTrajectory
 
 # Period of the work after a stop, and shortest one between motions shown [s].
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
+# An arm may come to rest so much later than its commanded stop [s].
+LONGEST_SETTLING = 1.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -71,8 +74,19 @@ class _Resumption:
 
     ticket: _Ticket
     goal: PointingGoal
-    rest: Rest
     n_motions: int
+    # When the stop ends [s], and until when to wait for the rest by the monotonic clock, since a
+    # simulated one may stand still.
+    stopped: float
+    latest: float
+
+    def is_due(self, joints: JointReading | None) -> bool:
+        """Return whether the arm is at rest since the end of its stop, or time is up."""
+        return time.monotonic() >= self.latest or (
+            joints is not None
+            and joints.received >= self.stopped
+            and bool((np.abs(joints.velocities) <= REST_SPEED).all())
+        )
 
 
 class PlanQueue:
@@ -81,14 +95,10 @@ class PlanQueue:
 
     Parameters
     ----------
-    node : Node
-    inputs : Inputs
     reporter : Reporter
         Its parameters, as they are when a request's turn begins, are those of the plan.
-    publishers : PlanPublishers
     monitor : ExecutionMonitor
         Monitors each published motion; its stops are checked again here, and replanned.
-    planner : Planner
     handled : callable
         As in `ExecutorBarrier`, of the bodies.
 
@@ -295,8 +305,14 @@ class PlanQueue:
             self.prepare(partial(self._check_stop, stop))
             if stop.is_replanned and stop.goal is not None and not self._is_closed:
                 self._discard_resumption()
-                rest = Rest(self._inputs.joints, self._now, stop.trajectory.duration)
-                self._resumption = _Resumption(_Ticket(), stop.goal, rest, stop.n_motions)
+                duration = stop.trajectory.duration
+                self._resumption = _Resumption(
+                    _Ticket(),
+                    stop.goal,
+                    stop.n_motions,
+                    self._now() + duration,
+                    time.monotonic() + duration + LONGEST_SETTLING,
+                )
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
         if resumption is None:
@@ -304,7 +320,7 @@ class PlanQueue:
         if resumption.n_motions != self._monitor.n_motions:
             # A motion that was requested since then has priority.
             self._discard_resumption()
-        elif resumption.rest.is_over():
+        elif resumption.is_due(self._inputs.joints.value):
             self._resumption = None
             self.prepare(partial(self._resume, resumption))
 

@@ -36,7 +36,6 @@ class Revalidation:
         The latest ones.
     clock : callable
         Returns the present time [s].
-    parameters : PlannerParameters
     snapshot : InputSnapshot
         The inputs of the plan.
     plan : MotionPlan

@@ -15,7 +15,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.plan_motion import plan_motion
+from rrth_planner.pipeline.plan_motion import plan_question
 from rrth_planner.pipeline.request import PlanQuestion
 
 # Waiting for a response checks the clock so often [s].
@@ -169,7 +169,7 @@ class ViewerModel:
             return self._is_closed or self._n_asked != number
 
         try:
-            plan = plan_motion(**question.arguments, should_stop=is_outdated)
+            plan = plan_question(question, is_outdated)
         except RrthError as problem:
             return Response(number=number, sentence=str(problem), question=question)
         except Exception as problem:
