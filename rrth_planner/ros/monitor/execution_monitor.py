@@ -133,34 +133,25 @@ class ExecutionMonitor:
     ) -> None:
         """Publish a motion, and monitor it with the parameters of its plan."""
         with self._lock:
-            self._begin(running, goal, parameters, publish)
+            if self._is_closed:
+                raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
+            before = copy(self._tracker), self._parameters, self._goal, self._state
+            self._tracker.begin(running, self._now())
+            self._parameters, self._goal, self._state = parameters, goal, MonitorState.MONITORING
+            try:
+                publish()
+            except Exception:
+                self._tracker, self._parameters, self._goal, self._state = before
+                raise
+            self.n_motions += 1
 
-    def _begin(
-        self,
-        running: ExecutingMotion,
-        goal: PointingGoal,
-        parameters: PlannerParameters,
-        publish: Callable[[], None],
-    ) -> None:
-        if self._is_closed:
-            raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
-        before = copy(self._tracker), self._parameters, self._goal, self._state
-        self._tracker.begin(running, self._now())
-        self._parameters, self._goal, self._state = parameters, goal, MonitorState.MONITORING
-        try:
-            publish()
-        except Exception:
-            self._tracker, self._parameters, self._goal, self._state = before
-            raise
-        self.n_motions += 1
+            def check() -> None:
+                self._set_state(MonitorState.MONITORING, '')
+                # The body may have changed since the revalidation.
+                self._check_remaining_motion(self._inputs.body.value, time.time_ns())
 
-        def check() -> None:
-            self._set_state(MonitorState.MONITORING, '')
-            # The body may have changed since the revalidation.
-            self._check_remaining_motion(self._inputs.body.value, time.time_ns())
-
-        # From here on the arm moves: an error must stop it.
-        self._run_fail_safe(check)
+            # From here on the arm moves: an error must stop it.
+            self._run_fail_safe(check)
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
@@ -223,7 +214,7 @@ class ExecutionMonitor:
         begin = time.perf_counter()
         if self.running is None:
             return
-        now, parameters = self._now(), self._parameters
+        now = self._now()
         phase = self._phase(now)
         if phase is None or self._state is not MonitorState.MONITORING:
             return
@@ -232,14 +223,7 @@ class ExecutionMonitor:
             self.fail(why)
             return
         scene = scene_of(body.at(now))
-        if is_remaining_free(
-            self.running,
-            phase,
-            parameters.arm,
-            scene,
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        ):
+        if self._holds(is_remaining_free, self.running, phase, scene):
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
         else:
             self._stop(phase, now, scene, arrived)
@@ -249,6 +233,20 @@ class ExecutionMonitor:
                 f'a body was checked {waited:.3f} s after its arrival, expected at most '
                 f'{LONGEST_WAIT:g} s'
             )
+
+    def _holds(
+        self, check: Callable[..., bool], running: ExecutingMotion, phase: float, scene: Scene
+    ) -> bool:
+        """Return the verdict of a check of a motion from a phase on [s]."""
+        parameters = self._parameters
+        return check(
+            running,
+            phase,
+            parameters.arm,
+            scene,
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        )
 
     def _on_timer(self) -> None:
         """Run the periodic checks, and assert liveliness."""
@@ -320,26 +318,12 @@ class ExecutionMonitor:
         # The check since then took time.
         now = self._now()
         phase += now - then
-        running, parameters = self.running, self._parameters
+        running = self.running
         if running is None or phase >= running.trajectory.duration:
             return
         stopped = self._stop_of(running, phase, now)
-        is_safe = is_remaining_free(
-            stopped,
-            0.0,
-            parameters.arm,
-            scene,
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        )
-        if not is_safe and escapes_by_continuing(
-            running,
-            phase,
-            parameters.arm,
-            scene,
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        ):
+        is_safe = self._holds(is_remaining_free, stopped, 0.0, scene)
+        if not is_safe and self._holds(escapes_by_continuing, running, phase, scene):
             sentence = f'{why}, but it escapes and a stop would not: motion continues'
             if self._reporter.monitor_state[1] != sentence:
                 self._node.get_logger().error(sentence)
