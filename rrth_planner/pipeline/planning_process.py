@@ -54,12 +54,16 @@ class Planner(Protocol):
     """Plans, and runs the second collision checker, in this process or in another one."""
 
     def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
-        """Return once plans with an arm and options need no time to load."""
+        """Return once plans need no time to load; raise ModelError where the arm cannot point."""
 
     def plan(
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
-        """Return what `plan_question` returns, without the search behind it."""
+        """
+        Return what `plan_question` returns, without the search behind it.
+
+        should_stop: polled while it plans; True cancels.
+        """
 
     def violation_seen(
         self,
@@ -68,7 +72,7 @@ class Planner(Protocol):
         trajectory: Trajectory,
         margin: float,
         ray_guard_length: float,
-        target_distance: float,
+        reach: float,
         escape_time: float = 0.0,
     ) -> Violation | None:
         """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
@@ -79,14 +83,14 @@ class Planner(Protocol):
 
 class PlanningProcess:
     """
-    Plans, and runs the second collision checker, in a process of its own.
+    A planner in a process of its own.
 
-    It starts at once, ends with this one in any case, and is restarted after it died. For one
-    caller at a time.
+    It starts at once, ends with this one in any case, and is restarted after it died: the question
+    that it died on raises PlanningProcessError. For one caller at a time.
 
     Parameters
     ----------
-    options : TreeOptions
+    arm, options
         The kernels are loaded for these.
     on_death : callable
         Called with a sentence after it died.
@@ -104,15 +108,7 @@ class PlanningProcess:
         self._start()
 
     def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
-        """
-        Return once plans with an arm and options need no time to load.
-
-        Raises
-        ------
-        RrthError
-            The arm cannot point.
-
-        """
+        """As of `Planner`."""
         if self._warm_up != (arm, options):
             self._warm_up = arm, options
             self._begin('warm_up', arm, options)
@@ -121,53 +117,14 @@ class PlanningProcess:
     def plan(
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
-        """
-        Return what `plan_question` returns, without the search behind it.
+        """As of `Planner`."""
+        plan: MotionPlan = self._ask('plan', question, should_stop=should_stop)
+        return plan
 
-        Parameters
-        ----------
-        should_stop : callable
-            Polled while it plans; True cancels.
-
-        Raises
-        ------
-        PlanningProcessError
-            It died on this question; the next one gets another process.
-
-        """
-        answer: MotionPlan = self._ask('plan', question, should_stop=should_stop)
-        return answer
-
-    def violation_seen(
-        self,
-        arm: ArmModel,
-        scene: Scene,
-        trajectory: Trajectory,
-        margin: float,
-        ray_guard_length: float,
-        target_distance: float,
-        escape_time: float = 0.0,
-    ) -> Violation | None:
-        """
-        Return what `trajectory_validation.violation_seen` returns for the same arguments.
-
-        Raises
-        ------
-        PlanningProcessError
-            It died on this motion.
-
-        """
-        answer: Violation | None = self._ask(
-            'violation_seen',
-            arm,
-            scene,
-            trajectory,
-            margin,
-            ray_guard_length,
-            target_distance,
-            escape_time,
-        )
-        return answer
+    def violation_seen(self, *arguments: Any) -> Violation | None:
+        """As of `Planner`."""
+        violation: Violation | None = self._ask('violation_seen', *arguments)
+        return violation
 
     def close(self) -> None:
         """End it."""
