@@ -177,7 +177,7 @@ def test_a_dry_run_plans_round_the_received_body(planner, bystander):
 @pytest.mark.slow
 def test_an_arm_that_does_not_follow_has_not_arrived(planner, bystander):
     bystander.stand()
-    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '20')
+    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '10')
     assert (report['exit_code'], report['name'], report['arrived']) == (4, 'SUCCESS', False)
     assert 'from the end of its motion' in report['sentence']
     assert report['pointing_error'] > 0.1
