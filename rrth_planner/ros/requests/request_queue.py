@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.trajectory import REST_SPEED
+from rrth_planner.model.trajectory import REST_SPEED, Trajectory
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.diagnostics import PlanReport
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
@@ -136,7 +136,7 @@ class PlanQueue:
 
         def work() -> None:
             try:
-                future.set_result(self._work(goal, begin, ticket))
+                self._work(goal, begin, ticket, future.set_result)
             except BaseException as problem:
                 future.set_exception(problem)
             executor = self._node.executor
@@ -183,9 +183,18 @@ class PlanQueue:
         self._worker.shutdown(wait=True, cancel_futures=True)
         self._planner.close()
 
-    def _work(self, goal: PointingGoal | None, begin: float, ticket: _Ticket) -> Response:
-        """Plan and publish; called in the worker's thread."""
-        figures, shown, incident = PlanReport(), None, None
+    def _work(
+        self,
+        goal: PointingGoal | None,
+        begin: float,
+        ticket: _Ticket,
+        settle: Callable[[Response], None],
+    ) -> None:
+        """
+        Plan, publish and settle a request; called in the worker's thread.
+
+        The request is settled as soon as its motion is published, in the node's own thread.
+        """
         parameters, monitor = self._reporter.parameters, self._monitor
         n_stops, running = monitor.n_stops, monitor.running
 
@@ -193,11 +202,16 @@ class PlanQueue:
             assert outcome.trajectory is not None
             start = 0.0 if outcome.handover is None else outcome.handover.time
             msg = self._publishers.motion(outcome.trajectory, parameters, start)
+
+            def publish_now() -> bool:
+                is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
+                if is_published:
+                    settle(self._response(outcome, parameters, begin))
+                return is_published
+
             try:
                 # In the node's own thread, once all received messages are processed.
-                return self._barrier.call(
-                    lambda: self._publish(ticket, outcome, revalidation, n_stops, msg)
-                )
+                return self._barrier.call(publish_now)
             except NodeIsBusyError:
                 require_not_cancelled(lambda: ticket.is_cancelled)
                 raise RequestError(
@@ -217,40 +231,48 @@ class PlanQueue:
                 goal,
                 running,
             )
-            code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
-            incident = outcome.incident
-            if plan is not None:
-                figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
-            if plan is not None and plan.path is not None and outcome.trajectory is not None:
-                shown = outcome
-                figures = replace(
-                    figures,
-                    response_time=time.perf_counter() - begin,
-                    duration=outcome.trajectory.duration,
-                    length=plan.path.length,
-                    clearance=plan.clearance,
-                )
-            elif ticket.is_cancelled and code is not ErrorCode.PREEMPTED:
-                code, sentence = CANCELLED
+            if outcome.trajectory is not None:
+                return
+            if ticket.is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
+                outcome = replace(outcome, code=CANCELLED[0], sentence=CANCELLED[1])
         except Exception as problem:
             # After any error the caller gets an answer, and the node continues.
             self._node.get_logger().error(traceback.format_exc())
-            code, sentence, shown = ErrorCode.FAILURE, sentence_of(problem), None
-            incident = incident_of(problem)
-        if incident is not None:
-            noted, file = keep(incident, parameters.incident_folder)
-            sentence += noted
+            outcome = PlanOutcome(
+                ErrorCode.FAILURE, sentence_of(problem), incident=incident_of(problem)
+            )
+        if outcome.incident is not None:
+            noted, file = keep(outcome.incident, parameters.incident_folder)
+            outcome = replace(outcome, sentence=outcome.sentence + noted)
             self._reporter.incident(file)
+        settle(self._response(outcome, parameters, begin))
+
+    def _response(
+        self, outcome: PlanOutcome, parameters: PlannerParameters, begin: float
+    ) -> Response:
+        """Return the response to a request that began at a time, by `time.perf_counter`."""
+        code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
+        trajectory, figures = outcome.trajectory, PlanReport()
+        if plan is not None:
+            figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
+        if plan is not None and plan.path is not None and trajectory is not None:
+            figures = replace(
+                figures,
+                response_time=time.perf_counter() - begin,
+                duration=trajectory.duration,
+                length=plan.path.length,
+                clearance=plan.clearance,
+            )
 
         def tool_path() -> Path:
-            return Path() if shown is None else self._tool_path(shown, parameters)
+            return Path() if trajectory is None else self._tool_path(trajectory, parameters)
 
         def conclude() -> None:
             self._reporter.conclude(code, sentence, figures)
-            if shown is not None:
-                self._unseen = shown, parameters
+            if trajectory is not None:
+                self._unseen = outcome, parameters
 
-        is_solved = code is ErrorCode.SUCCESS and not self._is_closed
+        is_solved = trajectory is not None and not self._is_closed
         return Response(is_solved, answer(code, sentence), tool_path, conclude)
 
     def _publish(
@@ -335,8 +357,10 @@ class PlanQueue:
         if ticket.is_cancelled or resumption.n_motions != self._monitor.n_motions:
             self._open.discard(ticket)
             return
-        response = self._work(resumption.goal, time.perf_counter(), ticket)
+        responses: list[Response] = []
+        self._work(resumption.goal, time.perf_counter(), ticket, responses.append)
         self._open.discard(ticket)
+        response = responses[-1]
         response.conclude()
         if not response.is_solved:
             self._monitor.hold(response.text)
@@ -349,11 +373,10 @@ class PlanQueue:
             self._reporter.incident(file)
             self._node.get_logger().error(f'fail-safe stop: {incident.sentence}{noted}')
 
-    def _tool_path(self, outcome: PlanOutcome, parameters: PlannerParameters) -> Path:
+    def _tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
         """Return the tool's path; empty after an error, since the motion is published already."""
-        assert outcome.trajectory is not None
         try:
-            return self._publishers.tool_path(outcome.trajectory, parameters)
+            return self._publishers.tool_path(trajectory, parameters)
         except Exception:
             self._node.get_logger().error(traceback.format_exc())
             return Path()
