@@ -30,11 +30,12 @@ if TYPE_CHECKING:
     from rrth_planner.model.goal import PointingGoal as PointingGoal
     from rrth_planner.model.path import Path as Path
     from rrth_planner.model.scene import Box as Box, Scene as Scene
-    from rrth_planner.model.start_state import MotionState as MotionState, StartState as StartState
     from rrth_planner.model.status import PlanStatus as PlanStatus
     from rrth_planner.model.trajectory import (
         MotionLimits as MotionLimits,
+        MotionState as MotionState,
         sample as sample,
+        StartState as StartState,
         Trajectory as Trajectory,
     )
     from rrth_planner.pipeline.motion_plan import MotionPlan as MotionPlan
@@ -106,8 +107,8 @@ _HOME = {
     'load_settings': 'io.settings',
     'MotionPlan': 'pipeline.motion_plan',
     'PlanSettings': 'io.settings',
-    'MotionState': 'model.start_state',
-    'StartState': 'model.start_state',
+    'MotionState': 'model.trajectory',
+    'StartState': 'model.trajectory',
     'RrthError': 'model.errors',
 }
 

@@ -15,8 +15,7 @@ from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, RecordError, shown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 

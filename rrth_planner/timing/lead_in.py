@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.parameterization import peaks
 

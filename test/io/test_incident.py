@@ -28,8 +28,7 @@ from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer

@@ -19,9 +19,8 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.model.trajectory import positions_at, sample
+from rrth_planner.model.trajectory import MotionState, positions_at, sample, StartState
 from rrth_planner.pipeline.plan_path import SPARES
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.timing.parameterization import parameterize
