@@ -15,9 +15,9 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_remaining_free
+from rrth_planner.model.arm import bar_ends
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
-from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionState, positions_at, sample, StartState
