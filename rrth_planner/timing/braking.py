@@ -23,10 +23,8 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
 
     Parameters
     ----------
-    trajectory : Trajectory
     time : float
         Before the start and after the end the arm stands still [s].
-    limits : MotionLimits
 
     Returns
     -------
@@ -37,17 +35,13 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     if not 0.0 < time < trajectory.duration:
         return part_of(trajectory, time, time)
     stop = fast_stop(trajectory, time, limits, lead=0.0)
-    q, v, a = sample(trajectory, [time])
-    if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
+    state = sample(trajectory, [time])
+    if np.abs(state[2] - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.
         return stop
     # Compiled code rounds the last digit of the first state differently.
-    return Trajectory(
-        times=stop.times,
-        positions=np.concatenate([q, stop.positions[1:]]),
-        velocities=np.concatenate([v, stop.velocities[1:]]),
-        accelerations=np.concatenate([a, stop.accelerations[1:]]),
-    )
+    rows = zip(state, stop.states, strict=True)
+    return Trajectory(stop.times, *(np.concatenate([first, row[1:]]) for first, row in rows))
 
 
 def certify_braking(
@@ -58,13 +52,12 @@ def certify_braking(
 
     Parameters
     ----------
-    trajectory : Trajectory
     time : float
         When it begins to brake [s].
     world : World
         The present one, not the one that the trajectory was planned in.
     limits : MotionLimits
-        Limits of the stop.
+        Of the stop.
 
     """
     return certify(brake(trajectory, time, limits), world)

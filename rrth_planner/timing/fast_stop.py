@@ -22,7 +22,6 @@ def fast_stop(
 
     Parameters
     ----------
-    trajectory : Trajectory
     time : float
         Within it [s].
     limits : MotionLimits
@@ -43,28 +42,8 @@ def fast_stop(
     curves, dof = piece_coefficients(trajectory), trajectory.positions.shape[1]
     if time == trajectory.duration:
         still = np.zeros((1, dof))
-        return Trajectory(
-            times=np.zeros(1),
-            positions=trajectory.positions[-1:],
-            velocities=still,
-            accelerations=still,
-        )
+        return Trajectory(np.zeros(1), trajectory.positions[-1:], still, still)
     most = len(trajectory.times) + 8 + int(trajectory.duration / SPACINGS[-1])
     times, states = np.empty(most), np.empty((3, most, dof))
-    n = write_fast_stop(
-        curves,
-        trajectory.times,
-        time,
-        lead,
-        limits.velocity,
-        limits.acceleration,
-        limits.jerk,
-        times,
-        states,
-    )
-    return Trajectory(
-        times=times[:n],
-        positions=states[0, :n],
-        velocities=states[1, :n],
-        accelerations=states[2, :n],
-    )
+    n = write_fast_stop(curves, trajectory.times, time, lead, *limits.rows, times, states)
+    return Trajectory(times[:n], *states[:, :n])

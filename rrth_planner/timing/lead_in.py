@@ -56,7 +56,6 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     ----------
     state : MotionState
         Within the limits, and so that the velocity stays within them while acceleration fades.
-    limits : MotionLimits
 
     """
     a = state.accelerations
@@ -78,26 +77,20 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     j_max = RESERVE * float((limits.jerk / share).min())
     length = 0.5 * speed * ramp_time(speed, a_max, j_max) * (1 + 1e-6)
     return LeadIn(
-        trajectory=Trajectory(
-            times=times, positions=positions, velocities=velocities, accelerations=accelerations
-        ),
+        trajectory=Trajectory(times, positions, velocities, accelerations),
         speed=speed,
         q_stop=positions[-1] + u * length,
         allowed=MotionLimits(
-            velocity=np.maximum(limits.velocity, np.abs(state.velocities)),
-            acceleration=np.maximum(limits.acceleration, np.abs(state.accelerations)),
-            jerk=limits.jerk,
+            np.maximum(limits.velocity, np.abs(state.velocities)),
+            np.maximum(limits.acceleration, np.abs(state.accelerations)),
+            limits.jerk,
         ),
     )
 
 
 def reserved(limits: MotionLimits) -> MotionLimits:
     """Return the limits for the path after a lead-in: those that the lead-in assumes."""
-    return MotionLimits(
-        velocity=limits.velocity,
-        acceleration=RESERVE * limits.acceleration,
-        jerk=RESERVE * limits.jerk,
-    )
+    return MotionLimits(limits.velocity, RESERVE * limits.acceleration, RESERVE * limits.jerk)
 
 
 def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
@@ -107,7 +100,5 @@ def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
     stop = brake(moving.running, moving.time, limits)
     allowed = limits
     if len(stop.times) > 1:
-        own = zip(peaks(stop), (limits.velocity, limits.acceleration, limits.jerk), strict=True)
-        v, a, j = (np.maximum(*pair) for pair in own)
-        allowed = MotionLimits(velocity=v, acceleration=a, jerk=j)
+        allowed = MotionLimits(*map(np.maximum, peaks(stop), limits.rows))
     return LeadIn(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)
