@@ -100,11 +100,11 @@ class _Segments:
     the direction turns from u to u + turns by the smooth step g'.
     """
 
+    end: Array
     origins: Array
     directions: Array
     turns: Array
     widths: Array
-    end: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +131,7 @@ def _segments(path: Path, blends: tuple[Blend, ...]) -> _Segments:
         if cuts[i + 1] > 0.0:
             half = cuts[i + 1]
             rows.append((q[i + 1] - half * u[i], u[i], u[i + 1] - u[i], 2 * half))
-    return _Segments(*map(np.array, zip(*rows, strict=True)), q[-1])
+    return _Segments(q[-1], *map(np.array, zip(*rows, strict=True)))
 
 
 def _speeds(
