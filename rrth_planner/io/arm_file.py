@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import parse_yaml, read_text, to_yaml
+from rrth_planner.io.text_file import naming_file, parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel, ROW
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
@@ -154,7 +154,5 @@ def load_arm(path: str | Path | None = None) -> ArmModel:
             'read_urdf writes one from a URDF'
         )
     data = parse_yaml(text, f'file {file}')
-    try:
+    with naming_file(file, ModelError):
         return arm_from_mapping(data)
-    except ModelError as problem:
-        raise ModelError(f'file {file}: {problem}') from problem

@@ -1,17 +1,20 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Incidents: plans that failed unexpectedly, recorded with everything to replay them."""
+"""Incidents: plans that failed unexpectedly, and files with everything to replay them."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from enum import Enum
 import functools
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
+import os
 from pathlib import Path
 import platform
 from typing import Any
+import uuid
 
 from rrth_planner.collision.violation import Disagreement, Violation
 from rrth_planner.io.entries import number, text
@@ -23,6 +26,7 @@ from rrth_planner.io.serialization import (
     trajectory_from_mapping,
     violation_from_mapping,
 )
+from rrth_planner.io.text_file import load_yaml, naming_file, to_yaml
 from rrth_planner.model.errors import one_line, RecordError, shown
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -30,6 +34,10 @@ from rrth_planner.pipeline.request import PlanQuestion
 
 # Version of the record's layout; others are rejected.
 FORMAT = 2
+# A folder keeps the last hundred files.
+MOST_FILES = 100
+PATTERN = 'incident-*.yaml'
+HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
 PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 
 
@@ -208,3 +216,49 @@ def _digest_of_sources() -> str:
 
 def _now() -> str:
     return datetime.now(timezone.utc).isoformat(timespec='microseconds')
+
+
+def incident_to_yaml(incident: Incident) -> str:
+    """Return the text of an incident's file; PyYAML writes numbers by repr, so to the bit."""
+    return HEADER + to_yaml(incident_to_mapping(incident))
+
+
+def write_incident(incident: Incident, folder: Path) -> Path:
+    """
+    Write an incident to a new file of a folder, and remove the oldest beyond a hundred.
+
+    Creates the folder if needed; the file is written atomically.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    stamp = ''.join(c for c in incident.time[:26] if c.isalnum())
+    path = folder / f'incident-{stamp}-{uuid.uuid4().hex[:6]}.yaml'
+    fresh = path.with_suffix('.part')
+    try:
+        fresh.write_text(incident_to_yaml(incident), encoding='utf-8')
+        os.replace(fresh, path)
+    finally:
+        fresh.unlink(missing_ok=True)
+    with suppress(OSError):
+        _remove_oldest(folder, path)
+    return path
+
+
+def read_incident(path: Path) -> Incident:
+    """Return the incident of a file, or raise RrthError."""
+    data = load_yaml(path)
+    with naming_file(path, RecordError):
+        return incident_from_mapping(data)
+
+
+def _remove_oldest(folder: Path, newest: Path) -> None:
+    """Remove the oldest files; the newest stays, whatever its time stamp."""
+    others = [file for file in folder.glob(PATTERN) if file != newest]
+    others.sort(key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
+    for file in others[MOST_FILES - 1 :]:
+        file.unlink(missing_ok=True)

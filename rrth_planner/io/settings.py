@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import number, text, whole
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.trajectory import MotionLimits
@@ -63,15 +63,8 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
         )
     algorithm = ALGORITHMS[values['algorithm']]
     return PlanSettings(
-        seed=values['seed'],
-        margin=values['margin'],
-        ray_guard_length=values['ray_guard_length'],
-        escape_depth=values['escape_depth'],
-        limits=MotionLimits(
-            velocity=_of_each_joint('max_velocity', values, dof),
-            acceleration=_of_each_joint('max_acceleration', values, dof),
-            jerk=_of_each_joint('max_jerk', values, dof),
-        ),
+        **{name: values[name] for name in ('seed', *LENGTHS)},
+        limits=MotionLimits(*(_of_each_joint(name, values, dof) for name in LIMIT_UNITS)),
         options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
     )
 
@@ -99,10 +92,8 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
     values = {**packaged, **{name: packaged[name][:1] for name in LIMIT_UNITS}}
     if path is not None:
         given = _parameters(path)
-        try:
+        with naming_file(path, OptionsError):
             _typed_settings(values, given, dof)
-        except OptionsError as problem:
-            raise OptionsError(f'file {path}: {problem}') from problem
         values |= given
     return _typed_settings(values, changes, dof)
 
@@ -138,10 +129,8 @@ def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
     """Return a limit for each joint, (dof,)."""
     unit = LIMIT_UNITS[name]
     given = frozen_array(values[name], (None,), name, unit, OptionsError)
-    if (
-        len(given) not in (1, dof)
-        or not ((given >= LOWEST_LIMIT) & (given <= HIGHEST_LIMIT)).all()
-    ):
+    is_within = ((given >= LOWEST_LIMIT) & (given <= HIGHEST_LIMIT)).all()
+    if len(given) not in (1, dof) or not is_within:
         raise OptionsError(
             f'{name}: {given.tolist()}, expected {dof} values, or one for all joints, from '
             f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{unit}]'

@@ -3,13 +3,15 @@
 """Files of text, read within limits whatever they hold: YAML as plain data, and XML."""
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 import math
 from pathlib import Path
 import re
 from typing import Any
 from xml.etree import ElementTree
 
-from rrth_planner.model.errors import ModelError
+from rrth_planner.model.errors import ModelError, RrthError
 import yaml
 
 # The largest files that are written here are incidents with 10,000 boxes, stored twice: 600,000
@@ -65,6 +67,15 @@ def read_text(path: str | Path) -> str:
         return read_bytes(path).decode('utf-8-sig')
     except UnicodeDecodeError as problem:
         raise ModelError(f'file {path}: {problem}; expected text in UTF-8') from problem
+
+
+@contextmanager
+def naming_file(path: str | Path, error: type[RrthError]) -> Iterator[None]:
+    """Raise errors of the values that a file describes as one whose sentence names the file."""
+    try:
+        yield
+    except RrthError as problem:
+        raise error(f'file {path}: {problem}') from problem
 
 
 def load_yaml(path: str | Path) -> Any:

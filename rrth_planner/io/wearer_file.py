@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import mapping, sequence, text, whole
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import FARTHEST, frozen_array
 from rrth_planner.model.errors import one_line, printable, SceneError, shown
 from rrth_planner.model.rotation import rotation_matrix
@@ -48,10 +48,8 @@ def load_wearer(path: str | Path | None = None) -> Scene:
     data = None if path is None else load_yaml(path)
     if not isinstance(data, dict) or 'markers' not in data:
         return load_body(path)
-    try:
+    with naming_file(str(path), SceneError):
         return scene_from_mapping({'boxes': _boxes_after(data['markers'])})
-    except SceneError as problem:
-        raise SceneError(f'file {path}: {problem}') from problem
 
 
 def _boxes_after(markers: Any) -> list[dict[str, Any]]:
@@ -161,10 +159,8 @@ def load_body(path: str | Path | None = None) -> Scene:
     """
     file = Path(path) if path else resource_path('config/body.yaml')
     data = load_yaml(file)
-    try:
+    with naming_file(file, SceneError):
         return scene_from_mapping(data)
-    except SceneError as problem:
-        raise SceneError(f'file {file}: {problem}') from problem
 
 
 def _box(label: str, data: Any) -> Box:

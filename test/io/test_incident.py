@@ -16,10 +16,8 @@ from rrth_planner.io.incident import (
     Incident,
     incident_from_mapping,
     incident_to_mapping,
-    IncidentKind,
-)
-from rrth_planner.io.incident_file import (
     incident_to_yaml,
+    IncidentKind,
     MOST_FILES,
     read_incident,
     write_incident,
