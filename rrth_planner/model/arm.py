@@ -151,6 +151,15 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
         The last one is the tool's: the pointing ray leaves its origin along its +z [m].
 
     """
+    poses = link_poses(arm, q)
+    T = arm.T_base_mount
+    for i in range(arm.dof + 1):
+        T = poses[..., i, :, :] = T @ poses[..., i, :, :]
+    return poses
+
+
+def link_poses(arm: ArmModel, q: Array) -> Array:
+    """Return the pose of each link frame in the one before, as `forward_kinematics` [m]."""
     q = np.asarray(q, dtype=np.float64)
     constant, slides, parts = _link_parts(arm)
     values = np.zeros((*q.shape[:-1], arm.dof + 1))
@@ -161,9 +170,6 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
     np.sin(theta, out=terms[..., 0, 2])
     terms[..., 0, 3] = constant[1] + np.where(slides, values, 0.0)
     poses: Array = (terms @ parts).reshape(*theta.shape, 4, 4)
-    T = arm.T_base_mount
-    for i in range(arm.dof + 1):
-        T = poses[..., i, :, :] = T @ poses[..., i, :, :]
     return poses
 
 

@@ -51,8 +51,6 @@ class UrdfChain:
     ----------
     name, base, tool : str
         Of the robot and of the two links.
-    joint_names : tuple of str
-    is_prismatic : tuple of bool
     bounds : ndarray, shape (2, dof)
         [rad or m].
     velocities : tuple of float
@@ -110,7 +108,6 @@ def read_chain(
 
     Parameters
     ----------
-    path : str or Path
     base, tool : str, optional
         The links that it leads from and to: the root and, where there is only one, the last link.
     ray : str
@@ -269,10 +266,7 @@ def _squared(T: Array) -> Array:
     """Return the origin of a joint with angles that were meant to be right angles made right."""
     angles = np.array(transformations.euler_from_matrix(T))
     right = 0.5 * np.pi * np.round(angles / (0.5 * np.pi))
-    squared = np.array(transformations.euler_matrix(*_nearer(angles, right)))
+    meant = np.where(np.abs(angles - right) < SQUARE, right, angles)
+    squared = np.array(transformations.euler_matrix(*meant))
     squared[:3, 3] = T[:3, 3]
     return squared
-
-
-def _nearer(angles: Array, right: Array) -> Array:
-    return np.where(np.abs(angles - right) < SQUARE, right, angles)
