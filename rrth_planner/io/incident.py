@@ -44,6 +44,7 @@ PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 class IncidentKind(Enum):
     """Kinds of incidents."""
 
+    # Of the two collision checks.
     DISAGREEMENT = 'disagreement'
     ERROR = 'error'
 
@@ -55,14 +56,8 @@ class Incident:
 
     Parameters
     ----------
-    kind : IncidentKind
-        A disagreement of the two collision checks, or an unexpected error.
-    sentence : str
-        Description, in one line.
-    time : str
-        ISO 8601.
-    question : PlanQuestion
-        The request of the plan.
+    sentence, time : str
+        Description, in one line; ISO 8601.
     trajectory : Trajectory or None
         The motion concerned, if there was one already.
     violation : Violation or None
@@ -74,8 +69,6 @@ class Incident:
         Until then the motion escapes from boxes that the arm was in [s].
     error, traceback : str
         Type and traceback of the error; empty for a disagreement.
-    versions : mapping
-        Of the packages involved.
 
     Raises
     ------
@@ -139,14 +132,9 @@ def error_incident(
     )
 
 
-def incident_to_mapping(incident: Incident) -> dict[str, Any]:
-    """Return an incident as numbers, texts, lists and mappings."""
-    return {'format': FORMAT, **plain(incident)}
-
-
 def incident_from_mapping(data: Any) -> Incident:
     """
-    Return the incident that a mapping describes, as `incident_to_mapping` writes it.
+    Return the incident that a mapping describes, as its file does.
 
     Raises
     ------
@@ -162,8 +150,7 @@ def incident_from_mapping(data: Any) -> Incident:
         raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
     if not isinstance(given['versions'], Mapping):
         raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
-    trajectory, present = given['trajectory'], given['present']
-    violation = given['violation']
+    trajectory, present, violation = (given[n] for n in ('trajectory', 'present', 'violation'))
     return Incident(
         kind=IncidentKind(given['kind']),
         question=question_from_mapping(given['question']),
@@ -220,7 +207,7 @@ def _now() -> str:
 
 def incident_to_yaml(incident: Incident) -> str:
     """Return the text of an incident's file; PyYAML writes numbers by repr, so to the bit."""
-    return HEADER + to_yaml(incident_to_mapping(incident))
+    return HEADER + to_yaml({'format': FORMAT, **plain(incident)})
 
 
 def write_incident(incident: Incident, folder: Path) -> Path:
