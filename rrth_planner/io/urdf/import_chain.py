@@ -84,8 +84,8 @@ def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> Importe
         raise ModelError(f'radius: {radius}, expected a length >= 0 [m]')
     T_0, dh, ray_lead = rows_of_axes(chain.points, chain.directions, chain.x_first)
     arm = ArmModel(
-        joint_names=chain.joint_names,
-        is_prismatic=chain.is_prismatic,
+        joint_names=tuple(joint.name for joint in chain.moving),
+        is_prismatic=tuple(joint.type == 'prismatic' for joint in chain.moving),
         dh=dh,
         bounds=chain.bounds,
         radii=np.full(len(dh), radius),
