@@ -32,14 +32,7 @@ HEADER = """\
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointMotion:
     """
-    A trajectory with the names and units of its joints.
-
-    Parameters
-    ----------
-    joint_names : tuple of str
-    units : tuple of str
-        rad or m, of each joint.
-    trajectory : Trajectory
+    A trajectory with the names and units, rad or m, of its joints.
 
     Raises
     ------
@@ -92,17 +85,9 @@ def check_suffix(path: Path) -> None:
 
 def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) -> None:
     """
-    Write a motion as .yaml or .csv, by the suffix of the file.
+    Write a motion as .yaml, comments at its head, or as .csv without, by the suffix of the file.
 
-    Comments are written at the head of a YAML file; a CSV file has none.
-
-    Raises
-    ------
-    RecordError
-        Another suffix.
-    OSError
-        The file cannot be written.
-
+    Raise RecordError where it has another one, OSError where it cannot be written.
     """
     check_suffix(path)
     is_table = path.suffix.lower() == '.csv'
@@ -111,15 +96,7 @@ def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) 
 
 
 def read_motion(path: str | Path) -> JointMotion:
-    """
-    Return the motion of a file that `write_motion` wrote.
-
-    Raises
-    ------
-    RrthError
-        The file cannot be read, or holds no motion.
-
-    """
+    """Return the motion that `write_motion` wrote; RrthError: no file, or none of a motion."""
     file = Path(path)
     check_suffix(file)
     text = read_text(file)

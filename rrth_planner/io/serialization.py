@@ -88,9 +88,9 @@ def scene_from_mapping(data: Any, name: str) -> Scene:
     )
 
 
-def trajectory_from_mapping(data: Any, name: str) -> Trajectory:
-    """Return the trajectory that `plain` wrote, or raise RrthError."""
-    return Trajectory(**fields_of(data, Trajectory, name))
+def trajectory_from_mapping(data: Any, name: str) -> Trajectory | None:
+    """Return the trajectory that `plain` wrote, None of nothing, or raise RrthError."""
+    return None if data is None else Trajectory(**fields_of(data, Trajectory, name))
 
 
 def violation_from_mapping(data: Any) -> Violation:
@@ -125,7 +125,6 @@ def _options(data: Any) -> TreeOptions:
 def _start_state(data: Any, dof: int) -> StartState:
     given = fields_of(data, StartState, 'moving')
     state = fields_of(given['state'], MotionState, 'moving: state')
-    running = given['running']
     return StartState(
         state=MotionState(
             **{
@@ -133,6 +132,6 @@ def _start_state(data: Any, dof: int) -> StartState:
                 for name, value in state.items()
             }
         ),
-        running=None if running is None else trajectory_from_mapping(running, 'moving: running'),
+        running=trajectory_from_mapping(given['running'], 'moving: running'),
         time=number(given['time'], 'moving: time', 's', RecordError),
     )

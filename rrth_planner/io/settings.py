@@ -23,20 +23,7 @@ LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanSettings:
-    """
-    Settings of a plan.
-
-    Parameters
-    ----------
-    seed : int
-        -1: a new one each time.
-    margin, ray_guard_length, escape_depth : float
-        [m].
-    limits : MotionLimits
-    options : TreeOptions
-        Their class is the algorithm.
-
-    """
+    """Settings of a plan: a seed, -1 for a new one each time, lengths [m], limits and options."""
 
     seed: int
     margin: float
@@ -50,11 +37,8 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
     """
     Return the settings that values by name describe, as in `config/planner.yaml`.
 
-    Raises
-    ------
-    OptionsError
-        The first invalid value: its name, what was given, what was expected, the unit.
-
+    Raise OptionsError for the first invalid value: its name, what was given, what was expected,
+    the unit.
     """
     if values['algorithm'] not in ALGORITHMS:
         raise OptionsError(
@@ -75,7 +59,6 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
 
     Parameters
     ----------
-    dof : int
     path : str or Path, optional
         Missing parameters are taken from `config/planner.yaml`.
     **changes

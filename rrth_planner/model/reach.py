@@ -17,19 +17,10 @@ def reach_bound(arm: ArmModel, ray_length: float, joint: int, row: int, end: str
     """
     Return a bound of the distance of a point of the arm from the axis of a joint.
 
-    The point is the end of the `a` or of the `d` offset of a DH row. Neighbouring offsets keep
+    The point is the `end` of the `a` or of the `d` offset of a DH row. Neighbouring offsets keep
     fixed angles whatever the joints do, so the norm of their sum is known exactly; the best split
     of the chain into such groups bounds the whole by the triangle inequality
     (`docs/algorithms.md`, section 2).
-
-    Parameters
-    ----------
-    ray_length : float
-        [m].
-    joint, row : int
-        Counted from 0.
-    end : str
-        'a' or 'd'.
 
     Returns
     -------

@@ -22,12 +22,7 @@ NEAR_POINT = 1e-5
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionLimits:
     """
-    Limits of each joint.
-
-    Parameters
-    ----------
-    velocity, acceleration, jerk : array_like, shape (dof,)
-        Greatest magnitudes [rad/s, rad/s^2, rad/s^3], all > 0.
+    Greatest magnitudes for each joint, array_like of shape (dof,) [rad/s, rad/s^2, rad/s^3].
 
     Raises
     ------
@@ -126,15 +121,8 @@ class StartState:
     """
     State of a moving arm at the handover to a new motion.
 
-    Parameters
-    ----------
-    state : MotionState
-        At the handover.
-    running : Trajectory or None
-        The motion that it executes until then; None where that is unknown.
-    time : float
-        Of the handover, within that motion [s].
-
+    `running` is the motion that it executes until then, None where that is unknown; `time` is that
+    of the handover within it [s].
     """
 
     state: MotionState
@@ -186,12 +174,7 @@ def positions_at(trajectory: Trajectory, times: ArrayLike) -> Array:
 
 def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Array]:
     """
-    Return the state at some times; at rest before the first and after the last point.
-
-    Parameters
-    ----------
-    times : array_like, shape (m,)
-        [s].
+    Return the state at some times, (m,) [s]; at rest before the first and after the last point.
 
     Returns
     -------
@@ -214,13 +197,8 @@ def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     Return the part of a trajectory between two times, shifted to begin at time 0.
 
     It is that trajectory to rounding: a part of a quintic is the quintic through its ends, and
-    every point between the two times stays.
-
-    Parameters
-    ----------
-    begin, end : float
-        Clipped to its times; where end <= begin, the result is a single point [s].
-
+    every point between the two times [s] stays. They are clipped to its own; where end <= begin,
+    the result is a single point.
     """
     times = trajectory.times
     begin = min(max(begin, 0.0), trajectory.duration)

@@ -48,16 +48,8 @@ def certify_braking(
     trajectory: Trajectory, time: float, world: World, limits: MotionLimits
 ) -> Certificate:
     """
-    Return the certificate of the stop that a running trajectory makes if braked at some time.
+    Return the certificate of `brake` at some time [s].
 
-    Parameters
-    ----------
-    time : float
-        When it begins to brake [s].
-    world : World
-        The present one, not the one that the trajectory was planned in.
-    limits : MotionLimits
-        Of the stop.
-
+    The world is the present one, not the one that the trajectory was planned in.
     """
     return certify(brake(trajectory, time, limits), world)

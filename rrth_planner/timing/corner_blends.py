@@ -61,15 +61,9 @@ class Blend:
 
 def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend, ...]:
     """
-    Return a blend for each inner waypoint, as large as can be certified.
+    Return a blend for each inner waypoint, as large as can be certified in the world.
 
-    Parameters
-    ----------
-    world : World
-        Where each blend itself must be certified free.
-    limits : MotionLimits
-        A blend is no larger than needed to pass it at full speed.
-
+    A blend is no larger than needed to pass it at full speed.
     """
     q = path.waypoints
     check_dof(q, world.bounds.shape[1], 'path')

@@ -22,13 +22,11 @@ def fast_stop(
 
     Parameters
     ----------
-    time : float
-        Within it [s].
+    time, lead : float
+        [s].
     limits : MotionLimits
         The stop exceeds them by no more than the motion does up to there, or by less than 1 %;
         jerks only up to rounding, which in pieces below 0.1 ms exceeds that.
-    lead : float
-        Time for which the motion continues unchanged [s].
 
     Returns
     -------

@@ -50,13 +50,8 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
 
     Each joint's acceleration decays at constant jerk, a little less than its limit; from then
     on the velocity is constant. Between two points every joint follows a cubic, which the quintic
-    of a controller reproduces.
-
-    Parameters
-    ----------
-    state : MotionState
-        Within the limits, and so that the velocity stays within them while acceleration fades.
-
+    of a controller reproduces. The state is within the limits, and such that the velocity stays
+    within them while acceleration fades.
     """
     a = state.accelerations
     fade = np.ceil(np.abs(a) / (RESERVE * limits.jerk) / TICK) * TICK

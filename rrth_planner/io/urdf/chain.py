@@ -45,7 +45,7 @@ SQUARE = 5e-5
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class UrdfChain:
     """
-    The moving joints between two links, all positions at 0, in the frame of the first link.
+    The joints between two links, all positions at 0, in the frame of the first link.
 
     Parameters
     ----------
@@ -108,10 +108,8 @@ def read_chain(
 
     Raises
     ------
-    ModelError
-        The file is no URDF, or there is no chain of joints that an arm may have.
-    NotInstalledError
-        What reads it is missing.
+    ModelError, NotInstalledError
+        No URDF, no chain of joints that an arm may have; what reads it is missing.
 
     """
     require('tools', *TOOLS)

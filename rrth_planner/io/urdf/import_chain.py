@@ -31,7 +31,7 @@ class ImportedArm:
         How far the arm's ray begins before the tool's origin, on the same line [m]; negative: so
         far beyond it, and the radii make up for that.
     radius : float
-        Of the links [m]; the arm's radii are greater where its bars do not follow the links.
+        Of the links, >= 0 [m]; the arm's radii are greater where its bars do not follow the links.
 
     """
 
@@ -64,22 +64,7 @@ class ImportedArm:
 
 
 def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> ImportedArm:
-    """
-    Return the arm of a chain.
-
-    Parameters
-    ----------
-    T_base_link : ndarray, shape (4, 4)
-        Where the wearer wears its first link: pose in the base frame [m].
-    radius : float
-        Of the links, >= 0 [m].
-
-    Raises
-    ------
-    ModelError
-        A radius or a pose that is none.
-
-    """
+    """Return the arm of a chain, as in `ImportedArm`; ModelError: a radius or pose is none."""
     if not 0.0 <= radius < np.inf:
         raise ModelError(f'radius: {radius}, expected a length >= 0 [m]')
     T_0, dh, ray_lead = rows_of_axes(chain.points, chain.directions, chain.x_first)
@@ -113,8 +98,6 @@ def _cover_radii(arm: ArmModel, points: Array, radius: float) -> Array:
     points : ndarray, shape (dof + 1, 3)
         Where the joints are with all positions at 0, and the beginning of the ray, in the frame
         that `T_base_mount` leads to [m].
-    radius : float
-        Of the links [m].
 
     Returns
     -------
