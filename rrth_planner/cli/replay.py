@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.cli.program import program, say
-from rrth_planner.io.incident import Incident, IncidentKind, read_incident, versions
+from rrth_planner.io.incident import Incident, IncidentKind, versions
+from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 

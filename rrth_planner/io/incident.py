@@ -1,43 +1,23 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Incidents: plans that failed unexpectedly, and files with everything to replay them."""
+"""Incidents: plans that failed unexpectedly, recorded with everything to replay them."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from enum import Enum
 import functools
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
-import os
 from pathlib import Path
 import platform
-from typing import Any
-import uuid
 
 from rrth_planner.collision.violation import Disagreement, Violation
-from rrth_planner.io.entries import number, text
-from rrth_planner.io.serialization import (
-    fields_of,
-    plain,
-    question_from_mapping,
-    scene_from_mapping,
-    trajectory_from_mapping,
-    violation_from_mapping,
-)
-from rrth_planner.io.text_file import load_yaml, naming_file, to_yaml
-from rrth_planner.model.errors import one_line, RecordError, shown
+from rrth_planner.model.errors import one_line, RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Version of the record's layout; others are rejected.
-FORMAT = 2
-# A folder keeps the last hundred files.
-MOST_FILES = 100
-PATTERN = 'incident-*.yaml'
-HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
 PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 
 
@@ -157,75 +137,3 @@ def error_incident(
         error=type(problem).__name__,
         traceback=where,
     )
-
-
-def incident_from_mapping(data: Any) -> Incident:
-    """Return the incident of a mapping; RrthError: an entry missing, unknown or out of range."""
-    if isinstance(data, Mapping) and data.get('format') != FORMAT:
-        raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
-    given = fields_of(data, Incident, 'incident', ('format',))
-    kinds = [kind.value for kind in IncidentKind]
-    if given['kind'] not in kinds:
-        raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
-    if not isinstance(given['versions'], Mapping):
-        raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
-    present, violation = given['present'], given['violation']
-    return Incident(
-        kind=IncidentKind(given['kind']),
-        question=question_from_mapping(given['question']),
-        trajectory=trajectory_from_mapping(given['trajectory'], 'trajectory'),
-        violation=None if violation is None else violation_from_mapping(violation),
-        present=None if present is None else scene_from_mapping(present, 'present'),
-        escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
-        traceback=text(given['traceback'], 'traceback', RecordError),
-        versions={
-            _line(key, 'versions'): _line(value, f'versions: {key}')
-            for key, value in given['versions'].items()
-        },
-        **{name: _line(given[name], name) for name in ('sentence', 'time', 'error')},
-    )
-
-
-def _line(value: Any, name: str) -> str:
-    """Return a text as a line that may be printed, or raise RecordError."""
-    return one_line(text(value, name, RecordError))
-
-
-def incident_to_yaml(incident: Incident) -> str:
-    """Return the text of an incident's file; PyYAML writes numbers by repr, so to the bit."""
-    return HEADER + to_yaml({'format': FORMAT, **plain(incident)})
-
-
-def write_incident(incident: Incident, folder: Path) -> Path:
-    """
-    Write an incident to a new file of a folder, and remove the oldest beyond a hundred.
-
-    Creates the folder if needed; the file is written atomically, or OSError is raised.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    stamp = ''.join(c for c in incident.time[:26] if c.isalnum())
-    path = folder / f'incident-{stamp}-{uuid.uuid4().hex[:6]}.yaml'
-    fresh = path.with_suffix('.part')
-    try:
-        fresh.write_text(incident_to_yaml(incident), encoding='utf-8')
-        os.replace(fresh, path)
-    finally:
-        fresh.unlink(missing_ok=True)
-    with suppress(OSError):
-        _remove_oldest(folder, path)
-    return path
-
-
-def read_incident(path: Path) -> Incident:
-    """Return the incident of a file, or raise RrthError."""
-    data = load_yaml(path)
-    with naming_file(path, RecordError):
-        return incident_from_mapping(data)
-
-
-def _remove_oldest(folder: Path, newest: Path) -> None:
-    """Remove the oldest files; the newest stays, whatever its time stamp."""
-    others = [file for file in folder.glob(PATTERN) if file != newest]
-    others.sort(key=lambda file: (file.stat().st_mtime_ns, file.name), reverse=True)
-    for file in others[MOST_FILES - 1 :]:
-        file.unlink(missing_ok=True)

@@ -12,7 +12,7 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.io.arm_file import load_arm
-from rrth_planner.io.incident import incident_to_yaml, read_incident
+from rrth_planner.io.incident_file import incident_to_yaml, read_incident
 from rrth_planner.io.map_file import load_map
 from rrth_planner.io.motion_file import read_motion, write_motion
 from rrth_planner.io.settings import load_settings

@@ -10,18 +10,15 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.collision.violation import Disagreement, Violation
-from rrth_planner.io.incident import (
-    disagreement_incident,
-    error_incident,
-    Incident,
+from rrth_planner.io.incident import disagreement_incident, error_incident, Incident, IncidentKind
+from rrth_planner.io.incident_file import (
     incident_from_mapping,
     incident_to_yaml,
-    IncidentKind,
     MOST_FILES,
+    plain,
     read_incident,
     write_incident,
 )
-from rrth_planner.io.serialization import plain
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal

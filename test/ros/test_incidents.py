@@ -19,10 +19,8 @@ from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
-from rrth_planner.io.incident import (
-    IncidentKind,  # noqa: E402
-    read_incident,  # noqa: E402
-)
+from rrth_planner.io.incident import IncidentKind  # noqa: E402
+from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402

@@ -29,7 +29,7 @@ from rclpy.qos import (  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
-from rrth_planner.io.incident import read_incident  # noqa: E402
+from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402

@@ -7,7 +7,8 @@ import shlex
 import traceback
 
 from rclpy.logging import get_logging_directory
-from rrth_planner.io.incident import error_incident, Incident, write_incident
+from rrth_planner.io.incident import error_incident, Incident
+from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
