@@ -206,14 +206,12 @@ def _options(data: Any) -> TreeOptions:
 
 def _start_state(data: Any, dof: int) -> StartState:
     given = _fields_of(data, StartState, 'moving')
-    state = _fields_of(given['state'], MotionState, 'moving: state')
+    state = {
+        name: frozen_array(value, (dof,), f'moving: {name}', 'rad, s', RecordError)
+        for name, value in _fields_of(given['state'], MotionState, 'moving: state').items()
+    }
     return StartState(
-        state=MotionState(
-            **{
-                name: frozen_array(value, (dof,), f'moving: {name}', 'rad, s', RecordError)
-                for name, value in state.items()
-            }
-        ),
+        state=MotionState(**state),
         running=_trajectory(given['running'], 'moving: running'),
         time=number(given['time'], 'moving: time', 's', RecordError),
     )

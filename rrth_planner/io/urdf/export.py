@@ -58,7 +58,8 @@ def arm_to_urdf(
     links = [base_frame, MOUNT, *(f'{joint}_link' for joint in arm.joint_names), TOOL]
     joints = [f'{MOUNT}_joint', *arm.joint_names, f'{TOOL}_joint']
     for what, names in (('links', links), ('joints', joints), ('robot', [name])):
-        _check_names(what, names)
+        if len(set(names)) != len(names) or not all(n and n.isprintable() for n in names):
+            raise ModelError(f'{what}: {names}, expected names, printable and all different')
     robot = ElementTree.Element('robot', name=name)
     robot.append(ElementTree.Comment(HEADER))
     for material, rgba in COLOURS.items():
@@ -114,23 +115,18 @@ def _add_joint(
 
 
 def _add_bar(
-    link: ElementTree.Element,
-    ends: tuple[float, float],
-    axis: int,
-    radius: float,
-    material: str,
+    link: ElementTree.Element, ends: tuple[float, float], axis: int, radius: float, material: str
 ) -> None:
     """Add a cylinder between two places on an axis of a link; cylinders lie along z."""
-    if ends[1] - ends[0] < SHORTEST:
+    length = ends[1] - ends[0]
+    if length < SHORTEST:
         return
     visual = ElementTree.SubElement(link, 'visual')
     middle = np.zeros(3)
     middle[axis] = 0.5 * (ends[0] + ends[1])
     _add_origin(visual, middle, [0.0, 0.5 * np.pi if axis == 0 else 0.0, 0.0])
     geometry = ElementTree.SubElement(visual, 'geometry')
-    ElementTree.SubElement(
-        geometry, 'cylinder', radius=_text([radius]), length=_text([ends[1] - ends[0]])
-    )
+    ElementTree.SubElement(geometry, 'cylinder', radius=_text([radius]), length=_text([length]))
     ElementTree.SubElement(visual, 'material', name=material)
 
 
@@ -143,8 +139,3 @@ def _add_origin(
 def _text(numbers: Sequence[float] | Array) -> str:
     # Adding 0 turns -0 into 0.
     return ' '.join(f'{round(float(x), DIGITS) + 0.0!r}'.removesuffix('.0') for x in numbers)
-
-
-def _check_names(what: str, names: Sequence[str]) -> None:
-    if len(set(names)) != len(names) or not all(name and name.isprintable() for name in names):
-        raise ModelError(f'{what}: {list(names)}, expected names, printable and all different')
