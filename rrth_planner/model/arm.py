@@ -140,16 +140,8 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
     """
     Return the poses of the link frames and of the tool in the base frame.
 
-    Parameters
-    ----------
-    q : ndarray, shape (..., dof)
-        Configurations [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (..., dof + 1, 4, 4)
-        The last one is the tool's: the pointing ray leaves its origin along its +z [m].
-
+    (..., dof) [rad or m] -> (..., dof + 1, 4, 4) [m]; the last one is the tool's: the pointing ray
+    leaves its origin along its +z.
     """
     poses = link_poses(arm, q)
     T = arm.T_base_mount

@@ -22,12 +22,8 @@ def reach_bound(arm: ArmModel, ray_length: float, joint: int, row: int, end: str
     of the chain into such groups bounds the whole by the triangle inequality
     (`docs/algorithms.md`, section 2).
 
-    Returns
-    -------
-    float
-        Greatest distance from a revolute joint's axis [m]; for a prismatic joint 1 where it
-        moves the point [-]; 0 where the joint does not move it.
-
+    It is the greatest distance from a revolute joint's axis [m]; for a prismatic joint 1 where it
+    moves the point [-]; 0 where the joint does not move it.
     """
     if row < joint or (row == joint and end == 'a'):
         return 0.0

@@ -140,12 +140,8 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
     """
     Return the polynomials of all pieces in u = (t - t_i) / (t_(i+1) - t_i), lowest power first.
 
-    Returns
-    -------
-    ndarray, shape (n - 1, 6, dof)
-        The quintic that fits position, velocity and acceleration at both ends of each piece [rad];
-        read-only, since timing and both checks share it.
-
+    (n - 1, 6, dof): the quintic that fits position, velocity and acceleration at both ends of each
+    piece [rad]; read-only, since timing and both checks share it.
     """
     p, v, a = trajectory.states
     T = (trajectory.times[1:] - trajectory.times[:-1])[:, None]
@@ -176,11 +172,7 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     """
     Return the state at some times, (m,) [s]; at rest before the first and after the last point.
 
-    Returns
-    -------
-    tuple of ndarray, each of shape (m, dof)
-        Positions [rad], velocities [rad/s], accelerations [rad/s^2].
-
+    Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (m, dof).
     """
     t = np.atleast_1d(np.asarray(times, dtype=np.float64))
     if len(trajectory.times) == 1:

@@ -19,18 +19,8 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     It begins with position, velocity and acceleration of that time. Between its points no
     joint is further than 1e-4 rad from the path, nor more than 1 % beyond its limits, or beyond
     what the trajectory itself does up to there, where that is more; jerks only up to rounding,
-    which in pieces below 0.1 ms exceeds that.
-
-    Parameters
-    ----------
-    time : float
-        Before the start and after the end the arm stands still [s].
-
-    Returns
-    -------
-    Trajectory
-        From time 0 on whole nanoseconds; a single point where the arm stands still.
-
+    which in pieces below 0.1 ms exceeds that. Its times are whole nanoseconds from 0; before the
+    start of the motion and after its end [s] the arm stands still, and it is a single point.
     """
     if not 0.0 < time < trajectory.duration:
         return part_of(trajectory, time, time)

@@ -49,7 +49,7 @@ def arm_to_urdf(
     Raises
     ------
     ModelError
-        A radius or velocity that is none, a name that is none, or two links or joints of one name.
+        A radius, velocity or name that is none, or two links or joints of one name.
 
     """
     if not 0.0 < radius < np.inf:
