@@ -30,11 +30,12 @@ if TYPE_CHECKING:
     from rrth_planner.model.goal import PointingGoal as PointingGoal
     from rrth_planner.model.path import Path as Path
     from rrth_planner.model.scene import Box as Box, Scene as Scene
-    from rrth_planner.model.start_state import MotionState as MotionState, StartState as StartState
     from rrth_planner.model.status import PlanStatus as PlanStatus
     from rrth_planner.model.trajectory import (
         MotionLimits as MotionLimits,
+        MotionState as MotionState,
         sample as sample,
+        StartState as StartState,
         Trajectory as Trajectory,
     )
     from rrth_planner.pipeline.motion_plan import MotionPlan as MotionPlan
@@ -64,52 +65,34 @@ if TYPE_CHECKING:
 
 __version__ = '0.1.0'
 
-_HOME = {
-    'ArmModel': 'model.arm',
-    'arm_from_mapping': 'io.arm_file',
-    'forward_kinematics': 'model.arm',
-    'tool_pose': 'model.arm',
-    'Box': 'model.scene',
-    'Scene': 'model.scene',
-    'PointingGoal': 'model.goal',
-    'load_body': 'io.wearer_file',
-    'RRTHOptions': 'planning.options',
-    'RRTOptions': 'planning.options',
-    'RRTStarOptions': 'planning.options',
-    'InformedRRTStarOptions': 'planning.options',
-    'RRTStarSmartOptions': 'planning.options',
-    'PrintedRRTHOptions': 'planning.options',
-    'World': 'collision.world',
-    'arm_world': 'collision.world',
-    'goal_configurations': 'planning.pointing_goals',
-    'pointing_problem': 'planning.pointing_goals',
-    'BoxMap': 'planning.box_map',
-    'map_from_mapping': 'io.map_file',
-    'map_problem': 'planning.box_map',
-    'map_world': 'planning.box_map',
-    'load_map': 'io.map_file',
-    'PlanningProblem': 'planning.problem',
-    'PlanResult': 'planning.result',
-    'plan': 'planning.planner',
-    'PlanStatus': 'model.status',
-    'Path': 'model.path',
-    'MotionLimits': 'model.trajectory',
-    'Trajectory': 'model.trajectory',
-    'sample': 'model.trajectory',
-    'parameterize': 'timing.parameterization',
-    'certify': 'collision.certificate',
-    'brake': 'timing.braking',
-    'certify_braking': 'timing.braking',
-    'load_arm': 'io.arm_file',
-    'plan_motion': 'pipeline.plan_motion',
-    'warm_up': 'pipeline.plan_motion',
-    'load_settings': 'io.settings',
-    'MotionPlan': 'pipeline.motion_plan',
-    'PlanSettings': 'io.settings',
-    'MotionState': 'model.start_state',
-    'StartState': 'model.start_state',
-    'RrthError': 'model.errors',
+# The names of each module.
+_PUBLIC = {
+    'collision.certificate': 'certify',
+    'collision.world': 'World arm_world',
+    'io.arm_file': 'arm_from_mapping load_arm',
+    'io.map_file': 'load_map map_from_mapping',
+    'io.settings': 'PlanSettings load_settings',
+    'io.wearer_file': 'load_body',
+    'model.arm': 'ArmModel forward_kinematics tool_pose',
+    'model.errors': 'RrthError',
+    'model.goal': 'PointingGoal',
+    'model.path': 'Path',
+    'model.scene': 'Box Scene',
+    'model.status': 'PlanStatus',
+    'model.trajectory': 'MotionLimits MotionState StartState Trajectory sample',
+    'pipeline.motion_plan': 'MotionPlan',
+    'pipeline.plan_motion': 'plan_motion warm_up',
+    'planning.box_map': 'BoxMap map_problem map_world',
+    'planning.options': 'InformedRRTStarOptions PrintedRRTHOptions RRTHOptions RRTOptions '
+    'RRTStarOptions RRTStarSmartOptions',
+    'planning.planner': 'plan',
+    'planning.pointing_goals': 'goal_configurations pointing_problem',
+    'planning.problem': 'PlanningProblem',
+    'planning.result': 'PlanResult',
+    'timing.braking': 'brake certify_braking',
+    'timing.parameterization': 'parameterize',
 }
+_HOME = {name: module for module, names in _PUBLIC.items() for name in names.split()}
 
 __all__ = sorted(_HOME)
 

@@ -4,7 +4,7 @@
 
 import numpy as np
 from rrth_planner.model.path import Path
-from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.timing.corner_blends import Blend
 from rrth_planner.timing.parameterization import parameterize
 from worlds import limits
@@ -66,3 +66,15 @@ def path_distance(points, trajectory, begin, end):
         off = np.abs(points - a - share[:, None] * along).max(axis=1)
         best = np.minimum(best, off)
     return best
+
+
+def jerks_at(trajectory, times):
+    """Return the jerks at some times within a motion, (m, dof); at a point that of the later."""
+    grid = trajectory.times
+    if len(grid) == 1:
+        return np.zeros((len(times), trajectory.positions.shape[1]))
+    i = np.searchsorted(grid[1:-1], times, side='right')
+    width = (grid[i + 1] - grid[i])[:, None]
+    u = np.clip((times - grid[i])[:, None] / width, 0.0, 1.0)
+    c = piece_coefficients(trajectory)[i]
+    return ((60 * c[:, 5] * u + 24 * c[:, 4]) * u + 6 * c[:, 3]) / width**3

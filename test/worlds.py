@@ -10,9 +10,8 @@ import numpy as np
 from rrth_planner.collision.reference_checker import bars
 from rrth_planner.collision.world import arm_world, robot_rows, World
 from rrth_planner.io.arm_file import arm_from_mapping
-from rrth_planner.model.arm import ArmModel, tool_pose
+from rrth_planner.model.arm import ArmModel, bar_ends, tool_pose
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits

@@ -17,7 +17,7 @@ from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
-from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
@@ -75,7 +75,7 @@ def _run(options: argparse.Namespace) -> int:
         raise OptionsError(
             '--period: given without --output, expected a file to write the points to'
         )
-    arm, scene = load_arm(options.arm), load_wearer(options.body)
+    arm, scene = load_arm(options.arm), load_body(options.body)
     settings = _settings(options, arm)
     q_start, goal = _start(options, arm), PointingGoal(options.target)
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.

@@ -16,7 +16,7 @@ from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
-from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
@@ -67,7 +67,7 @@ def _check_output(output: Path) -> None:
 
 def _draw_plan(options: argparse.Namespace) -> 'Figure':
     arm, settings = _arm_and_settings(options)
-    scene, goal = load_wearer(options.body), PointingGoal(options.target)
+    scene, goal = load_body(options.body), PointingGoal(options.target)
     q_start = _start(arm, options.start)
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels

@@ -98,7 +98,8 @@ def _report(found: ImportedArm) -> list[str]:
     for k, name in enumerate(arm.joint_names):
         unit = 'm' if arm.is_prismatic[k] else 'rad'
         low, high = arm.bounds[:, k]
-        note = ', +-pi for a continuous joint' if name in chain.endless else ''
+        endless = chain.moving[k].type == 'continuous'
+        note = ', +-pi for a continuous joint' if endless else ''
         lines.append(
             f'  {name}: {low:.4f} to {high:.4f} {unit}, radius {arm.radii[k]:.4f} m{note}'
         )
@@ -119,12 +120,11 @@ def _report(found: ImportedArm) -> list[str]:
         lines.append(
             f"ray: starts {abs(found.ray_lead):.4f} m {where} the tool's origin, on the same line"
         )
-    given = np.isfinite(chain.velocities)
-    if given.any():
-        speeds = ', '.join(f'{v:g}' if v < np.inf else '?' for v in chain.velocities)
-        missing = ', '.join(
-            name for name, has in zip(arm.joint_names, given, strict=True) if not has
-        )
+    velocities = {joint.name: joint.limit and joint.limit.velocity for joint in chain.moving}
+    velocities = {name: v if v and np.isfinite(v) else None for name, v in velocities.items()}
+    if any(velocities.values()):
+        speeds = ', '.join(f'{v:g}' if v else '?' for v in velocities.values())
+        missing = ', '.join(name for name, v in velocities.items() if not v)
         note = f'; none given for {missing}: replace each ? by a value' if missing else ''
         lines.append(f'max_velocity of the URDF, for the settings: [{speeds}]{note}')
     far, tilt = found.deviation()

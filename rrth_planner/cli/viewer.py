@@ -20,7 +20,7 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import parse_yaml
-from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.request import PlanQuestion
@@ -155,7 +155,7 @@ def _question(options: argparse.Namespace) -> PlanQuestion:
     target = example_target('front') if options.target is None else options.target
     return PlanQuestion(
         arm=arm,
-        scene=load_wearer(options.body),
+        scene=load_body(options.body),
         q_start=start_of(arm),
         goal=PointingGoal(target),
         limits=settings.limits,

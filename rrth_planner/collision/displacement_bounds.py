@@ -36,7 +36,7 @@ def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_lengt
     Returns
     -------
     ndarray, shape (n_bars, n)
-        Bars as in `reach.bar_ends` [m].
+        Bars as in `arm.bar_ends` [m].
 
     """
     reaches = reach_table(arm, ray_length)

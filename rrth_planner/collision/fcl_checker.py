@@ -12,9 +12,8 @@ import numpy as np
 from rrth_planner.collision.displacement_bounds import displacements
 from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
 from rrth_planner.collision.violation import Violation
-from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arm import ArmModel, bar_ends, forward_kinematics
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
 

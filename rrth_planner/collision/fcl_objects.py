@@ -9,9 +9,8 @@ from typing import ClassVar
 
 import fcl
 import numpy as np
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, bar_ends, bar_names
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.reach import bar_ends, bar_names
 from rrth_planner.model.scene import Box, Scene
 
 # Bars become capsules this thin, and their radius is taken off the distance: of thick ones the

@@ -13,10 +13,10 @@ from rrth_planner.kernels import jit
 from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_contacts as contacts
 from rrth_planner.kernels.collision.boxes import rows_of
 from rrth_planner.kernels.kinematics import generated_fk as chain
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, bar_ends, bar_names
 from rrth_planner.model.arrays import Array, check_dof, FARTHEST
 from rrth_planner.model.errors import OptionsError
-from rrth_planner.model.reach import bar_ends, bar_names, reach_table
+from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
 
 # Rounding of kinematics and of the separating axes, with room: coordinates up to 1e4 m carry

@@ -4,8 +4,7 @@
 
 import numpy as np
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import near_point, sample, Trajectory
+from rrth_planner.model.trajectory import MotionState, near_point, sample, StartState, Trajectory
 
 # A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03

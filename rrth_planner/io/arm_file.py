@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import parse_yaml, read_text, to_yaml
+from rrth_planner.io.text_file import naming_file, parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel, ROW
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
@@ -27,21 +27,12 @@ LAYOUT = (
 def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
     """Return an arm as `arm_from_mapping` reads it."""
     rows = [dict(zip(ROW, row, strict=True)) for row in arm.dh.tolist()]
-    radii = arm.radii.tolist()
-    joints = [
-        {
-            'name': joint,
-            'type': 'prismatic' if slides else 'revolute',
-            **row,
-            'lower': lower,
-            'upper': upper,
-            'radius': radius,
-        }
-        for joint, slides, row, lower, upper, radius in zip(
-            arm.joint_names, arm.is_prismatic, rows[:-1], *arm.bounds.tolist(), radii[:-1],
-            strict=True,
-        )
-    ]  # fmt: skip
+    (lower, upper), radii = arm.bounds.tolist(), arm.radii.tolist()
+    joints = []
+    for k, joint in enumerate(arm.joint_names):
+        kind = 'prismatic' if arm.is_prismatic[k] else 'revolute'
+        limits = {'lower': lower[k], 'upper': upper[k]}
+        joints.append({'name': joint, 'type': kind, **rows[k], **limits, 'radius': radii[k]})
     del rows[-1]['d']
     return {
         'name': name,
@@ -133,12 +124,7 @@ def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> 
 
 def load_arm(path: str | Path | None = None) -> ArmModel:
     """
-    Return the arm that a YAML file describes, laid out as `config/arm.yaml`.
-
-    Parameters
-    ----------
-    path : str or Path, optional
-        None or empty: the packaged arm.
+    Return the arm that a YAML file describes; None or empty: the packaged one, `config/arm.yaml`.
 
     Raises
     ------
@@ -154,7 +140,5 @@ def load_arm(path: str | Path | None = None) -> ArmModel:
             'read_urdf writes one from a URDF'
         )
     data = parse_yaml(text, f'file {file}')
-    try:
+    with naming_file(file, ModelError):
         return arm_from_mapping(data)
-    except ModelError as problem:
-        raise ModelError(f'file {file}: {problem}') from problem

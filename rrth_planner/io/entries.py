@@ -19,16 +19,7 @@ def mapping(
     """
     Return a mapping with all wanted entries, optional ones, and no others.
 
-    Parameters
-    ----------
-    value : Any
-        What was given.
-    name : str
-        Its name in errors; likewise for the functions below.
-    wanted, optional : collection of str
-    error : type
-        Raised for anything else.
-
+    Anything else raises an error of the given type in which it is called `name`; likewise below.
     """
     if not isinstance(value, Mapping):
         raise error(f'{name}: {shown(value)}, expected a mapping with {", ".join(wanted)}')

@@ -11,20 +11,9 @@ ROS = 'rclpy'
 
 def require(extras: str, *libraries: str) -> None:
     """
-    Check that libraries are installed.
+    Raise NotInstalledError where libraries, named as they are imported, are missing.
 
-    Parameters
-    ----------
-    extras : str
-        The extras of the package that install them, as `ros,tools`.
-    libraries : str
-        As they are imported.
-
-    Raises
-    ------
-    NotInstalledError
-        Some are missing; names them and what installs them.
-
+    It names them and the extras of the package that install them, as `ros,tools`.
     """
     missing = [name for name in libraries if find_spec(name) is None]
     if not missing:

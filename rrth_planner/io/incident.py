@@ -11,172 +11,22 @@ import hashlib
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 import platform
-from typing import Any
 
 from rrth_planner.collision.violation import Disagreement, Violation
-from rrth_planner.io.entries import number, text
-from rrth_planner.io.serialization import (
-    fields_of,
-    plain,
-    question_from_mapping,
-    scene_from_mapping,
-    trajectory_from_mapping,
-    violation_from_mapping,
-)
-from rrth_planner.model.errors import one_line, RecordError, shown
+from rrth_planner.model.errors import one_line, RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Version of the record's layout; others are rejected.
-FORMAT = 2
 PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
 
 
 class IncidentKind(Enum):
     """Kinds of incidents."""
 
+    # Of the two collision checks.
     DISAGREEMENT = 'disagreement'
     ERROR = 'error'
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Incident:
-    """
-    A plan that failed in a way that must never happen.
-
-    Parameters
-    ----------
-    kind : IncidentKind
-        A disagreement of the two collision checks, or an unexpected error.
-    sentence : str
-        Description, in one line.
-    time : str
-        ISO 8601.
-    question : PlanQuestion
-        The request of the plan.
-    trajectory : Trajectory or None
-        The motion concerned, if there was one already.
-    violation : Violation or None
-        The clearance violation that python-fcl found.
-    present : Scene or None
-        The wearer that the motion was checked against, where that is not the one it was planned
-        for, since the wearer moved meanwhile.
-    escape_time : float
-        Until then the motion escapes from boxes that the arm was in [s].
-    error, traceback : str
-        Type and traceback of the error; empty for a disagreement.
-    versions : mapping
-        Of the packages involved.
-
-    Raises
-    ------
-    RecordError
-        A disagreement without a motion, or a motion whose number of joints is not the arm's.
-
-    """
-
-    kind: IncidentKind
-    sentence: str
-    time: str
-    question: PlanQuestion
-    trajectory: Trajectory | None = None
-    violation: Violation | None = None
-    present: Scene | None = None
-    escape_time: float = 0.0
-    error: str = ''
-    traceback: str = ''
-    versions: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        if self.kind is IncidentKind.DISAGREEMENT and None in (self.trajectory, self.violation):
-            raise RecordError('incident: a disagreement without trajectory and violation')
-        if self.trajectory is not None:
-            width, dof = self.trajectory.positions.shape[1], self.question.arm.dof
-            if width != dof:
-                raise RecordError(f'trajectory: {width} joints, expected {dof}, as the arm')
-
-
-def disagreement_incident(
-    question: PlanQuestion, found: Disagreement, present: Scene | None = None
-) -> Incident:
-    """Return a new incident of a disagreement; `present` as in `Incident`."""
-    return Incident(
-        kind=IncidentKind.DISAGREEMENT,
-        sentence=found.sentence(question.margin),
-        time=_now(),
-        question=question,
-        trajectory=found.trajectory,
-        violation=found.violation,
-        present=present,
-        escape_time=found.escape_time,
-        versions=versions(),
-    )
-
-
-def error_incident(
-    question: PlanQuestion, problem: BaseException, where: str, trajectory: Trajectory | None
-) -> Incident:
-    """Return a new incident of an error; where: its traceback."""
-    return Incident(
-        kind=IncidentKind.ERROR,
-        sentence=one_line(str(problem)),
-        time=_now(),
-        question=question,
-        trajectory=trajectory,
-        error=type(problem).__name__,
-        traceback=where,
-        versions=versions(),
-    )
-
-
-def incident_to_mapping(incident: Incident) -> dict[str, Any]:
-    """Return an incident as numbers, texts, lists and mappings."""
-    return {'format': FORMAT, **plain(incident)}
-
-
-def incident_from_mapping(data: Any) -> Incident:
-    """
-    Return the incident that a mapping describes, as `incident_to_mapping` writes it.
-
-    Raises
-    ------
-    RrthError
-        An entry that is missing, unknown or out of its range.
-
-    """
-    if isinstance(data, Mapping) and data.get('format') != FORMAT:
-        raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
-    given = fields_of(data, Incident, 'incident', ('format',))
-    kinds = [kind.value for kind in IncidentKind]
-    if given['kind'] not in kinds:
-        raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
-    if not isinstance(given['versions'], Mapping):
-        raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
-    trajectory, present = given['trajectory'], given['present']
-    violation = given['violation']
-    return Incident(
-        kind=IncidentKind(given['kind']),
-        question=question_from_mapping(given['question']),
-        trajectory=(
-            None if trajectory is None else trajectory_from_mapping(trajectory, 'trajectory')
-        ),
-        violation=None if violation is None else violation_from_mapping(violation),
-        present=None if present is None else scene_from_mapping(present, 'present'),
-        escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
-        traceback=text(given['traceback'], 'traceback', RecordError),
-        versions={
-            _line(key, 'versions'): _line(value, f'versions: {key}')
-            for key, value in given['versions'].items()
-        },
-        **{name: _line(given[name], name) for name in ('sentence', 'time', 'error')},
-    )
-
-
-def _line(value: Any, name: str) -> str:
-    """Return a text as a line that may be printed, or raise RecordError."""
-    return one_line(text(value, name, RecordError))
 
 
 @functools.cache
@@ -208,3 +58,82 @@ def _digest_of_sources() -> str:
 
 def _now() -> str:
     return datetime.now(timezone.utc).isoformat(timespec='microseconds')
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Incident:
+    """
+    A plan that failed in a way that must never happen.
+
+    Parameters
+    ----------
+    sentence, time : str
+        Description, in one line; ISO 8601, by default now.
+    trajectory : Trajectory or None
+        The motion concerned, if there was one already.
+    violation : Violation or None
+        The clearance violation that python-fcl found.
+    present : Scene or None
+        The wearer that the motion was checked against, where that is not the one it was planned
+        for, since the wearer moved meanwhile.
+    escape_time : float
+        Until then the motion escapes from boxes that the arm was in [s].
+    error, traceback : str
+        Type and traceback of the error; empty for a disagreement.
+
+    Raises
+    ------
+    RecordError
+        A disagreement without a motion, or a motion whose number of joints is not the arm's.
+
+    """
+
+    kind: IncidentKind
+    sentence: str
+    time: str = field(default_factory=_now)
+    question: PlanQuestion
+    trajectory: Trajectory | None = None
+    violation: Violation | None = None
+    present: Scene | None = None
+    escape_time: float = 0.0
+    error: str = ''
+    traceback: str = ''
+    versions: Mapping[str, str] = field(default_factory=versions)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.kind is IncidentKind.DISAGREEMENT and None in (self.trajectory, self.violation):
+            raise RecordError('incident: a disagreement without trajectory and violation')
+        if self.trajectory is not None:
+            width, dof = self.trajectory.positions.shape[1], self.question.arm.dof
+            if width != dof:
+                raise RecordError(f'trajectory: {width} joints, expected {dof}, as the arm')
+
+
+def disagreement_incident(
+    question: PlanQuestion, found: Disagreement, present: Scene | None = None
+) -> Incident:
+    """Return a new incident of a disagreement; `present` as in `Incident`."""
+    return Incident(
+        kind=IncidentKind.DISAGREEMENT,
+        sentence=found.sentence(question.margin),
+        question=question,
+        trajectory=found.trajectory,
+        violation=found.violation,
+        present=present,
+        escape_time=found.escape_time,
+    )
+
+
+def error_incident(
+    question: PlanQuestion, problem: BaseException, where: str, trajectory: Trajectory | None
+) -> Incident:
+    """Return a new incident of an error; where: its traceback."""
+    return Incident(
+        kind=IncidentKind.ERROR,
+        sentence=one_line(str(problem)),
+        question=question,
+        trajectory=trajectory,
+        error=type(problem).__name__,
+        traceback=where,
+    )

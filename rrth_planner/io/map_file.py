@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
 from rrth_planner.planning.box_map import BoxMap
@@ -31,10 +31,8 @@ def load_map(name: str | Path) -> BoxMap:
     is_file = str(name).endswith('.yaml')
     path = Path(name) if is_file else resource_path(f'config/maps/{name}.yaml')
     data = load_yaml(path)
-    try:
+    with naming_file(path, SceneError):
         return map_from_mapping(data, path.stem)
-    except SceneError as problem:
-        raise SceneError(f'file {path}: {problem}') from problem
 
 
 def map_from_mapping(data: Mapping[str, Any], name: str) -> BoxMap:

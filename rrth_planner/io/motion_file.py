@@ -4,17 +4,17 @@
 
 from collections.abc import Sequence
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rrth_planner.io.entries import mapping, sequence
-from rrth_planner.io.text_file import MOST_VALUES, parse_yaml, read_text, to_yaml
+from rrth_planner.io.text_file import MOST_VALUES, naming_file, parse_yaml, read_text, to_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import printable, RecordError, RrthError, shown
+from rrth_planner.model.errors import printable, RecordError, shown
 from rrth_planner.model.trajectory import sample, Trajectory
 
 SERIES = ('positions', 'velocities', 'accelerations')
@@ -32,14 +32,7 @@ HEADER = """\
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointMotion:
     """
-    A trajectory with the names and units of its joints.
-
-    Parameters
-    ----------
-    joint_names : tuple of str
-    units : tuple of str
-        rad or m, of each joint.
-    trajectory : Trajectory
+    A trajectory with the names and units, rad or m, of its joints.
 
     Raises
     ------
@@ -81,14 +74,7 @@ def sampled(motion: JointMotion, period: float) -> JointMotion:
     # No sample that would coincide with the end.
     times = np.arange(0.0, end - 1e-3 * period, period)
     times = np.append(times, end) if end > 0.0 else np.zeros(1)
-    positions, velocities, accelerations = sample(motion.trajectory, times)
-    return JointMotion(
-        joint_names=motion.joint_names,
-        units=motion.units,
-        trajectory=Trajectory(
-            times=times, positions=positions, velocities=velocities, accelerations=accelerations
-        ),
-    )
+    return replace(motion, trajectory=Trajectory(times, *sample(motion.trajectory, times)))
 
 
 def check_suffix(path: Path) -> None:
@@ -99,17 +85,9 @@ def check_suffix(path: Path) -> None:
 
 def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) -> None:
     """
-    Write a motion as .yaml or .csv, by the suffix of the file.
+    Write a motion as .yaml, comments at its head, or as .csv without, by the suffix of the file.
 
-    Comments are written at the head of a YAML file; a CSV file has none.
-
-    Raises
-    ------
-    RecordError
-        Another suffix.
-    OSError
-        The file cannot be written.
-
+    Raise RecordError where it has another one, OSError where it cannot be written.
     """
     check_suffix(path)
     is_table = path.suffix.lower() == '.csv'
@@ -118,31 +96,19 @@ def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) 
 
 
 def read_motion(path: str | Path) -> JointMotion:
-    """
-    Return the motion of a file that `write_motion` wrote.
-
-    Raises
-    ------
-    RrthError
-        The file cannot be read, or holds no motion.
-
-    """
+    """Return the motion that `write_motion` wrote; RrthError: no file, or none of a motion."""
     file = Path(path)
     check_suffix(file)
     text = read_text(file)
     is_table = file.suffix.lower() == '.csv'
     data = None if is_table else parse_yaml(text, f'file {file}')
-    try:
+    with naming_file(file, RecordError):
         return _from_csv(text) if is_table else _from_mapping(data)
-    except csv.Error as problem:
-        raise RecordError(f'file {file}: {problem}; expected a readable file') from problem
-    except RrthError as problem:
-        raise RecordError(f'file {file}: {problem}') from problem
 
 
 def _to_yaml(motion: JointMotion, comments: Sequence[str]) -> str:
     trajectory = motion.trajectory
-    columns = [getattr(trajectory, name).tolist() for name in ('times', *SERIES)]
+    columns = [column.tolist() for column in (trajectory.times, *trajectory.states)]
     data = {
         'joint_names': list(motion.joint_names),
         'units': list(motion.units),
@@ -165,8 +131,8 @@ def _from_mapping(data: Any) -> JointMotion:
         joint_names=tuple(sequence(given['joint_names'], 'joint_names', RecordError)),
         units=tuple(sequence(given['units'], 'units', RecordError)),
         trajectory=Trajectory(
-            times=_column(points, 'time', (None,)),
-            **{name: _column(points, name, (None, None)) for name in SERIES},
+            _column(points, 'time', (None,)),
+            *(_column(points, name, (None, None)) for name in SERIES),
         ),
     )
 
@@ -188,7 +154,7 @@ def _header(names: Sequence[str], units: Sequence[str]) -> list[str]:
 def _to_csv(motion: JointMotion) -> str:
     trajectory = motion.trajectory
     # A joint's position, velocity and acceleration beside each other.
-    values = np.stack([getattr(trajectory, name) for name in SERIES], axis=2)
+    values = np.stack(trajectory.states, axis=2)
     rows = np.column_stack([trajectory.times, values.reshape(len(values), -1)])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator='\n')
@@ -200,7 +166,10 @@ def _to_csv(motion: JointMotion) -> str:
 def _from_csv(text: str) -> JointMotion:
     if text.count(',') > MOST_VALUES:
         raise RecordError(f'{text.count(",")} commas, expected at most {MOST_VALUES} values')
-    rows = [row for row in csv.reader(io.StringIO(text, newline=''), strict=True) if row]
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text, newline=''), strict=True) if row]
+    except csv.Error as problem:
+        raise RecordError(f'{problem}; expected a readable file') from problem
     header = rows[0] if rows else []
     columns = [column.rpartition(' position [') for column in header[1::3]]
     names, units = [name for name, _, _ in columns], [unit[:-1] for _, _, unit in columns]
@@ -216,7 +185,5 @@ def _from_csv(text: str) -> JointMotion:
     return JointMotion(
         joint_names=tuple(names),
         units=tuple(units),
-        trajectory=Trajectory(
-            times=numbers[:, 0], **{name: values[..., k] for k, name in enumerate(SERIES)}
-        ),
+        trajectory=Trajectory(numbers[:, 0], *np.moveaxis(values, 2, 0)),
     )

@@ -11,19 +11,10 @@ PACKAGE = Path(__file__).parents[1]
 
 def resource_path(name: str) -> Path:
     """
-    Return where a file of the package is.
+    Return where a file is that is named relative to the project's root, as `config/arm.yaml`.
 
-    Parameters
-    ----------
-    name : str
-        Relative to the project's root, as `config/arm.yaml`.
-
-    Raises
-    ------
-    ModelError
-        It is neither in the package, as pip installs it, nor beside it, as in a source tree, nor
-        in its share folder, as colcon installs it.
-
+    Raise ModelError where it is neither in the package, as pip installs it, nor beside it, as in
+    a source tree, nor in its share folder, as colcon installs it.
     """
     folders = [PACKAGE, PACKAGE.parent, *_share_folder()]
     for folder in folders:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import number, text, whole
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.trajectory import MotionLimits
@@ -23,20 +23,7 @@ LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlanSettings:
-    """
-    Settings of a plan.
-
-    Parameters
-    ----------
-    seed : int
-        -1: a new one each time.
-    margin, ray_guard_length, escape_depth : float
-        [m].
-    limits : MotionLimits
-    options : TreeOptions
-        Their class is the algorithm.
-
-    """
+    """Settings of a plan: a seed, -1 for a new one each time, lengths [m], limits and options."""
 
     seed: int
     margin: float
@@ -50,11 +37,8 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
     """
     Return the settings that values by name describe, as in `config/planner.yaml`.
 
-    Raises
-    ------
-    OptionsError
-        The first invalid value: its name, what was given, what was expected, the unit.
-
+    Raise OptionsError for the first invalid value: its name, what was given, what was expected,
+    the unit.
     """
     if values['algorithm'] not in ALGORITHMS:
         raise OptionsError(
@@ -63,15 +47,8 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
         )
     algorithm = ALGORITHMS[values['algorithm']]
     return PlanSettings(
-        seed=values['seed'],
-        margin=values['margin'],
-        ray_guard_length=values['ray_guard_length'],
-        escape_depth=values['escape_depth'],
-        limits=MotionLimits(
-            velocity=_of_each_joint('max_velocity', values, dof),
-            acceleration=_of_each_joint('max_acceleration', values, dof),
-            jerk=_of_each_joint('max_jerk', values, dof),
-        ),
+        **{name: values[name] for name in ('seed', *LENGTHS)},
+        limits=MotionLimits(*(_of_each_joint(name, values, dof) for name in LIMIT_UNITS)),
         options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
     )
 
@@ -82,7 +59,6 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
 
     Parameters
     ----------
-    dof : int
     path : str or Path, optional
         Missing parameters are taken from `config/planner.yaml`.
     **changes
@@ -99,10 +75,8 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
     values = {**packaged, **{name: packaged[name][:1] for name in LIMIT_UNITS}}
     if path is not None:
         given = _parameters(path)
-        try:
+        with naming_file(path, OptionsError):
             _typed_settings(values, given, dof)
-        except OptionsError as problem:
-            raise OptionsError(f'file {path}: {problem}') from problem
         values |= given
     return _typed_settings(values, changes, dof)
 
@@ -138,10 +112,8 @@ def _of_each_joint(name: str, values: Mapping[str, Any], dof: int) -> Array:
     """Return a limit for each joint, (dof,)."""
     unit = LIMIT_UNITS[name]
     given = frozen_array(values[name], (None,), name, unit, OptionsError)
-    if (
-        len(given) not in (1, dof)
-        or not ((given >= LOWEST_LIMIT) & (given <= HIGHEST_LIMIT)).all()
-    ):
+    is_within = ((given >= LOWEST_LIMIT) & (given <= HIGHEST_LIMIT)).all()
+    if len(given) not in (1, dof) or not is_within:
         raise OptionsError(
             f'{name}: {given.tolist()}, expected {dof} values, or one for all joints, from '
             f'{LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{unit}]'

@@ -3,13 +3,15 @@
 """Files of text, read within limits whatever they hold: YAML as plain data, and XML."""
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 import math
 from pathlib import Path
 import re
 from typing import Any
 from xml.etree import ElementTree
 
-from rrth_planner.model.errors import ModelError
+from rrth_planner.model.errors import ModelError, RrthError
 import yaml
 
 # The largest files that are written here are incidents with 10,000 boxes, stored twice: 600,000
@@ -19,6 +21,7 @@ DEEPEST, MOST_ELEMENTS = 20, 50_000
 # libyaml is thirty times as fast as what PyYAML does where it comes without it.
 _Parser = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _Dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+_ENDS = yaml.SequenceEndEvent, yaml.MappingEndEvent
 # Numbers as in YAML 1.2, decimal only: 010, 1:30 and dates, of which every reader makes something
 # else, are texts. Of 64 bits an integer is exact; longer ones are numbers like others.
 _INTEGER = re.compile(r'[-+]?(0|[1-9][0-9]{0,19})')
@@ -39,15 +42,7 @@ _WORDS = {
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """
-    Return what a file holds.
-
-    Raises
-    ------
-    ModelError
-        It cannot be read, or is longer than 16 MiB.
-
-    """
+    """Return what a file holds, or raise ModelError: unreadable, or longer than 16 MiB."""
     try:
         with Path(path).open('rb') as file:
             data = file.read(MOST_BYTES + 1)
@@ -67,16 +62,21 @@ def read_text(path: str | Path) -> str:
         raise ModelError(f'file {path}: {problem}; expected text in UTF-8') from problem
 
 
+@contextmanager
+def naming_file(path: str | Path, error: type[RrthError]) -> Iterator[None]:
+    """Raise errors of the values that a file describes as one whose sentence names the file."""
+    try:
+        yield
+    except RrthError as problem:
+        raise error(f'file {path}: {problem}') from problem
+
+
 def load_yaml(path: str | Path) -> Any:
     """
     Return what a YAML file holds: mappings by texts, lists, texts, numbers, booleans and None.
 
-    Raises
-    ------
-    ModelError
-        It cannot be read, is no YAML, is too long or too deep, or has an alias, an anchor, a tag,
-        or a key that is no text or there twice.
-
+    Raise ModelError where it cannot be read, is no YAML, is too long or too deep, or has an alias,
+    an anchor, a tag, or a key that is no text or there twice.
     """
     return parse_yaml(read_text(path), f'file {path}')
 
@@ -118,43 +118,34 @@ def _parsed(text: str) -> Any:
     word makes of a text, cannot grow.
     """
     next_event = _Parser(text).get_event
-    # Of the document, and of each list and mapping in it that is not closed: what has been read
-    # of it, and where it begins.
-    open_items: list[list[Any]] = [[]]
-    begins: list[Any] = []
     n_values = 0
-    while True:
-        event = next_event()
+
+    def value_of(event: Any, depth: int) -> Any:
+        nonlocal n_values
         kind = type(event)
-        if kind is yaml.ScalarEvent:
-            # The first says whether it stands without quotes.
-            value = _plain(event.value) if event.implicit[0] else event.value
-            open_items[-1].append(value)
-        elif kind is yaml.SequenceEndEvent:
-            items = open_items.pop()
-            open_items[-1].append(items)
-            begins.pop()
-            continue
-        elif kind is yaml.MappingEndEvent:
-            mapping = _mapping(begins.pop(), open_items.pop())
-            open_items[-1].append(mapping)
-            continue
-        elif kind in (yaml.SequenceStartEvent, yaml.MappingStartEvent):
-            open_items.append([])
-            begins.append(event)
-        elif kind is yaml.AliasEvent:
+        if kind is yaml.AliasEvent:
             raise _rejection(event, 'an alias')
-        elif kind is yaml.DocumentStartEvent and open_items[0]:
-            raise _rejection(event, 'a second document')
-        elif kind is yaml.StreamEndEvent:
-            return open_items[0][0] if open_items[0] else None
-        else:
-            continue
         if event.anchor or event.tag:
             raise _rejection(event, f'an anchor or a tag, {event.anchor or event.tag}')
         n_values += 1
-        if n_values > MOST_VALUES or len(open_items) > DEEPEST + 1:
+        is_scalar = kind is yaml.ScalarEvent
+        if n_values > MOST_VALUES or depth - is_scalar >= DEEPEST:
             raise _rejection(event, f'more than {MOST_VALUES} values, or {DEEPEST} in one another')
+        if is_scalar:
+            # The first says whether it stands without quotes.
+            return _plain(event.value) if event.implicit[0] else event.value
+        items = []
+        while type(inner := next_event()) not in _ENDS:
+            items.append(value_of(inner, depth + 1))
+        return items if kind is yaml.SequenceStartEvent else _mapping(event, items)
+
+    documents: list[Any] = []
+    while type(event := next_event()) is not yaml.StreamEndEvent:
+        if type(event) is yaml.DocumentStartEvent:
+            if documents:
+                raise _rejection(event, 'a second document')
+            documents.append(value_of(next_event(), 0))
+    return documents[0] if documents else None
 
 
 def _mapping(event: Any, items: list[Any]) -> dict[str, Any]:
@@ -214,11 +205,8 @@ def load_xml(path: str | Path) -> ElementTree.Element:
     """
     Return the root of an XML file.
 
-    Raises
-    ------
-    ModelError
-        It cannot be read, is no XML, is too long or too deep, or declares a document type.
-
+    Raise ModelError where it cannot be read, is no XML, is too long or too deep, or declares a
+    document type.
     """
     parser = ElementTree.XMLParser(target=_Tree())
     try:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import mapping, sequence, text, whole
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
+from rrth_planner.io.text_file import load_yaml, naming_file
 from rrth_planner.model.arrays import FARTHEST, frozen_array
 from rrth_planner.model.errors import one_line, printable, SceneError, shown
 from rrth_planner.model.rotation import rotation_matrix
@@ -29,14 +29,9 @@ ADD, DELETE, DELETEALL = 0, 2, 3
 LONGEST_TEXT = 100
 
 
-def load_wearer(path: str | Path | None = None) -> Scene:
+def load_body(path: str | Path | None = None) -> Scene:
     """
-    Return the wearer of a YAML file: laid out as `config/body.yaml`, or an example message.
-
-    Parameters
-    ----------
-    path : str or Path, optional
-        None: `config/body.yaml`.
+    Return the wearer of a YAML file: laid out as `config/body.yaml`, the default, or a message.
 
     Raises
     ------
@@ -45,13 +40,12 @@ def load_wearer(path: str | Path | None = None) -> Scene:
         other than that of the examples.
 
     """
-    data = None if path is None else load_yaml(path)
-    if not isinstance(data, dict) or 'markers' not in data:
-        return load_body(path)
-    try:
-        return scene_from_mapping({'boxes': _boxes_after(data['markers'])})
-    except SceneError as problem:
-        raise SceneError(f'file {path}: {problem}') from problem
+    file = Path(path) if path else resource_path('config/body.yaml')
+    data = load_yaml(file)
+    with naming_file(file, SceneError):
+        if isinstance(data, dict) and 'markers' in data:
+            data = {'boxes': _boxes_after(data['markers'])}
+        return scene_from_mapping(data)
 
 
 def _boxes_after(markers: Any) -> list[dict[str, Any]]:
@@ -122,20 +116,16 @@ def _boxes(label: str, marker: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _vector(data: Any, axes: str, label: str, unit: str) -> list[float]:
     """Return the components of a point, vector or quaternion of a message."""
     given = mapping(data, label, axes, SceneError)
-    return frozen_array(
-        [given[axis] for axis in axes], (len(axes),), label, unit, SceneError, FARTHEST
-    ).tolist()
+    values = [given[axis] for axis in axes]
+    return frozen_array(values, (len(axes),), label, unit, SceneError, FARTHEST).tolist()
 
 
 def scene_from_mapping(data: Any) -> Scene:
     """
     Return the wearer that a mapping describes, laid out as `config/body.yaml`.
 
-    Parameters
-    ----------
-    data : mapping
-        `boxes`: a list of mappings with `name`, `center` and full `size` [m], and, where a box is
-        turned, its `quaternion_xyzw`.
+    Its `boxes` are a list of mappings with `name`, `center` and full `size` [m], and, where a box
+    is turned, its `quaternion_xyzw`.
 
     Raises
     ------
@@ -149,39 +139,14 @@ def scene_from_mapping(data: Any) -> Scene:
     return Scene(tuple(_box(f'box {k}', box) for k, box in enumerate(boxes)))
 
 
-def load_body(path: str | Path | None = None) -> Scene:
-    """
-    Return the wearer that a YAML file describes; None: the packaged one, `config/body.yaml`.
-
-    Raises
-    ------
-    ModelError, SceneError
-        The file cannot be read, or describes no body.
-
-    """
-    file = Path(path) if path else resource_path('config/body.yaml')
-    data = load_yaml(file)
-    try:
-        return scene_from_mapping(data)
-    except SceneError as problem:
-        raise SceneError(f'file {file}: {problem}') from problem
-
-
 def _box(label: str, data: Any) -> Box:
     wanted = ('name', 'center', 'size')
     given = mapping(data, label, wanted, SceneError, ('quaternion_xyzw',))
-    quaternion = frozen_array(
-        given.get('quaternion_xyzw', UPRIGHT),
-        (4,),
-        f'{label}: quaternion_xyzw',
-        '-',
-        SceneError,
-        FARTHEST,
-    )
+    turn, named = given.get('quaternion_xyzw', UPRIGHT), f'{label}: quaternion_xyzw'
+    quaternion = frozen_array(turn, (4,), named, '-', SceneError, FARTHEST)
     if np.linalg.norm(quaternion) < SHORTEST:
         raise SceneError(
-            f'{label}: quaternion_xyzw {quaternion.tolist()}, expected four numbers x, y, z, w, '
-            'not all 0 [-]'
+            f'{named} {quaternion.tolist()}, expected four numbers x, y, z, w, not all 0 [-]'
         )
     name = printable(given['name'], f'{label}: name', SceneError)
     return Box(name, given['center'], given['size'], rotation_matrix(quaternion))

@@ -79,7 +79,7 @@ class ArmModel:
             raise ModelError(f'radii: {self.radii.tolist()}, expected lengths >= 0 [m]')
         if self.dh[-1, 3] != 0.0:
             raise ModelError(f'dh: d = {self.dh[-1, 3]} in the row of the tool, expected 0 [m]')
-        n_bars = len(bars_of(self.dh, prismatic))
+        n_bars = len(bar_ends(self))
         if n_bars > MAX_BARS:
             raise ModelError(
                 f'dh: {n_bars} bars, expected at most {MAX_BARS}: each a and d behind the first '
@@ -110,41 +110,48 @@ class ArmModel:
         return len(self.joint_names)
 
 
-def bars_of(dh: Array, is_prismatic: tuple[bool, ...]) -> tuple[tuple[int, str], ...]:
+@functools.lru_cache(maxsize=16)
+def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
     """
-    Return the offsets of a chain that are bars, (row, 'a' or 'd'), from the mount outwards.
+    Return the offsets of an arm that are bars, (row, 'a' or 'd'), from the mount outwards.
 
     Offsets of length zero are no bars. Those that no joint moves belong to the mount, which is
     worn on the body and therefore not checked against it.
     """
     bars = []
-    dof = len(is_prismatic)
-    for row in range(dof + 1):
-        is_moved, is_joint = row > 0, row < dof
-        if is_moved and dh[row, 1] != 0.0:
+    for row, (_, a, _, d) in enumerate(arm.dh):
+        is_moved, is_ray = row > 0, row == arm.dof
+        if is_moved and a != 0.0:
             bars.append((row, 'a'))
-        slides = is_joint and is_prismatic[row]
-        if slides or not is_joint or (is_moved and dh[row, 3] != 0.0):
+        if is_ray or arm.is_prismatic[row] or (is_moved and d != 0.0):
             bars.append((row, 'd'))
     return tuple(bars)
+
+
+@functools.lru_cache(maxsize=16)
+def bar_names(arm: ArmModel) -> tuple[str, ...]:
+    """Return what messages call the bars of `bar_ends`."""
+    return tuple(
+        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
+    )
 
 
 def forward_kinematics(arm: ArmModel, q: Array) -> Array:
     """
     Return the poses of the link frames and of the tool in the base frame.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    q : ndarray, shape (..., dof)
-        Configurations [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (..., dof + 1, 4, 4)
-        The last one is the tool's: the pointing ray leaves its origin along its +z [m].
-
+    (..., dof) [rad or m] -> (..., dof + 1, 4, 4) [m]; the last one is the tool's: the pointing ray
+    leaves its origin along its +z.
     """
+    poses = link_poses(arm, q)
+    T = arm.T_base_mount
+    for i in range(arm.dof + 1):
+        T = poses[..., i, :, :] = T @ poses[..., i, :, :]
+    return poses
+
+
+def link_poses(arm: ArmModel, q: Array) -> Array:
+    """Return the pose of each link frame in the one before, as `forward_kinematics` [m]."""
     q = np.asarray(q, dtype=np.float64)
     constant, slides, parts = _link_parts(arm)
     values = np.zeros((*q.shape[:-1], arm.dof + 1))
@@ -155,9 +162,6 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
     np.sin(theta, out=terms[..., 0, 2])
     terms[..., 0, 3] = constant[1] + np.where(slides, values, 0.0)
     poses: Array = (terms @ parts).reshape(*theta.shape, 4, 4)
-    T = arm.T_base_mount
-    for i in range(arm.dof + 1):
-        T = poses[..., i, :, :] = T @ poses[..., i, :, :]
     return poses
 
 

@@ -29,12 +29,10 @@ def frozen_array(
 
     Parameters
     ----------
-    value : array_like
-        What was given.
     shape : tuple
         Expected shape; `None` stands for any length.
     name, unit : str
-        Name and unit of the array in the error.
+        In the error.
     error : type
         Raised when the shape differs, or an element is not a finite number (true and "1" are
         none) or too large.
@@ -50,7 +48,10 @@ def frozen_array(
         raise error(
             f'{name}: {shown(value)}, expected numbers of shape {_wanted(shape)} [{unit}]'
         ) from problem
-    if array.shape != shape and not _fits(array.shape, shape):
+    is_fit = len(array.shape) == len(shape) and all(
+        wanted in (None, given) for given, wanted in zip(array.shape, shape, strict=True)
+    )
+    if not is_fit:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
     # A sum of squares is finite where all elements are, unless it overflows.
     if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
@@ -76,14 +77,6 @@ def check_dof(q: Array, dof: int, name: str) -> None:
     """Raise RrthError unless an array, shape (..., dof), has a value for each joint."""
     if q.shape[-1:] != (dof,):
         raise RrthError(f'{name}: shape {q.shape}, expected a value for each of {dof} joints')
-
-
-def _fits(given: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
-    return len(given) == len(shape) and all(map(_is_length, given, shape))
-
-
-def _is_length(given: int, wanted: int | None) -> bool:
-    return wanted is None or given == wanted
 
 
 def _wanted(shape: tuple[int | None, ...]) -> str:

@@ -38,8 +38,8 @@ def first_outside(control: Array, low: Array, high: Array) -> tuple[int, float, 
     Returns
     -------
     tuple or None
-        Index of a polynomial, where in [0, 1], and its value there; of the
-        places checked first, the one furthest outside.
+        Index of a polynomial, where in [0, 1], and its value there; of the places checked first,
+        the one furthest outside.
 
     """
     left, right = _halving(len(control) - 1)

@@ -11,12 +11,7 @@ from rrth_planner.model.errors import SceneError
 @dataclass(frozen=True, slots=True, eq=False)
 class PointingGoal:
     """
-    A point that the pointing ray has to meet.
-
-    Parameters
-    ----------
-    target : array_like, shape (3,)
-        The point in the base frame [m].
+    A point of the base frame that the pointing ray has to meet, array_like of shape (3,) [m].
 
     Raises
     ------

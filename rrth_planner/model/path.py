@@ -11,15 +11,7 @@ from rrth_planner.model.errors import RrthError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """
-    Straight joint motions from waypoint to waypoint.
-
-    Parameters
-    ----------
-    waypoints : array_like, shape (n, dof)
-        At least one configuration [rad].
-
-    """
+    """Straight joint motions between one or more waypoints, array_like of shape (n, dof) [rad]."""
 
     waypoints: Array
 

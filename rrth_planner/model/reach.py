@@ -6,7 +6,7 @@ import functools
 import math
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, bars_of
+from rrth_planner.model.arm import ArmModel, bar_ends
 from rrth_planner.model.arrays import Array
 
 # A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
@@ -17,27 +17,13 @@ def reach_bound(arm: ArmModel, ray_length: float, joint: int, row: int, end: str
     """
     Return a bound of the distance of a point of the arm from the axis of a joint.
 
-    The point is the end of the `a` or of the `d` offset of a DH row. Neighbouring offsets keep
+    The point is the `end` of the `a` or of the `d` offset of a DH row. Neighbouring offsets keep
     fixed angles whatever the joints do, so the norm of their sum is known exactly; the best split
     of the chain into such groups bounds the whole by the triangle inequality
     (`docs/algorithms.md`, section 2).
 
-    Parameters
-    ----------
-    arm : ArmModel
-    ray_length : float
-        Length of the pointing ray [m].
-    joint, row : int
-        Indices of the joint and of the DH row, counted from 0.
-    end : str
-        'a' or 'd'.
-
-    Returns
-    -------
-    float
-        Greatest distance from a revolute joint's axis [m]; for a prismatic joint 1 where it
-        moves the point [-]; 0 where the joint does not move it.
-
+    It is the greatest distance from a revolute joint's axis [m]; for a prismatic joint 1 where it
+    moves the point [-]; 0 where the joint does not move it.
     """
     if row < joint or (row == joint and end == 'a'):
         return 0.0
@@ -97,20 +83,6 @@ def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
     if arm.is_prismatic[row]:
         return (d + float(arm.bounds[0, row]), d + float(arm.bounds[1, row]))
     return (d,)
-
-
-@functools.lru_cache(maxsize=16)
-def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
-    """Return the bars of an arm as `arm.bars_of` does."""
-    return bars_of(arm.dh, arm.is_prismatic)
-
-
-@functools.lru_cache(maxsize=16)
-def bar_names(arm: ArmModel) -> tuple[str, ...]:
-    """Return what messages call the bars of `bar_ends`."""
-    return tuple(
-        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
-    )
 
 
 @functools.lru_cache(maxsize=16)

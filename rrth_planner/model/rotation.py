@@ -23,24 +23,20 @@ def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
 def quaternion_xyzw(rotation: Array) -> Array:
     """Return the unit quaternion (x, y, z, w) of a rotation, w >= 0 (Shepperd 1978)."""
     r = rotation
-    squares = np.array(
-        [
-            1 + r[0, 0] - r[1, 1] - r[2, 2],
-            1 - r[0, 0] + r[1, 1] - r[2, 2],
-            1 - r[0, 0] - r[1, 1] + r[2, 2],
-            1 + r[0, 0] + r[1, 1] + r[2, 2],
-        ]
-    )
-    # The largest of the four is far from zero, so the divisions below are safe.
+    xx, yy, zz = np.diag(r)
+    xy, xz, yz = r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1]
+    wx, wy, wz = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    # Four times each product of two components.
     table = np.array(
         [
-            [squares[0], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[2, 1] - r[1, 2]],
-            [r[0, 1] + r[1, 0], squares[1], r[1, 2] + r[2, 1], r[0, 2] - r[2, 0]],
-            [r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[2], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], squares[3]],
+            [1 + xx - yy - zz, xy, xz, wx],
+            [xy, 1 - xx + yy - zz, yz, wy],
+            [xz, yz, 1 - xx - yy + zz, wz],
+            [wx, wy, wz, 1 + xx + yy + zz],
         ]
     )
-    q = table[int(np.argmax(squares))]
+    # The largest of the four squares is far from zero, so the division below is safe.
+    q = table[int(np.argmax(np.diag(table)))]
     q = q / np.linalg.norm(q)
     return -q if q[3] < 0 else q
 

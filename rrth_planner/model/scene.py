@@ -17,12 +17,8 @@ class Box:
 
     Parameters
     ----------
-    name : str
-        How messages call it.
-    center : array_like, shape (3,)
-        Its centre in the base frame [m].
-    size : array_like, shape (3,)
-        Its full edge lengths along its own axes [m], all > 0.
+    center, size : array_like, shape (3,)
+        Its centre in the base frame, and full edge lengths along its own axes, all > 0 [m].
     rotation : array_like, shape (3, 3)
         Its axes as columns, in the base frame.
 
@@ -59,7 +55,9 @@ class Box:
             ).ravel()
             for name, shape in (('center', (3,)), ('size', (3,)), ('rotation', (3, 3)))
         ]
-        _fill(self, self.name, _frozen(np.concatenate(parts)))
+        numbers = np.concatenate(parts)
+        numbers.setflags(write=False)
+        _fill(self, self.name, numbers)
         if not (self.size > 0.0).all():
             raise SceneError(f'{label}: size {self.size.tolist()}, expected three lengths > 0 [m]')
         r = self.rotation
@@ -72,11 +70,6 @@ class Box:
         box: Box = object.__new__(cls)
         _fill(box, name, row)
         return box
-
-
-def _frozen(numbers: Array) -> Array:
-    numbers.setflags(write=False)
-    return numbers
 
 
 def _fill(box: Box, name: str, row: Array) -> None:
@@ -92,16 +85,7 @@ def _fill(box: Box, name: str, row: Array) -> None:
 @dataclass(frozen=True, slots=True)
 class Scene:
     """
-    The wearer: boxes in the base frame.
-
-    Parameters
-    ----------
-    boxes : sequence of Box
-
-    Attributes
-    ----------
-    numbers : ndarray, shape (n, 15)
-        Those of the boxes.
+    The wearer: boxes in the base frame, and their `numbers` as an array, (n, 15).
 
     Raises
     ------
@@ -120,4 +104,5 @@ class Scene:
             raise SceneError(f'boxes: {len(boxes)}, expected at most {MAX_BOXES}')
         object.__setattr__(self, 'boxes', boxes)
         numbers = np.array([box.numbers for box in boxes]).reshape(len(boxes), NUMBERS)
-        object.__setattr__(self, 'numbers', _frozen(numbers))
+        numbers.setflags(write=False)
+        object.__setattr__(self, 'numbers', numbers)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Geometry with time: quintic pieces, as a controller interpolates them."""
+"""Geometry with time: quintic pieces, as a controller interpolates them, and states of motion."""
 
 from dataclasses import dataclass
 import functools
@@ -17,24 +17,12 @@ REST_SPEED = 0.01
 # The polynomial of the piece beyond the point is extended over that time; where the jerk jumps
 # by 80 rad/s^3 at the point it is 1.3e-14 rad from that of the piece before.
 NEAR_POINT = 1e-5
-# Of a trajectory.
-_FIELDS = ('times', 'positions', 'velocities', 'accelerations')
 
 
-def _are_all(flags: NDArray[np.bool_]) -> bool:
-    # Like `flags.all()`, in half the time.
-    return bool(np.logical_and.reduce(flags, axis=None))
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class MotionLimits:
     """
-    Limits of each joint.
-
-    Parameters
-    ----------
-    velocity, acceleration, jerk : array_like, shape (dof,)
-        Greatest magnitudes [rad/s, rad/s^2, rad/s^3], all > 0.
+    Greatest magnitudes for each joint, array_like of shape (dof,) [rad/s, rad/s^2, rad/s^3].
 
     Raises
     ------
@@ -50,11 +38,8 @@ class MotionLimits:
     def __post_init__(self) -> None:
         """Validate and freeze."""
         dof: int | None = None
-        for name, unit in (
-            ('velocity', 'rad/s'),
-            ('acceleration', 'rad/s^2'),
-            ('jerk', 'rad/s^3'),
-        ):
+        units = {'velocity': 'rad/s', 'acceleration': 'rad/s^2', 'jerk': 'rad/s^3'}
+        for name, unit in units.items():
             value = frozen_array(getattr(self, name), (dof,), f'max_{name}', unit, OptionsError)
             dof = len(value)
             if not (value > 0.0).all():
@@ -63,8 +48,13 @@ class MotionLimits:
                 )
             object.__setattr__(self, name, value)
 
+    @property
+    def rows(self) -> tuple[Array, Array, Array]:
+        """Greatest velocities, accelerations and jerks."""
+        return self.velocity, self.acceleration, self.jerk
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
     """
     Points in time; between two of them each joint follows the quintic that fits both.
@@ -91,36 +81,10 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
-        for name, value in zip(_FIELDS, self._sound() or self._checked(), strict=True):
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
-
-    def _sound(self) -> list[Array] | None:
-        """Return copies of all fields if they are valid: the fast path of a stop."""
-        given = [getattr(self, name) for name in _FIELDS]
-        # Other types would be converted: true and "1" would become numbers.
-        if not all(type(value) is np.ndarray and value.dtype == np.float64 for value in given):
-            return None
-        fields = [np.array(value, order='C') for value in given]
-        times, *rows = fields
-        shape = rows[0].shape
-        fits = len(shape) == 2 and times.shape == shape[:1] and shape[0] > 0
-        if not fits or any(row.shape != shape for row in rows) or times[0] != 0.0:
-            return None
-        positions, *others = rows
-        is_sound = (
-            times[:-1] < times[1:],
-            np.abs(positions) <= FARTHEST,
-            *map(np.isfinite, (times, *others)),
-        )
-        return fields if all(map(_are_all, is_sound)) else None
-
-    def _checked(self) -> list[Array]:
-        """Return copies of all fields, or raise RrthError for the first that is wrong."""
         times = frozen_array(self.times, (None,), 'times', 's', RrthError)
         if len(times) == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
-        fields: list[Array] = [times]
+        object.__setattr__(self, 'times', times)
         dof: int | None = None
         for name, unit, largest in (
             ('positions', 'rad', FARTHEST),
@@ -129,14 +93,41 @@ class Trajectory:
         ):
             shape = (len(times), dof)
             value = frozen_array(getattr(self, name), shape, name, unit, RrthError, largest)
-            fields.append(value)
             dof = value.shape[1]
-        return fields
+            object.__setattr__(self, name, value)
 
     @property
     def duration(self) -> float:
         """Time of the last point [s]."""
         return float(self.times[-1])
+
+    @property
+    def states(self) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations."""
+        return self.positions, self.velocities, self.accelerations
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MotionState:
+    """Positions, velocities and accelerations of the joints, (dof,) [rad, rad/s, rad/s^2]."""
+
+    positions: Array
+    velocities: Array
+    accelerations: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StartState:
+    """
+    State of a moving arm at the handover to a new motion.
+
+    `running` is the motion that it executes until then, None where that is unknown; `time` is that
+    of the handover within it [s].
+    """
+
+    state: MotionState
+    running: Trajectory | None = None
+    time: float = 0.0
 
 
 # The terms u^3, u^4 and u^5 that add a position, a velocity and an acceleration at u = 1, and
@@ -149,14 +140,10 @@ def piece_coefficients(trajectory: Trajectory) -> Array:
     """
     Return the polynomials of all pieces in u = (t - t_i) / (t_(i+1) - t_i), lowest power first.
 
-    Returns
-    -------
-    ndarray, shape (n - 1, 6, dof)
-        The quintic that fits position, velocity and acceleration at both ends of each piece [rad];
-        read-only, since timing and both checks share it.
-
+    (n - 1, 6, dof): the quintic that fits position, velocity and acceleration at both ends of each
+    piece [rad]; read-only, since timing and both checks share it.
     """
-    p, v, a = trajectory.positions, trajectory.velocities, trajectory.accelerations
+    p, v, a = trajectory.states
     T = (trajectory.times[1:] - trajectory.times[:-1])[:, None]
     square = T * T
     c = np.empty((len(T), 6, p.shape[1]))
@@ -183,19 +170,9 @@ def positions_at(trajectory: Trajectory, times: ArrayLike) -> Array:
 
 def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Array]:
     """
-    Return the state at some times; at rest before the first and after the last point.
+    Return the state at some times, (m,) [s]; at rest before the first and after the last point.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-    times : array_like, shape (m,)
-        [s].
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (m, dof)
-        Positions [rad], velocities [rad/s], accelerations [rad/s^2].
-
+    Positions [rad], velocities [rad/s] and accelerations [rad/s^2], each (m, dof).
     """
     t = np.atleast_1d(np.asarray(times, dtype=np.float64))
     if len(trajectory.times) == 1:
@@ -207,71 +184,39 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
     return q, np.where(is_outside, 0.0, v), np.where(is_outside, 0.0, a)
 
 
-def jerks_at(trajectory: Trajectory, times: ArrayLike) -> Array:
-    """
-    Return the jerks at some times within the motion, (m,) [s] -> (m, dof) [rad/s^3].
-
-    At a point, where two pieces meet, that of the later one.
-    """
-    t = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    if len(trajectory.times) == 1:
-        return np.zeros((len(t), trajectory.positions.shape[1]))
-    i, u, width = _locate(trajectory, t)
-    c = piece_coefficients(trajectory)[i]
-    return np.asarray(((60 * c[:, 5] * u + 24 * c[:, 4]) * u + 6 * c[:, 3]) / width**3)
-
-
 def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     """
     Return the part of a trajectory between two times, shifted to begin at time 0.
 
     It is that trajectory to rounding: a part of a quintic is the quintic through its ends, and
-    every point between the two times stays.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    begin, end : float
-        Clipped to its times; where end <= begin, the result is a single point [s].
-
+    every point between the two times [s] stays. They are clipped to its own; where end <= begin,
+    the result is a single point.
     """
     times = trajectory.times
     begin = min(max(begin, 0.0), trajectory.duration)
     end = min(max(end, 0.0), trajectory.duration)
-    rows = (trajectory.positions, trajectory.velocities, trajectory.accelerations)
     if end <= begin:
-        return Trajectory(
-            times=np.zeros(1),
-            **dict(zip(_FIELDS[1:], _state_by(trajectory, end, 0.0), strict=True)),
-        )
+        return Trajectory(np.zeros(1), *_state_by(trajectory, end, 0.0))
     is_inside = (times > begin + NEAR_POINT) & (times < end - NEAR_POINT)
-    ends = _state_by(trajectory, begin, NEAR_POINT), _state_by(trajectory, end, -NEAR_POINT)
-    q, v, a = (
-        np.concatenate([first, row[is_inside], last])
-        for first, row, last in zip(ends[0], rows, ends[1], strict=True)
-    )
+    first, last = _state_by(trajectory, begin, NEAR_POINT), _state_by(trajectory, end, -NEAR_POINT)
+    inner = [row[is_inside] for row in trajectory.states]
     return Trajectory(
-        times=np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
-        positions=q,
-        velocities=v,
-        accelerations=a,
+        np.concatenate([[0.0], times[is_inside] - begin, [end - begin]]),
+        *map(np.concatenate, zip(first, inner, last, strict=True)),
     )
 
 
 def near_point(trajectory: Trajectory, time: float) -> float:
     """Return a time, replaced by that of a point of the trajectory within `NEAR_POINT` [s]."""
-    near = float(trajectory.times[np.abs(trajectory.times - time).argmin()])
+    near = _nearest(trajectory, time)
     return near if abs(near - time) <= NEAR_POINT else time
 
 
 def joined(before: Trajectory, after: Trajectory) -> Trajectory:
     """Return two trajectories in one; the second begins at the last point of the first."""
-    return Trajectory(
-        times=np.concatenate([before.times, before.times[-1] + after.times[1:]]),
-        positions=np.concatenate([before.positions, after.positions[1:]]),
-        velocities=np.concatenate([before.velocities, after.velocities[1:]]),
-        accelerations=np.concatenate([before.accelerations, after.accelerations[1:]]),
-    )
+    times = np.concatenate([before.times, before.times[-1] + after.times[1:]])
+    pairs = zip(before.states, after.states, strict=True)
+    return Trajectory(times, *(np.concatenate([one, other[1:]]) for one, other in pairs))
 
 
 def _state_by(trajectory: Trajectory, time: float, ahead: float) -> tuple[Array, Array, Array]:
@@ -283,8 +228,8 @@ def _state_by(trajectory: Trajectory, time: float, ahead: float) -> tuple[Array,
     times = trajectory.times
     i = int(times.searchsorted(time))
     if times[i] == time:
-        rows = trajectory.positions, trajectory.velocities, trajectory.accelerations
-        return rows[0][i : i + 1], rows[1][i : i + 1], rows[2][i : i + 1]
+        q, v, a = (row[i : i + 1] for row in trajectory.states)
+        return q, v, a
     i = int(np.searchsorted(times[1:-1], time + ahead, side='right'))
     width = times[i + 1] - times[i]
     u = np.full((1, 1), (time - times[i]) / width)
@@ -314,5 +259,8 @@ def beyond(trajectory: Trajectory, escape_time: float) -> Trajectory:
     """Return the remaining motion after an escape, from the point nearest to that time [s]."""
     if escape_time == 0.0:
         return trajectory
-    begin = trajectory.times[np.abs(trajectory.times - escape_time).argmin()]
-    return part_of(trajectory, float(begin), trajectory.duration)
+    return part_of(trajectory, _nearest(trajectory, escape_time), trajectory.duration)
+
+
+def _nearest(trajectory: Trajectory, time: float) -> float:
+    return float(trajectory.times[np.abs(trajectory.times - time).argmin()])

@@ -18,9 +18,8 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import StartState
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, StartState, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape, plan_escape
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_path import find_path, SPARES

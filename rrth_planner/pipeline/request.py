@@ -9,8 +9,7 @@ from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.start_state import StartState
-from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.model.trajectory import MotionLimits, StartState
 from rrth_planner.planning.options import TreeOptions
 
 

@@ -19,52 +19,27 @@ def brake(trajectory: Trajectory, time: float, limits: MotionLimits) -> Trajecto
     It begins with position, velocity and acceleration of that time. Between its points no
     joint is further than 1e-4 rad from the path, nor more than 1 % beyond its limits, or beyond
     what the trajectory itself does up to there, where that is more; jerks only up to rounding,
-    which in pieces below 0.1 ms exceeds that.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    time : float
-        Before the start and after the end the arm stands still [s].
-    limits : MotionLimits
-
-    Returns
-    -------
-    Trajectory
-        From time 0 on whole nanoseconds; a single point where the arm stands still.
-
+    which in pieces below 0.1 ms exceeds that. Its times are whole nanoseconds from 0; before the
+    start of the motion and after its end [s] the arm stands still, and it is a single point.
     """
     if not 0.0 < time < trajectory.duration:
         return part_of(trajectory, time, time)
     stop = fast_stop(trajectory, time, limits, lead=0.0)
-    q, v, a = sample(trajectory, [time])
-    if np.abs(a - stop.accelerations[:1]).max() > ROUNDING:
+    state = sample(trajectory, [time])
+    if np.abs(state[2] - stop.accelerations[:1]).max() > ROUNDING:
         # At a point of the trajectory, whose jerk jumps: by the piece that follows.
         return stop
     # Compiled code rounds the last digit of the first state differently.
-    return Trajectory(
-        times=stop.times,
-        positions=np.concatenate([q, stop.positions[1:]]),
-        velocities=np.concatenate([v, stop.velocities[1:]]),
-        accelerations=np.concatenate([a, stop.accelerations[1:]]),
-    )
+    rows = zip(state, stop.states, strict=True)
+    return Trajectory(stop.times, *(np.concatenate([first, row[1:]]) for first, row in rows))
 
 
 def certify_braking(
     trajectory: Trajectory, time: float, world: World, limits: MotionLimits
 ) -> Certificate:
     """
-    Return the certificate of the stop that a running trajectory makes if braked at some time.
+    Return the certificate of `brake` at some time [s].
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-    time : float
-        When it begins to brake [s].
-    world : World
-        The present one, not the one that the trajectory was planned in.
-    limits : MotionLimits
-        Limits of the stop.
-
+    The world is the present one, not the one that the trajectory was planned in.
     """
     return certify(brake(trajectory, time, limits), world)

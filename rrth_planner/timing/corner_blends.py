@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Corner blends: curves that pass a waypoint without stopping."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from rrth_planner.collision.world import World
@@ -21,7 +21,7 @@ ENOUGH = 0.01
 TINY = 1e-300
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Blend:
     """
     A quartic from `half_length` before a corner to as much after it, in tau from 0 to 1.
@@ -58,35 +58,12 @@ class Blend:
         speed = 2 * d * np.maximum(np.abs(self.u_in), np.abs(self.u_out))
         return speed, 3 * d * np.abs(self.u_out - self.u_in)
 
-    def top_speed(self, limits: MotionLimits) -> float:
-        """Return the greatest constant speed that holds all limits within the blend [rad/s]."""
-        if self.half_length == 0.0:
-            return 0.0
-        turn = np.abs(self.u_out - self.u_in) + 1e-300
-        width = 2 * self.half_length
-        along = np.maximum(np.abs(self.u_in), np.abs(self.u_out)) + 1e-300
-        # q'' peaks at 3/2 and q''' at 6 times the turn, over width and width^2.
-        return float(
-            min(
-                (limits.velocity / along).min(),
-                np.sqrt((limits.acceleration * width / (1.5 * turn)).min()),
-                np.cbrt((limits.jerk * width**2 / (6.0 * turn)).min()),
-            )
-        )
-
 
 def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend, ...]:
     """
-    Return a blend for each inner waypoint, as large as can be certified.
+    Return a blend for each inner waypoint, as large as can be certified in the world.
 
-    Parameters
-    ----------
-    path : Path
-    world : World
-        Where each blend itself must be certified free.
-    limits : MotionLimits
-        A blend is no larger than needed to pass it at full speed.
-
+    A blend is no larger than needed to pass it at full speed.
     """
     q = path.waypoints
     check_dof(q, world.bounds.shape[1], 'path')
@@ -96,9 +73,7 @@ def round_corners(path: Path, world: World, limits: MotionLimits) -> tuple[Blend
     blends = []
     for i in range(1, len(q) - 1):
         room = SHARE * min(lengths[i - 1], lengths[i])
-        whole = Blend(
-            corner=q[i], u_in=directions[i - 1], u_out=directions[i], half_length=float(room)
-        )
+        whole = Blend(q[i], directions[i - 1], directions[i], float(room))
         blends.append(_largest_free(whole, world, limits))
     return tuple(blends)
 
@@ -113,20 +88,10 @@ def _largest_free(whole: Blend, world: World, limits: MotionLimits) -> Blend:
     )
     half_length = min(whole.half_length, max(enough, ENOUGH))
     while half_length > SMALLEST:
-        blend = Blend(
-            corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=half_length
-        )
-        speed, curvature = blend.derivative_bounds()
-        proof = arm_validity.prove_curve(
-            blend.coefficients(),
-            speed,
-            curvature,
-            world.resolution,
-            world.chain,
-            world.robot,
-            world.obstacles,
-        )
-        if proof == 1:
+        blend = replace(whole, half_length=half_length)
+        curve = blend.coefficients(), *blend.derivative_bounds()
+        place = world.resolution, world.chain, world.robot, world.obstacles
+        if arm_validity.prove_curve(*curve, *place) == 1:
             return blend
         half_length *= SHRINK
-    return Blend(corner=whole.corner, u_in=whole.u_in, u_out=whole.u_out, half_length=0.0)
+    return replace(whole, half_length=0.0)

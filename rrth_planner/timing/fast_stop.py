@@ -17,54 +17,20 @@ def fast_stop(
     """
     Return the fail-safe stop along a motion, from a time within it.
 
-    During `lead`, the latency of the message, the motion continues unchanged, so that a controller
-    that receives the stop a little late is still on it.
+    During `lead` [s], the latency of the message, the motion continues unchanged, so that a
+    controller that receives the stop a little late is still on it.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-    time : float
-        Within it [s].
-    limits : MotionLimits
-        The stop exceeds them by no more than the motion does up to there, or by less than 1 %;
-        jerks only up to rounding, which in pieces below 0.1 ms exceeds that.
-    lead : float
-        Time for which the motion continues unchanged [s].
-
-    Returns
-    -------
-    Trajectory
-        From the state at that time to rest, no joint further than 1e-4 rad from the path, with
-        points no further apart than 50 ms once it slows down; the remaining motion where that
-        ends as soon.
-
+    It leads from the state at that time [s] to rest, no joint further than 1e-4 rad from the path,
+    with points no further apart than 50 ms once it slows down; it is the remaining motion where
+    that ends as soon. It exceeds the limits by no more than the motion does up to there, or by
+    less than 1 %; jerks only up to rounding, which in pieces below 0.1 ms exceeds that.
     """
     time = min(max(time, 0.0), trajectory.duration)
     curves, dof = piece_coefficients(trajectory), trajectory.positions.shape[1]
     if time == trajectory.duration:
         still = np.zeros((1, dof))
-        return Trajectory(
-            times=np.zeros(1),
-            positions=trajectory.positions[-1:],
-            velocities=still,
-            accelerations=still,
-        )
+        return Trajectory(np.zeros(1), trajectory.positions[-1:], still, still)
     most = len(trajectory.times) + 8 + int(trajectory.duration / SPACINGS[-1])
     times, states = np.empty(most), np.empty((3, most, dof))
-    n = write_fast_stop(
-        curves,
-        trajectory.times,
-        time,
-        lead,
-        limits.velocity,
-        limits.acceleration,
-        limits.jerk,
-        times,
-        states,
-    )
-    return Trajectory(
-        times=times[:n],
-        positions=states[0, :n],
-        velocities=states[1, :n],
-        accelerations=states[2, :n],
-    )
+    n = write_fast_stop(curves, trajectory.times, time, lead, *limits.rows, times, states)
+    return Trajectory(times[:n], *states[:, :n])

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.kernels.trajectory.speed_profile import ramp_time
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.timing.braking import brake
 from rrth_planner.timing.parameterization import peaks
 
@@ -51,14 +50,8 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
 
     Each joint's acceleration decays at constant jerk, a little less than its limit; from then
     on the velocity is constant. Between two points every joint follows a cubic, which the quintic
-    of a controller reproduces.
-
-    Parameters
-    ----------
-    state : MotionState
-        Within the limits, and so that the velocity stays within them while acceleration fades.
-    limits : MotionLimits
-
+    of a controller reproduces. The state is within the limits, and such that the velocity stays
+    within them while acceleration fades.
     """
     a = state.accelerations
     fade = np.ceil(np.abs(a) / (RESERVE * limits.jerk) / TICK) * TICK
@@ -79,26 +72,20 @@ def lead_in(state: MotionState, limits: MotionLimits) -> LeadIn:
     j_max = RESERVE * float((limits.jerk / share).min())
     length = 0.5 * speed * ramp_time(speed, a_max, j_max) * (1 + 1e-6)
     return LeadIn(
-        trajectory=Trajectory(
-            times=times, positions=positions, velocities=velocities, accelerations=accelerations
-        ),
+        trajectory=Trajectory(times, positions, velocities, accelerations),
         speed=speed,
         q_stop=positions[-1] + u * length,
         allowed=MotionLimits(
-            velocity=np.maximum(limits.velocity, np.abs(state.velocities)),
-            acceleration=np.maximum(limits.acceleration, np.abs(state.accelerations)),
-            jerk=limits.jerk,
+            np.maximum(limits.velocity, np.abs(state.velocities)),
+            np.maximum(limits.acceleration, np.abs(state.accelerations)),
+            limits.jerk,
         ),
     )
 
 
 def reserved(limits: MotionLimits) -> MotionLimits:
     """Return the limits for the path after a lead-in: those that the lead-in assumes."""
-    return MotionLimits(
-        velocity=limits.velocity,
-        acceleration=RESERVE * limits.acceleration,
-        jerk=RESERVE * limits.jerk,
-    )
+    return MotionLimits(limits.velocity, RESERVE * limits.acceleration, RESERVE * limits.jerk)
 
 
 def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
@@ -108,7 +95,5 @@ def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
     stop = brake(moving.running, moving.time, limits)
     allowed = limits
     if len(stop.times) > 1:
-        own = zip(peaks(stop), (limits.velocity, limits.acceleration, limits.jerk), strict=True)
-        v, a, j = (np.maximum(*pair) for pair in own)
-        allowed = MotionLimits(velocity=v, acceleration=a, jerk=j)
+        allowed = MotionLimits(*map(np.maximum, peaks(stop), limits.rows))
     return LeadIn(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)

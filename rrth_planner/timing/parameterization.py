@@ -54,11 +54,9 @@ def parameterize(
 
     Parameters
     ----------
-    path : Path
     blends : tuple of Blend
         One for each inner waypoint; `half_length` 0 means to stop there, unless the path goes
         straight on.
-    limits : MotionLimits
     v_start : float
         Speed along the first edge at the start, without acceleration [rad/s]. Above 0 the limits
         are for the caller to check (`excess`).
@@ -77,11 +75,9 @@ def parameterize(
     q = path.waypoints
     if path.length < STILL:
         still = np.zeros((2, q.shape[1]))
-        return Trajectory(
-            times=np.array([0.0, HOLD]), positions=q[[0, 0]], velocities=still, accelerations=still
-        )
+        return Trajectory(np.array([0.0, HOLD]), q[[0, 0]], still, still)
     segments = _segments(path, blends)
-    table = np.stack([limits.velocity, limits.acceleration, limits.jerk])
+    table = np.stack(limits.rows)
     whole, fine = (_speeds(segments, shares, table, v_start) for shares in SUBDIVISIONS)
     best = whole if whole.duration <= WORTH * fine.duration else fine
     if best.duration == math.inf:
@@ -104,11 +100,11 @@ class _Segments:
     the direction turns from u to u + turns by the smooth step g'.
     """
 
+    end: Array
     origins: Array
     directions: Array
     turns: Array
     widths: Array
-    end: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,10 +131,7 @@ def _segments(path: Path, blends: tuple[Blend, ...]) -> _Segments:
         if cuts[i + 1] > 0.0:
             half = cuts[i + 1]
             rows.append((q[i + 1] - half * u[i], u[i], u[i + 1] - u[i], 2 * half))
-    origins, directions, turns, widths = zip(*rows, strict=True)
-    return _Segments(
-        np.array(origins), np.array(directions), np.array(turns), np.array(widths), q[-1]
-    )
+    return _Segments(q[-1], *map(np.array, zip(*rows, strict=True)))
 
 
 def _speeds(
@@ -203,7 +196,7 @@ def _assemble(
     q += shift * v + 0.5 * shift**2 * a
     v += shift * a
     v[-1] = a[-1] = 0.0
-    return Trajectory(times=rounded, positions=q, velocities=v, accelerations=a)
+    return Trajectory(rounded, q, v, a)
 
 
 def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
@@ -259,18 +252,16 @@ def limit_ratio(trajectory: Trajectory, limits: MotionLimits) -> float:
 
     A motion within a limit by `peaks` nowhere exceeds it by more than 0.2 %.
     """
-    ratios = []
-    for order, (peak, limit) in enumerate(
-        zip(peaks(trajectory), (limits.velocity, limits.acceleration, limits.jerk), strict=True),
-        start=1,
-    ):
-        ratios.append((float((peak / limit).max()) / (1 + ALLOWED)) ** (1 / order))
-    return max(ratios)
+    ratios = enumerate(_ratios(trajectory, limits), start=1)
+    return max((ratio / (1 + ALLOWED)) ** (1 / order) for order, ratio in ratios)
 
 
 def excess(trajectory: Trajectory, limits: MotionLimits) -> float:
     """Return the greatest ratio of a trajectory to its limits; 1.01: 1 % beyond."""
-    shares = zip(
-        peaks(trajectory), (limits.velocity, limits.acceleration, limits.jerk), strict=True
-    )
-    return max(float((peak / limit).max()) for peak, limit in shares)
+    return max(_ratios(trajectory, limits))
+
+
+def _ratios(trajectory: Trajectory, limits: MotionLimits) -> list[float]:
+    """Return the greatest ratio of each derivative to its limits."""
+    pairs = zip(peaks(trajectory), limits.rows, strict=True)
+    return [float((peak / limit).max()) for peak, limit in pairs]

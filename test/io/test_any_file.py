@@ -17,7 +17,7 @@ from rrth_planner.io.map_file import load_map
 from rrth_planner.io.motion_file import read_motion, write_motion
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import load_yaml, parse_yaml, to_yaml
-from rrth_planner.io.wearer_file import load_body, load_wearer
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
 from test_incident import disagreement
@@ -69,7 +69,7 @@ READERS = {
     'arm': (load_arm, '.yaml', lambda _: shipped('config/arm.yaml')),
     'map': (load_map, '.yaml', lambda _: shipped('config/maps/fence.yaml')),
     'body': (load_body, '.yaml', lambda _: shipped('config/body.yaml')),
-    'wearer': (load_wearer, '.yaml', lambda _: shipped(*BODIES)),
+    'wearer': (load_body, '.yaml', lambda _: shipped(*BODIES)),
     'settings': (lambda p: load_settings(4, p), '.yaml', lambda _: shipped('config/planner.yaml')),
     'incident': (read_incident, '.yaml', lambda _: [incident_text().encode()]),
     'motion': (read_motion, '.yaml', lambda folder: motion(folder, '.yaml')),
@@ -244,7 +244,6 @@ def test_names_that_are_not_printable_are_rejected_wherever_they_stand(tmp_path,
     moved['joint_names'][0] = name
     for read, data in (
         (load_body, body),
-        (load_wearer, body),
         (load_arm, arm),
         (load_arm, named),
         (load_map, fence),
@@ -264,6 +263,6 @@ def test_a_text_of_a_marker_names_its_box_in_one_line(tmp_path):
     message['markers'][1]['text'] = 'left\nhand \x1b[31m' + 'x' * 1000
     file = tmp_path / 'body.yaml'
     file.write_text(to_yaml(message))
-    name = load_wearer(file).boxes[0].name
+    name = load_body(file).boxes[0].name
     assert name.startswith('left hand ?[31mxxx')
     assert len(name) == 100

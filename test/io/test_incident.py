@@ -10,17 +10,12 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.collision.violation import Disagreement, Violation
-from rrth_planner.io.incident import (
-    disagreement_incident,
-    error_incident,
-    Incident,
-    incident_from_mapping,
-    incident_to_mapping,
-    IncidentKind,
-)
+from rrth_planner.io.incident import disagreement_incident, error_incident, Incident, IncidentKind
 from rrth_planner.io.incident_file import (
+    incident_from_mapping,
     incident_to_yaml,
     MOST_FILES,
+    plain,
     read_incident,
     write_incident,
 )
@@ -28,8 +23,7 @@ from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
 from worlds import examples, FOLDED, limits, MARGIN, RAY, table_1_arm, wearer
@@ -128,9 +122,8 @@ def flat(value):
 @examples(150)
 @given(incidents())
 def test_an_incident_survives_its_file_to_the_bit(incident):
-    mapping = incident_to_mapping(incident)
-    again = incident_from_mapping(parse_yaml(incident_to_yaml(incident), 'incident'))
-    assert flat(incident_to_mapping(again)) == flat(mapping)
+    again = incident_from_mapping(as_mapping(incident))
+    assert flat(plain(again)) == flat(plain(incident))
     for name in ('arm', 'limits', 'options'):
         assert type(getattr(again.question, name)) is type(getattr(incident.question, name))
     np.testing.assert_array_equal(again.question.q_start, incident.question.q_start)
@@ -203,9 +196,14 @@ def test_a_new_file_stays_when_the_clock_has_jumped_backwards(tmp_path):
     assert write_incident(disagreement(), tmp_path).exists()
 
 
+def as_mapping(incident):
+    """Return what the file of an incident holds."""
+    return parse_yaml(incident_to_yaml(incident), 'incident')
+
+
 def changed(path, value):
     """Return the mapping of an incident with one entry replaced; `del`: left out."""
-    data = parse_yaml(incident_to_yaml(disagreement()), 'incident')
+    data = as_mapping(disagreement())
     inner = data
     for key in path[:-1]:
         inner = inner[key]
@@ -278,7 +276,7 @@ def paths_in(data, path=()):
             yield from paths_in(value, (*path, key))
 
 
-PATHS = list(paths_in(incident_to_mapping(disagreement())))
+PATHS = list(paths_in(as_mapping(disagreement())))
 
 
 @examples(400)
@@ -301,7 +299,7 @@ def test_what_is_no_mapping_is_rejected(data):
 def test_options_without_a_name_are_rejected():
     record = error_incident(question(options=PrintedRRTHOptions()), ValueError(), '', None)
     with pytest.raises(RecordError, match='PrintedRRTHOptions, expected those of rrt_h, rrt'):
-        incident_to_mapping(record)
+        incident_to_yaml(record)
 
 
 def test_a_question_is_about_one_arm():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rrth_planner.cli.plan import main as plan
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.wearer_file import load_body, load_wearer
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.errors import SceneError
 
 MARKERS = """
@@ -43,7 +43,7 @@ def message(folder, last):
 
 def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
     file = message(tmp_path, '{ns: arms, id: 9, action: 2}')
-    scene = load_wearer(file)
+    scene = load_body(file)
     assert [box.name for box in scene.boxes] == ['torso', 'arms[0]', 'arms[1]']
     pytest.importorskip('rclpy')
     from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -69,25 +69,19 @@ def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
 )
 def test_what_is_no_box_of_the_wearer_is_rejected_and_not_left_out(tmp_path, head, words):
     with pytest.raises(SceneError, match=f'body.yaml: marker 6.*{words}'):
-        load_wearer(message(tmp_path, head))
-
-
-def test_a_body_file_is_taken_as_it_is():
-    file = resource_path('config/examples/seated_body.yaml')
-    np.testing.assert_array_equal(load_wearer(file).numbers, load_body(file).numbers)
-    np.testing.assert_array_equal(load_wearer().numbers, load_body().numbers)
+        load_body(message(tmp_path, head))
 
 
 def test_a_file_that_is_neither_is_named(tmp_path):
     with pytest.raises(SceneError, match='body_bad.yaml'):
-        load_wearer(resource_path('msg_examples/body_bad.yaml'))
+        load_body(resource_path('msg_examples/body_bad.yaml'))
     file = tmp_path / 'body.yaml'
     file.write_text('markers: 5\n')
     with pytest.raises(SceneError, match='markers: 5, expected a list'):
-        load_wearer(file)
+        load_body(file)
     file.write_text('head: ' + 'long ' * 500)
     with pytest.raises(SceneError, match='expected a mapping with a list of boxes') as refusal:
-        load_wearer(file)
+        load_body(file)
     assert len(str(refusal.value)) < 200 + len(str(file))
 
 

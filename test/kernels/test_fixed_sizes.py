@@ -19,10 +19,9 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.search import elastic_band, tree
 from rrth_planner.kernels.trajectory import speed_profile
-from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
+from rrth_planner.model.arm import ArmModel, bar_ends, pointing_error, tool_pose
 from rrth_planner.model.errors import ModelError, OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan

@@ -9,8 +9,7 @@ from rrth_planner.collision.reference_checker import frames
 from rrth_planner.collision.world import arm_world, robot_rows
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
-from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
-from rrth_planner.model.reach import bar_ends
+from rrth_planner.model.arm import bar_ends, forward_kinematics, pointing_error, tool_pose
 from rrth_planner.model.scene import Scene
 from worlds import (
     compiled_chain,

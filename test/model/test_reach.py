@@ -9,7 +9,8 @@ from rrth_planner.collision.certificate import derivative_bounds
 from rrth_planner.collision.reference_checker import frames
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import curvature_bounds
-from rrth_planner.model.reach import bar_ends, bar_names, reach_table
+from rrth_planner.model.arm import bar_ends, bar_names
+from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
 from worlds import bezier_quintic, compiled_chain, examples, line, oracle_bars, table_1_arm
 

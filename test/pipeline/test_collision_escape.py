@@ -15,13 +15,12 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_remaining_free
+from rrth_planner.model.arm import bar_ends
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
-from rrth_planner.model.reach import bar_ends
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.model.trajectory import positions_at, sample
+from rrth_planner.model.trajectory import MotionState, positions_at, sample, StartState
 from rrth_planner.pipeline.plan_path import SPARES
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.timing.parameterization import parameterize

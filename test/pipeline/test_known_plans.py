@@ -29,7 +29,7 @@ from rrth_planner import (
     Scene,
 )
 from rrth_planner.io.settings import load_settings
-from rrth_planner.model.start_state import MotionState, StartState
+from rrth_planner.model.trajectory import MotionState, StartState
 from rrth_planner.pipeline.plan_motion import plan_motion
 
 ROOT, FILE = Path(__file__).parents[2], Path(__file__).with_suffix('.csv')

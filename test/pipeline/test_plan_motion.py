@@ -16,9 +16,8 @@ from rrth_planner.model.arm import forward_kinematics, pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.model.trajectory import sample
+from rrth_planner.model.trajectory import MotionState, sample, StartState
 from rrth_planner.pipeline.rejection import goal_rejection
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount

@@ -11,12 +11,12 @@ from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import jerks_at, piece_coefficients, sample, Trajectory
+from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.pipeline.time_path import first_proven, in_time
 from rrth_planner.timing.braking import brake, certify_braking
 from rrth_planner.timing.corner_blends import round_corners
 from rrth_planner.timing.parameterization import parameterize
-from sample_motions import any_motion, path_distance
+from sample_motions import any_motion, jerks_at, path_distance
 from worlds import (
     dense_touch,
     examples,

@@ -10,7 +10,6 @@ from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, S, TIME,
 from rrth_planner.kernels.trajectory.stop_profile import keeps_limits, line_stop, stop_s
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
-    jerks_at,
     MotionLimits,
     piece_coefficients,
     sample,
@@ -20,7 +19,7 @@ from rrth_planner.timing.braking import brake
 from rrth_planner.timing.corner_blends import Blend
 from rrth_planner.timing.fast_stop import fast_stop, LATENCY
 from rrth_planner.timing.parameterization import limit_ratio, parameterize
-from sample_motions import any_motion, foreign_motion, path_distance, planned_motion
+from sample_motions import any_motion, foreign_motion, jerks_at, path_distance, planned_motion
 from worlds import examples, limits
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -12,9 +12,15 @@ from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.start_state import MotionState, StartState
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.model.trajectory import joined, piece_coefficients, REST_SPEED, sample
+from rrth_planner.model.trajectory import (
+    joined,
+    MotionState,
+    piece_coefficients,
+    REST_SPEED,
+    sample,
+    StartState,
+)
 from rrth_planner.pipeline import time_path
 from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.planning.options import RRTHOptions

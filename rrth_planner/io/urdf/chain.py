@@ -45,44 +45,35 @@ SQUARE = 5e-5
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class UrdfChain:
     """
-    The moving joints between two links, all positions at 0, in the frame of the first link.
+    The joints between two links, all positions at 0, in the frame of the first link.
 
     Parameters
     ----------
     name, base, tool : str
         Of the robot and of the two links.
-    joint_names : tuple of str
-    is_prismatic : tuple of bool
+    joints, moving : tuple of yourdfpy.Joint
+        All from base to tool, as they are in the file, and those that move.
     bounds : ndarray, shape (2, dof)
-        [rad or m].
-    velocities : tuple of float
-        Greatest ones that the file gives, infinity where it gives none [rad/s or m/s].
+        [rad or m], +-pi for continuous joints.
     points, directions : ndarray, shape (dof + 1, 3)
         The joints' origins [m] and axes; last the tool's origin and its ray.
     x_first : ndarray, shape (3,)
         The x axis of the first joint's frame.
     ray : ndarray, shape (3,)
         The pointing ray in the tool's link.
-    endless : tuple of str
-        Continuous joints, limited to +-pi.
-    joints : tuple of yourdfpy.Joint
-        All from base to tool, as they are in the file.
 
     """
 
     name: str
     base: str
     tool: str
-    joint_names: tuple[str, ...]
-    is_prismatic: tuple[bool, ...]
+    joints: tuple[Any, ...]
+    moving: tuple[Any, ...]
     bounds: Array
-    velocities: tuple[float, ...]
     points: Array
     directions: Array
     x_first: Array
     ray: Array
-    endless: tuple[str, ...]
-    joints: tuple[Any, ...]
 
     def tool_pose(self, q: Array) -> Array:
         """
@@ -91,14 +82,14 @@ class UrdfChain:
         Computed from the URDF itself, origin after origin, without DH parameters.
         """
         T = np.eye(4)
-        values = dict(zip(self.joint_names, np.asarray(q).tolist(), strict=True))
+        values = iter(np.asarray(q).tolist())
         for joint in self.joints:
             if joint.origin is not None:
                 T = T @ joint.origin
             if joint.type == 'prismatic':
-                T = T @ transformations.translation_matrix(values[joint.name] * _axis(joint))
+                T = T @ transformations.translation_matrix(next(values) * _axis(joint))
             elif joint.type != 'fixed':
-                T = T @ transformations.rotation_matrix(values[joint.name], _axis(joint))
+                T = T @ transformations.rotation_matrix(next(values), _axis(joint))
         return np.asarray(T)
 
 
@@ -110,7 +101,6 @@ def read_chain(
 
     Parameters
     ----------
-    path : str or Path
     base, tool : str, optional
         The links that it leads from and to: the root and, where there is only one, the last link.
     ray : str
@@ -118,10 +108,8 @@ def read_chain(
 
     Raises
     ------
-    ModelError
-        The file is no URDF, or there is no chain of joints that an arm may have.
-    NotInstalledError
-        What reads it is missing.
+    ModelError, NotInstalledError
+        No URDF, no chain of joints that an arm may have; what reads it is missing.
 
     """
     require('tools', *TOOLS)
@@ -144,21 +132,17 @@ def read_chain(
         )
     axes = [R[:3, :3] @ _axis(joint) for R, joint in zip(frames, moving, strict=True)]
     limits = [_limits(joint) for joint in moving]
-    speeds = [joint.limit.velocity if joint.limit else None for joint in moving]
     return UrdfChain(
         name=str(model.robot.name),
         base=base,
         tool=tool,
-        joint_names=tuple(joint.name for joint in moving),
-        is_prismatic=tuple(joint.type == 'prismatic' for joint in moving),
+        joints=tuple(joints),
+        moving=tuple(moving),
         bounds=np.array(limits).T,
-        velocities=tuple(speed if speed else math.inf for speed in speeds),
         points=np.array([T_joint[:3, 3] for T_joint in (*frames, T)]),
         directions=np.array([*axes, T[:3, :3] @ RAYS[ray]]),
         x_first=frames[0][:3, 0],
         ray=RAYS[ray],
-        endless=tuple(joint.name for joint in moving if joint.type == 'continuous'),
-        joints=tuple(joints),
     )
 
 
@@ -269,10 +253,7 @@ def _squared(T: Array) -> Array:
     """Return the origin of a joint with angles that were meant to be right angles made right."""
     angles = np.array(transformations.euler_from_matrix(T))
     right = 0.5 * np.pi * np.round(angles / (0.5 * np.pi))
-    squared = np.array(transformations.euler_matrix(*_nearer(angles, right)))
+    meant = np.where(np.abs(angles - right) < SQUARE, right, angles)
+    squared = np.array(transformations.euler_matrix(*meant))
     squared[:3, 3] = T[:3, 3]
     return squared
-
-
-def _nearer(angles: Array, right: Array) -> Array:
-    return np.where(np.abs(angles - right) < SQUARE, right, angles)

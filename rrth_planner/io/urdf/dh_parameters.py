@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Modified Denavit-Hartenberg rows of any serial chain, from the lines of its axes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError
@@ -15,32 +13,9 @@ PARALLEL = 5e-5
 MEETING = 1e-9
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class DhRows:
+def rows_of_axes(points: Array, directions: Array, x_0: Array) -> tuple[Array, Array, float]:
     """
-    A chain in Craig's convention.
-
-    Parameters
-    ----------
-    T_0 : ndarray, shape (4, 4)
-        Pose of frame 0 in the frame of the lines: at the first axis's point, its z along that
-        axis [m].
-    dh : ndarray, shape (n_axes + 1, 4)
-        As in `ArmModel`, the tool's row last.
-    ray_lead : float
-        How far the origin of the tool's row lies before the given point of the ray, on the ray
-        [m]. A row without `d` can end only where the ray is nearest to the last axis.
-
-    """
-
-    T_0: Array
-    dh: Array
-    ray_lead: float
-
-
-def rows_of_axes(points: Array, directions: Array, x_0: Array) -> DhRows:
-    """
-    Return the rows of a chain at rest.
+    Return the rows of a chain at rest, in Craig's convention; ModelError: not finite.
 
     Parameters
     ----------
@@ -51,10 +26,16 @@ def rows_of_axes(points: Array, directions: Array, x_0: Array) -> DhRows:
     x_0 : ndarray, shape (3,)
         Where the x axis of frame 0 shall point, as far as the first axis lets it.
 
-    Raises
-    ------
-    ModelError
-        Numbers that are not finite.
+    Returns
+    -------
+    T_0 : ndarray, shape (4, 4)
+        Pose of frame 0 in the frame of the lines: at the first axis's point, its z along that
+        axis [m].
+    dh : ndarray, shape (n_axes + 1, 4)
+        As in `ArmModel`, the tool's row last.
+    ray_lead : float
+        How far the origin of the tool's row lies before the given point of the ray, on the ray
+        [m]. A row without `d` can end only where the ray is nearest to the last axis.
 
     """
     p = np.array(frozen_array(points, (None, 3), 'points of the axes', 'm', ModelError))
@@ -73,8 +54,7 @@ def rows_of_axes(points: Array, directions: Array, x_0: Array) -> DhRows:
         dh[i + 1, 0] = _angle(z[i], z[i + 1], x)
         dh[i + 1, 1] = _rounded(float((far_foot - foot) @ x))
         corner = far_foot
-    lead = float((p[-1] - corner) @ z[-1])
-    return DhRows(T_0=T_0, dh=dh, ray_lead=_rounded(lead))
+    return T_0, dh, _rounded(float((p[-1] - corner) @ z[-1]))
 
 
 def _straighten(p: Array, z: Array, i: int) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.etree import ElementTree
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, link_poses
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import roll_pitch_yaw
@@ -39,20 +39,17 @@ def arm_to_urdf(
 
     Parameters
     ----------
-    arm : ArmModel
     max_velocity : ndarray, shape (dof,)
         [rad/s or m/s].
     radius : float
         Of the cylinders of bars that have no thickness of their own [m].
-    base_frame : str
-        Link that the arm is mounted on.
-    name : str
-        Of the robot.
+    base_frame, name : str
+        The link that the arm is mounted on, and the robot.
 
     Raises
     ------
     ModelError
-        A radius or velocity that is none, a name that is none, or two links or joints of one name.
+        A radius, velocity or name that is none, or two links or joints of one name.
 
     """
     if not 0.0 < radius < np.inf:
@@ -61,7 +58,8 @@ def arm_to_urdf(
     links = [base_frame, MOUNT, *(f'{joint}_link' for joint in arm.joint_names), TOOL]
     joints = [f'{MOUNT}_joint', *arm.joint_names, f'{TOOL}_joint']
     for what, names in (('links', links), ('joints', joints), ('robot', [name])):
-        _check_names(what, names)
+        if len(set(names)) != len(names) or not all(n and n.isprintable() for n in names):
+            raise ModelError(f'{what}: {names}, expected names, printable and all different')
     robot = ElementTree.Element('robot', name=name)
     robot.append(ElementTree.Comment(HEADER))
     for material, rgba in COLOURS.items():
@@ -69,6 +67,7 @@ def arm_to_urdf(
         ElementTree.SubElement(colour, 'color', rgba=_text(rgba))
     ElementTree.SubElement(robot, 'link', name=links[0])
     _add_joint(robot, joints[0], 'fixed', links[:2], arm.T_base_mount)
+    poses = link_poses(arm, np.zeros(arm.dof))
     thickness = [float(r) or radius for r in arm.radii]
     for i, link in enumerate(links[1:]):
         element = ElementTree.SubElement(robot, 'link', name=link)
@@ -82,34 +81,19 @@ def arm_to_urdf(
         kind = 'fixed'
         if i < arm.dof:
             kind = 'prismatic' if arm.is_prismatic[i] else 'revolute'
-        joint = _add_joint(robot, joints[i + 1], kind, links[i + 1 :], _row_pose(arm.dh[i]))
+        joint = _add_joint(robot, joints[i + 1], kind, links[i + 1 :], poses[i])
         if i < arm.dof:
             ElementTree.SubElement(joint, 'axis', xyz='0 0 1')
             lower, upper = arm.bounds[:, i].tolist()
-            ElementTree.SubElement(
-                joint,
-                'limit',
-                lower=repr(lower),
-                upper=repr(upper),
-                velocity=repr(float(speeds[i])),
-                effort=repr(EFFORT),
-            )
+            limit = {
+                'lower': lower,
+                'upper': upper,
+                'velocity': float(speeds[i]),
+                'effort': EFFORT,
+            }
+            ElementTree.SubElement(joint, 'limit', {key: repr(x) for key, x in limit.items()})
     ElementTree.indent(robot)
     return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'
-
-
-def _row_pose(row: Array) -> Array:
-    """Return the pose of a row's frame at joint position 0 in the one before (Craig, eq. 3.6)."""
-    alpha, a, offset, d = row.tolist()
-    ca, sa, co, so = np.cos(alpha), np.sin(alpha), np.cos(offset), np.sin(offset)
-    return np.array(
-        [
-            [co, -so, 0.0, a],
-            [so * ca, co * ca, -sa, -sa * d],
-            [so * sa, co * sa, ca, ca * d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
 
 
 def _along_z(arm: ArmModel, i: int) -> tuple[float, float]:
@@ -131,23 +115,18 @@ def _add_joint(
 
 
 def _add_bar(
-    link: ElementTree.Element,
-    ends: tuple[float, float],
-    axis: int,
-    radius: float,
-    material: str,
+    link: ElementTree.Element, ends: tuple[float, float], axis: int, radius: float, material: str
 ) -> None:
     """Add a cylinder between two places on an axis of a link; cylinders lie along z."""
-    if ends[1] - ends[0] < SHORTEST:
+    length = ends[1] - ends[0]
+    if length < SHORTEST:
         return
     visual = ElementTree.SubElement(link, 'visual')
     middle = np.zeros(3)
     middle[axis] = 0.5 * (ends[0] + ends[1])
     _add_origin(visual, middle, [0.0, 0.5 * np.pi if axis == 0 else 0.0, 0.0])
     geometry = ElementTree.SubElement(visual, 'geometry')
-    ElementTree.SubElement(
-        geometry, 'cylinder', radius=_text([radius]), length=_text([ends[1] - ends[0]])
-    )
+    ElementTree.SubElement(geometry, 'cylinder', radius=_text([radius]), length=_text([length]))
     ElementTree.SubElement(visual, 'material', name=material)
 
 
@@ -160,8 +139,3 @@ def _add_origin(
 def _text(numbers: Sequence[float] | Array) -> str:
     # Adding 0 turns -0 into 0.
     return ' '.join(f'{round(float(x), DIGITS) + 0.0!r}'.removesuffix('.0') for x in numbers)
-
-
-def _check_names(what: str, names: Sequence[str]) -> None:
-    if len(set(names)) != len(names) or not all(name and name.isprintable() for name in names):
-        raise ModelError(f'{what}: {list(names)}, expected names, printable and all different')

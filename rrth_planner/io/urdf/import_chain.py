@@ -1,19 +1,21 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The arm that a chain of a URDF is."""
+"""The arm that a chain of a URDF is, its bars thick enough to enclose the links."""
 
 from dataclasses import dataclass, replace
+import math
 
 import numpy as np
 from rrth_planner.io.urdf.chain import UrdfChain
 from rrth_planner.io.urdf.dh_parameters import rows_of_axes
-from rrth_planner.io.urdf.link_radii import cover_radii
-from rrth_planner.model.arm import ArmModel, tool_pose
+from rrth_planner.model.arm import ArmModel, forward_kinematics, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 
 # Configurations at which an arm is compared with its URDF.
 N_COMPARED = 50
+# Number of sampled points of a link; radii are rounded up to this [m].
+POINTS, STEP = 1025, 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -23,15 +25,13 @@ class ImportedArm:
 
     Parameters
     ----------
-    arm : ArmModel
-    chain : UrdfChain
     T_base_link : ndarray, shape (4, 4)
         Pose of the chain's first link in the wearer's base frame [m].
     ray_lead : float
         How far the arm's ray begins before the tool's origin, on the same line [m]; negative: so
         far beyond it, and the radii make up for that.
     radius : float
-        Of the links [m]; the arm's radii are greater where its bars do not follow the links.
+        Of the links, >= 0 [m]; the arm's radii are greater where its bars do not follow the links.
 
     """
 
@@ -64,39 +64,97 @@ class ImportedArm:
 
 
 def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> ImportedArm:
-    """
-    Return the arm of a chain.
-
-    Parameters
-    ----------
-    chain : UrdfChain
-    T_base_link : ndarray, shape (4, 4)
-        Where the wearer wears its first link: pose in the base frame [m].
-    radius : float
-        Of the links, >= 0 [m].
-
-    Raises
-    ------
-    ModelError
-        A radius or a pose that is none.
-
-    """
+    """Return the arm of a chain, as in `ImportedArm`; ModelError: a radius or pose is none."""
     if not 0.0 <= radius < np.inf:
         raise ModelError(f'radius: {radius}, expected a length >= 0 [m]')
-    rows = rows_of_axes(chain.points, chain.directions, chain.x_first)
+    T_0, dh, ray_lead = rows_of_axes(chain.points, chain.directions, chain.x_first)
     arm = ArmModel(
-        joint_names=chain.joint_names,
-        is_prismatic=chain.is_prismatic,
-        dh=rows.dh,
+        joint_names=tuple(joint.name for joint in chain.moving),
+        is_prismatic=tuple(joint.type == 'prismatic' for joint in chain.moving),
+        dh=dh,
         bounds=chain.bounds,
-        radii=np.full(len(rows.dh), radius),
-        T_base_mount=T_base_link @ rows.T_0,
+        radii=np.full(len(dh), radius),
+        T_base_mount=T_base_link @ T_0,
     )
     points = chain.points @ T_base_link[:3, :3].T + T_base_link[:3, 3]
     return ImportedArm(
-        arm=replace(arm, radii=cover_radii(arm, points, radius)),
+        arm=replace(arm, radii=_cover_radii(arm, points, radius)),
         chain=chain,
         T_base_link=T_base_link,
-        ray_lead=rows.ray_lead,
+        ray_lead=ray_lead,
         radius=radius,
     )
+
+
+def _cover_radii(arm: ArmModel, points: Array, radius: float) -> Array:
+    """
+    Return the radii with which the bars enclose the links.
+
+    Bars follow common normals and axes; a link need not. It is taken as a bar of some radius from
+    each joint straight to the next, and on to where the ray begins.
+
+    Parameters
+    ----------
+    points : ndarray, shape (dof + 1, 3)
+        Where the joints are with all positions at 0, and the beginning of the ray, in the frame
+        that `T_base_mount` leads to [m].
+
+    Returns
+    -------
+    ndarray, shape (dof + 1,)
+        A radius for the bars of each row, the link's own where they lie on it [m].
+
+    """
+    T = forward_kinematics(arm, np.zeros(arm.dof))
+    extra = np.zeros(arm.dof + 1)
+    _, a, _, d = arm.dh.T
+    has_bar = (a != 0.0) | (d != 0.0) | np.array([*arm.is_prismatic, False])
+    for i in range(arm.dof):
+        begin, end = (points[i : i + 2] - T[i, :3, 3]) @ T[i, :3, :3]
+        share = np.linspace(0.0, 1.0, POINTS)[:, None]
+        link = begin + share * (end - begin)
+        distances = [_distances(link, *bar) for bar in _bars(arm, i, end)]
+        farthest = float(np.min(distances, axis=0).max())
+        if farthest < 1e-9:
+            continue
+        # No point of the link is farther from a sample than half their spacing.
+        farthest += 0.5 * float(np.linalg.norm(end - begin)) / (POINTS - 1)
+        rows = {i, i + 1}
+        # Where neither row has a bar, the last one before ends there.
+        rows.update(np.flatnonzero(has_bar[: i + 1])[-1:].tolist())
+        for row in rows:
+            extra[row] = max(extra[row], STEP * math.ceil(farthest / STEP))
+    return np.asarray(np.round(radius + extra, 6))
+
+
+def _bars(arm: ArmModel, i: int, tip: Array) -> list[tuple[Array, Array]]:
+    """Return the bars next to link i as they are shortest, in its frame."""
+    alpha, a, _, _ = arm.dh[i + 1]
+    zero, corner = np.zeros(3), np.array([a, 0.0, 0.0])
+    outwards = np.array([0.0, -math.sin(alpha), math.cos(alpha)])
+    behind = _shortest(arm, i)
+    if i + 1 < arm.dof:
+        ahead = _shortest(arm, i + 1)
+    else:
+        # As much of the ray as there is of the tool.
+        ahead = max(0.0, float((tip - corner) @ outwards))
+    return [
+        (np.array([0.0, 0.0, -behind]), zero),
+        (zero, corner),
+        (corner, corner + ahead * outwards),
+    ]
+
+
+def _shortest(arm: ArmModel, row: int) -> float:
+    """Return the `d` of a row when its bar is shortest: longer ones contain it."""
+    d = float(arm.dh[row, 3])
+    if not arm.is_prismatic[row]:
+        return d
+    return d + float(np.clip(-d, *arm.bounds[:, row]))
+
+
+def _distances(points: Array, begin: Array, end: Array) -> Array:
+    """Return the distances of points, (n, 3), from the line between two others, (n,) [m]."""
+    along = end - begin
+    share = np.clip((points - begin) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(points - begin - share[:, None] * along, axis=1))

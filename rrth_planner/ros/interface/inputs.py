@@ -14,8 +14,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.start_state import StartState
-from rrth_planner.model.trajectory import REST_SPEED
+from rrth_planner.model.trajectory import REST_SPEED, StartState
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import time
 
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LEAD
-from rrth_planner.model.start_state import StartState
+from rrth_planner.model.trajectory import StartState
 
 # How far ahead a handover is planned for; the second value, where the first was too short [s].
 LEADS = (0.05, LONGEST_LEAD)

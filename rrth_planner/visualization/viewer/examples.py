@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml
-from rrth_planner.io.wearer_file import load_wearer
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
@@ -18,7 +18,7 @@ TARGETS = ('front', 'left', 'high', 'behind', 'low')
 
 def example_body(name: str) -> Scene:
     """Return the wearer of `msg_examples/NAME.yaml`."""
-    return load_wearer(resource_path(f'msg_examples/{name}.yaml'))
+    return load_body(resource_path(f'msg_examples/{name}.yaml'))
 
 
 def example_target(name: str) -> Array:
