@@ -4,12 +4,12 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 from rrth_planner import __version__
+from rrth_planner.cli import ros_parsers
 from rrth_planner.cli.program import program, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
@@ -24,8 +24,7 @@ the namespace. All parameters, with units, ranges and defaults, are in
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(NamedTuple):
     """
     A command and its requirements.
 
@@ -34,24 +33,21 @@ class Command:
     summary : str
         What it does, for the list of all.
     module : str
-        Of the package, with its `main`.
-    parser : str
-        Module with its `parser`, where `module` itself needs ROS to be loaded.
-    settings : str
-        The parameters of a node, which has no arguments of its own.
+        Of the package, with its `main`. Where it needs ROS, its parser is in `cli.ros_parsers`.
     needs : tuple of str
-        Libraries that it requires.
+        Libraries that it requires, if its module does not find out by itself.
     extras : str
         Extras of the package that install these.
+    settings : str
+        The parameters of a node, which has no arguments of its own.
 
     """
 
     summary: str
     module: str
-    parser: str = ''
-    settings: str = ''
     needs: tuple[str, ...] = ()
     extras: str = ''
+    settings: str = ''
 
 
 COMMANDS = {
@@ -63,39 +59,32 @@ COMMANDS = {
     'replay': Command('replay an incident', 'cli.replay'),
     'reproduce': Command("regenerate the paper's comparison", 'cli.reproduce'),
     'planner_node': Command(
-        'run the planner as a ROS node',
-        'ros.planner_node',
-        settings='config/planner.yaml',
-        needs=(ROS,),
-        extras='ros',
+        'run the planner as a ROS node', 'ros.planner_node', (ROS,), 'ros', 'config/planner.yaml'
     ),
     'playback_node': Command(
         'run a kinematic arm as a ROS node',
         'ros.playback_node',
-        settings='config/playback.yaml',
-        needs=(ROS,),
-        extras='ros',
+        (ROS,),
+        'ros',
+        'config/playback.yaml',
     ),
     'point_at': Command(
         'point the arm and wait until it has arrived',
         'cli.point_at',
-        parser='cli.point_at_options',
-        needs=(ROS, 'tqdm'),
-        extras='ros,tools',
+        (ROS, 'tqdm'),
+        'ros,tools',
     ),
     'record': Command(
         'record a run of the nodes in an MCAP file',
         'cli.record',
-        parser='cli.record_options',
-        needs=(ROS, 'mcap', 'tqdm'),
-        extras='ros,tools',
+        (ROS, 'mcap', 'tqdm'),
+        'ros,tools',
     ),
     'demo': Command(
         'run both nodes with a moving wearer; check and draw the motions',
         'cli.demo',
-        parser='cli.demo_options',
-        needs=(ROS, 'matplotlib'),
-        extras='ros',
+        (ROS, 'matplotlib'),
+        'ros',
     ),
 }
 
@@ -109,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name, rest = given[0], given[1:]
     command = COMMANDS[name]
     own = rest[: rest.index('--ros-args')] if '--ros-args' in rest else rest
-    if not set(own).isdisjoint(HELP) and (command.parser or command.settings):
+    if ROS in command.needs and not set(own).isdisjoint(HELP):
         _parser_of(name).print_help()
         return 0
     try:
@@ -117,20 +106,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NotInstalledError as problem:
         say(name, str(problem))
         return WRONG
-    return int(_load(command.module).main(rest))
-
-
-def _load(module: str) -> Any:
-    return import_module(f'rrth_planner.{module}')
+    module: Any = import_module(f'rrth_planner.{command.module}')
+    return int(module.main(rest))
 
 
 def _parser_of(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command that needs ROS, without loading ROS."""
     command = COMMANDS[name]
-    if command.parser:
-        found = _load(command.parser).parser()
-        assert isinstance(found, argparse.ArgumentParser)
-        return found
+    if not command.settings:
+        parser: argparse.ArgumentParser = getattr(ros_parsers, name)()
+        return parser
     return argparse.ArgumentParser(
         prog=program(name),
         usage='%(prog)s [--ros-args ...]',

@@ -3,7 +3,6 @@
 """The node of the demo: a client of planner and playback."""
 
 from collections.abc import Callable
-import time
 
 import numpy as np
 from rrth_planner.model.arm import ArmModel
@@ -30,7 +29,6 @@ class DemoClient(PlannerClient):
 
     Parameters
     ----------
-    arm : ArmModel
     timeout : float
         Longest wait for anything [s].
     check : callable
@@ -41,17 +39,13 @@ class DemoClient(PlannerClient):
     def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__('rrth_demo', timeout, check)
-        self._joints_of_arm = arm.joint_names
+        self.arm = arm
 
     def wait_for_nodes(self) -> None:
         """Wait for the planner, for joint states, and for a subscriber of the motions."""
-        self.wait_for_state(self._joints_of_arm)
+        self.wait_for_state(self.arm.joint_names)
         self.wait_for_planner()
         self.wait_for(lambda: self.count_arms() > 0, 'a subscriber of joint_trajectory')
-
-    def present(self) -> Array:
-        """Return the latest joint positions, (dof,) [rad]."""
-        return self.positions(self._joints_of_arm)
 
     def ask_for_motion(self) -> tuple[Trajectory, float]:
         """Return the motion that the planner publishes, and its planning time [ms]."""
@@ -63,14 +57,14 @@ class DemoClient(PlannerClient):
         figures = answer_from_text(response.message).figures
         if 'planning_time_ms' not in figures:
             raise DemoError(f'no planning time in the answer "{response.message}"')
-        trajectory = joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm)
+        trajectory = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
         return trajectory, figures['planning_time_ms']
 
     def wait_for_arrival(self, trajectory: Trajectory) -> None:
         """Wait until the arm stands still at the end of a motion."""
         q_end = trajectory.positions[-1]
         self.wait_for(
-            lambda: self.is_still_at(q_end, self._joints_of_arm, ARRIVED, STILL),
+            lambda: self.is_still_at(q_end, ARRIVED, STILL),
             f'the arm at the end of its motion of {trajectory.duration:.2f} s',
             trajectory.duration + self.timeout,
         )
@@ -83,11 +77,9 @@ class DemoClient(PlannerClient):
         new motion, and has arrived at its end.
         """
         self.wait_for(
-            lambda: np.abs(self.present() - q_start).max() > ARRIVED, 'the arm in motion'
+            lambda: np.abs(self.positions() - q_start).max() > ARRIVED, 'the arm in motion'
         )
-        end = time.monotonic() + after
-        while time.monotonic() < end:
-            self.take_messages(0.005)
+        self.receive_for(after)
         n = len(self.commanded)
         self.observed = []
         self.publish_body(body)
@@ -98,5 +90,5 @@ class DemoClient(PlannerClient):
             ),
             'a stop and a new motion',
         )
-        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self._joints_of_arm))
-        return np.array([configuration_from_msg(m, self._joints_of_arm) for m in self.observed])
+        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self.joint_names))
+        return np.array([configuration_from_msg(m, self.joint_names) for m in self.observed])

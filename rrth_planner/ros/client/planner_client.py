@@ -35,13 +35,10 @@ class NotInTimeError(RrthError):
 
 class PlannerClient(Node):
     """
-    The common part of the clients of a planner.
-
-    Messages are received only while it waits for something.
+    The common part of the clients of a planner; it receives messages only while it waits.
 
     Parameters
     ----------
-    name : str
     timeout : float
         Longest wait for anything [s].
     check : callable
@@ -55,8 +52,8 @@ class PlannerClient(Node):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__(name)
         self.timeout, self._check = timeout, check
-        # The joints required in a message; empty: any.
-        self._joint_names: tuple[str, ...] = ()
+        # Of the arm: other joint states are ignored.
+        self.joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
         # The commanded motions and the joint states since `clear_history` was called.
         self.commanded: list[JointTrajectory] = []
@@ -64,7 +61,9 @@ class PlannerClient(Node):
         self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
         self._target = self.create_publisher(PointStamped, 'target', LATCHED)
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
-        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_motion, LATCHED)
+        self.create_subscription(
+            JointTrajectory, 'joint_trajectory', lambda msg: self.commanded.append(msg), LATCHED
+        )
         self._plan = self.create_client(Trigger, 'rrth_planner/plan')
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
@@ -90,35 +89,39 @@ class PlannerClient(Node):
             raise
         self._check()
 
+    def receive_for(self, span: float) -> None:
+        """Receive messages for a time [s]."""
+        end = time.monotonic() + span
+        while time.monotonic() < end:
+            self.take_messages(0.005)
+
     def wait_for_planner(self) -> None:
         """Wait for the service of the planner."""
         service = self.resolve_service_name('rrth_planner/plan')
         self.wait_for(self._plan.service_is_ready, f'service {service}')
 
-    def wait_for_state(self, joint_names: Sequence[str] = ()) -> None:
-        """Wait for a joint state that has all of these joints."""
-        self._joint_names, self.state = tuple(joint_names), None
-        joints = f' of {", ".join(joint_names)}' if joint_names else ''
-        self.wait_for(lambda: self.state is not None, f'{self._joints.topic_name}{joints}')
+    def wait_for_state(self, joint_names: Sequence[str]) -> None:
+        """Wait for a joint state of the arm that has these joints."""
+        self.joint_names, self.state = tuple(joint_names), None
+        what = f'{self._joints.topic_name} of {", ".join(joint_names)}'
+        self.wait_for(lambda: self.state is not None, what)
 
-    def positions(self, joint_names: Sequence[str]) -> Array:
-        """Return the latest positions of these joints, (dof,) [rad]."""
+    def positions(self) -> Array:
+        """Return the latest positions of the arm, (dof,) [rad]."""
         if self.state is None:
             raise NotInTimeError('joint_states: none yet')
-        return configuration_from_msg(self.state, joint_names)
+        return configuration_from_msg(self.state, self.joint_names)
 
-    def is_still_at(
-        self, q: Array, joint_names: Sequence[str], tolerance: float, speed: float
-    ) -> bool:
+    def is_still_at(self, q: Array, tolerance: float, speed: float) -> bool:
         """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
-        if np.abs(self.positions(joint_names) - q).max() > tolerance:
+        if np.abs(self.positions() - q).max() > tolerance:
             return False
         assert self.state is not None
         names = list(self.state.name)
         if len(self.state.velocity) != len(names):
             # Not every driver has velocities.
             return True
-        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in joint_names)
+        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in self.joint_names)
 
     def publish_body(self, body: MarkerArray) -> None:
         """Publish the wearer's body; return once the planner has it."""
@@ -133,7 +136,7 @@ class PlannerClient(Node):
         end = time.monotonic() + patience
         answer = self._call()
         while answer.message.startswith(NO_INPUT_YET) and time.monotonic() < end:
-            self._pause()
+            self.receive_for(PAUSE)
             answer = self._call()
         return answer
 
@@ -159,37 +162,21 @@ class PlannerClient(Node):
         self.wait_for(future.done, 'an answer of rrth_planner/plan')
         return future.result()
 
-    def _pause(self) -> None:
-        """Receive messages for a while."""
-        end = time.monotonic() + PAUSE
-        while time.monotonic() < end:
-            self.take_messages()
-
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
-            configuration_from_msg(msg, self._joint_names)
+            configuration_from_msg(msg, self.joint_names)
         except MessageError:
             # Of other joints, or invalid: the last state counts.
             return
         self.state = msg
         self.observed.append(msg)
 
-    def _on_motion(self, msg: JointTrajectory) -> None:
-        self.commanded.append(msg)
-
 
 def is_matched(node: Node, publisher: Publisher) -> bool:
     """
-    Return whether all subscribers are connected, a reliable one among them.
+    Return whether all subscribers of a node's publisher are connected, a reliable one among them.
 
     Before that, `wait_for_all_acked` may return too early.
-
-    Parameters
-    ----------
-    node : Node
-        Of the publisher.
-    publisher : Publisher
-
     """
     infos = node.get_subscriptions_info_by_topic(publisher.topic)
     is_reliable = any(info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos)

@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the messages of topics to an MCAP file, byte for byte."""
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-import time
 from types import TracebackType
 from typing import Any
 
 from mcap.writer import Writer
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.model.errors import RrthError
+from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.ros.messages.definitions import definition_of, type_name, type_of_name
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 
@@ -20,10 +19,6 @@ from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscript
 CHUNK = 128 * 1024
 # How often topics of unknown type are searched for [s].
 PERIOD = 0.2
-
-
-class RecordingError(RrthError):
-    """A recording that cannot be written or read."""
 
 
 class RecordingFile:
@@ -42,7 +37,7 @@ class RecordingFile:
 
     Raises
     ------
-    RecordingError
+    RecordError
         The file exists, or cannot be made; later, it cannot be written.
 
     """
@@ -53,13 +48,12 @@ class RecordingFile:
         self.counts: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        try:
-            # Closed when the block is left.
-            self._file = path.open('xb')
-        except FileExistsError:
-            raise RecordingError(f'{path}: exists already, expected a new file') from None
-        except OSError as problem:
-            raise self._failure(problem) from problem
+        with self._writing():
+            try:
+                # Closed when the block is left.
+                self._file = path.open('xb')
+            except FileExistsError:
+                raise RecordError(f'{path}: exists already, expected a new file') from None
         self._writer = Writer(self._file, chunk_size=CHUNK)
         self._writer.start(profile='ros2', library='rrth_planner')
 
@@ -75,11 +69,12 @@ class RecordingFile:
     ) -> None:
         """Finish the file; one without any message is removed."""
         try:
-            self._writer.finish()
-            self._file.close()
-        except OSError as failure:
+            with self._writing():
+                self._writer.finish()
+                self._file.close()
+        except RecordError:
             if problem is None:
-                raise self._failure(failure) from failure
+                raise
         finally:
             with suppress(OSError):
                 self._file.close()
@@ -89,29 +84,30 @@ class RecordingFile:
     def add_topic(self, topic: str, msg_type: Any) -> None:
         """Write the schema of a topic's messages."""
         name = type_name(msg_type)
-        try:
+        with self._writing():
             if name not in self._schemas:
                 text = definition_of(msg_type).encode()
                 self._schemas[name] = self._writer.register_schema(name, 'ros2msg', text)
-            self._channels[topic] = self._writer.register_channel(
-                topic, 'cdr', self._schemas[name]
-            )
-        except OSError as problem:
-            raise self._failure(problem) from problem
+            schema = self._schemas[name]
+            self._channels[topic] = self._writer.register_channel(topic, 'cdr', schema)
         self.counts[topic] = 0
 
     def add(self, topic: str, data: bytes, sent: int, received: int) -> None:
         """Write the bytes of a message, with the times of sending and reception [ns]."""
-        try:
+        with self._writing():
             self._writer.add_message(
                 self._channels[topic], log_time=received, data=data, publish_time=sent
             )
-        except OSError as problem:
-            raise self._failure(problem) from problem
         self.counts[topic] += 1
 
-    def _failure(self, problem: OSError) -> RecordingError:
-        return RecordingError(f'{self._path}: {problem.strerror}, expected to write there')
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as problem:
+            raise RecordError(
+                f'{self._path}: {problem.strerror}, expected to write there'
+            ) from problem
 
 
 class RawSubscription(OpenSubscription):
@@ -146,16 +142,12 @@ class Recorder(Node):
         self._file = file
         # Why the recording must end; raised by `check`, outside of callbacks.
         self._problem: RrthError | None = None
-        self._topics: list[OpenSubscription] = []
-        self._missing: list[str] = []
+        self._missing = [topic for topic in topics if topic not in known]
         for topic in topics:
             if topic in known:
                 self._add_topic(topic, known[topic])
-            else:
-                self._missing.append(topic)
-        self._timer = self.create_timer(
-            PERIOD, self._find_missing, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(PERIOD, self._find_missing, clock=steady)
 
     def check(self) -> None:
         """Raise what ends the recording."""
@@ -176,7 +168,7 @@ class Recorder(Node):
                     self._problem = problem
 
         # Late latched messages are part of the recording, too.
-        self._topics.append(RawSubscription(self, msg_type, topic, write, on_late=write))
+        RawSubscription(self, msg_type, topic, write, on_late=write)
 
     def _find_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}
@@ -189,8 +181,3 @@ class Recorder(Node):
                 self._add_topic(topic, type_of_name(types[0]))
             except RrthError as problem:
                 self._problem = problem
-
-
-def since(begin: float) -> float:
-    """Return the time since a reading of the monotonic clock [s]."""
-    return time.monotonic() - begin

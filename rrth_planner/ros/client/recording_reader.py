@@ -49,7 +49,6 @@ class RecordingReader:
 
     Parameters
     ----------
-    path : Path
     arm : ArmModel
         The arm of the run.
     base_frame : str
@@ -77,9 +76,7 @@ class RecordingReader:
         topics, self._begin, self.rejected = _read(path)
         self._topics = {role: self._topic(topics, role, namespace) for role in TYPES}
         self._messages = {
-            role: []
-            if topic is None
-            else sorted(topics[topic], key=lambda recorded: recorded.received)
+            role: sorted(topics.get(topic or '', ()), key=lambda recorded: recorded.received)
             for role, topic in self._topics.items()
         }
 
@@ -107,7 +104,12 @@ class RecordingReader:
             velocities=velocities,
             commanded=tuple(sorted(self._commanded(), key=lambda motion: motion.begin)),
             bodies=tuple(self._bodies()),
-            targets=tuple(self._good('target', lambda h: (self._when(h), self._target_of(h.msg)))),
+            targets=tuple(
+                self._good(
+                    'target',
+                    lambda h: (self._when(h), goal_from_msg(h.msg, self._base_frame).target),
+                )
+            ),
             monitor_states=tuple(self._monitor_states()),
         )
 
@@ -144,18 +146,15 @@ class RecordingReader:
 
     def _readings(self) -> list[JointReading]:
         before: JointReading | None = None
+        names = self._arm.joint_names
 
         def read(recorded: RecordedMessage) -> JointReading:
             nonlocal before
-            names = self._arm.joint_names
             before = joint_reading(recorded.msg, names, recorded.received / NANOSECONDS, before)
             return before
 
-        names = self._arm.joint_names
         self._messages['joint_states'] = [
-            recorded
-            for recorded in self._messages['joint_states']
-            if has_joint_of(recorded.msg, names)
+            h for h in self._messages['joint_states'] if has_joint_of(h.msg, names)
         ]
         return self._good('joint_states', read)
 
@@ -169,9 +168,6 @@ class RecordingReader:
             )
 
         return self._good('joint_trajectory', read)
-
-    def _target_of(self, msg: Any) -> Any:
-        return goal_from_msg(msg, self._base_frame).target
 
     def _bodies(self) -> list[tuple[float, Scene]]:
         order, body = MarkerOrder(), WearerBody()
