@@ -2,17 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question that files and arguments ask a planner, and its answer."""
 
-from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 from rrth_planner.cli.program import say
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.pipeline.request import PlanQuestion
@@ -35,8 +34,8 @@ def new_seed(seed: int) -> int:
 def question_of(
     arm: ArmModel,
     scene: Scene,
-    q_start: ArrayLike,
-    target: Sequence[float],
+    q_start: Array,
+    target: Array,
     settings: PlanSettings,
     seed: int,
 ) -> PlanQuestion:
@@ -45,10 +44,10 @@ def question_of(
 
     Parameters
     ----------
-    q_start : array_like, shape (dof,)
+    q_start : ndarray, shape (dof,)
         [rad].
-    target : sequence of float
-        (3,) in the base frame [m].
+    target : ndarray, shape (3,)
+        In the base frame [m].
 
     """
     return PlanQuestion(

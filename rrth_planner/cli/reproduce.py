@@ -94,8 +94,11 @@ def _extent(options: argparse.Namespace) -> 'Extent':
             arm=min(extent.arm, options.seeds),
             arm_modes=min(extent.arm_modes, options.seeds),
         )
-    chosen = {name: getattr(options, name) for name in ('maps', 'targets')}
-    return replace(extent, **{name: tuple(given) for name, given in chosen.items() if given})
+    return replace(
+        extent,
+        maps=tuple(options.maps or extent.maps),
+        targets=tuple(options.targets or extent.targets),
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

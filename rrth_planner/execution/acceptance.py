@@ -79,7 +79,6 @@ def accept(
         The new motion.
     arm : ArmModel
         Its bounds hold along the whole curve, not only at the points.
-    rules : PlaybackRules
     start_time, time : float
         When the new motion begins, and now [s].
 

@@ -40,7 +40,6 @@ class ExecutingMotion:
 
     Parameters
     ----------
-    trajectory : Trajectory
     start_time : float
         [s].
     target_distance : float

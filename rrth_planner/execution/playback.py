@@ -41,30 +41,13 @@ class Playback:
         """When the motion has ended [s]."""
         return self.start_time + self.trajectory.duration / self.time_scale
 
-    def states_at(self, times: ArrayLike) -> tuple[Array, Array, Array]:
-        """
-        Return the states of the arm at some times, shape (m,) [s].
-
-        Returns
-        -------
-        tuple of ndarray, each of shape (m, dof)
-            Positions [rad], velocities [rad/s], accelerations [rad/s^2].
-
-        """
-        t = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        rate = self.time_scale
-        q, v, a = sample(self.trajectory, rate * (t - self.start_time))
-        states = q, v * rate, a * rate**2
-        is_early = t < self.start_time
-        if self.before is not None and is_early.any():
-            for values, earlier in zip(states, self.before.states_at(t[is_early]), strict=True):
-                values[is_early] = earlier
-        return states
-
     def state_at(self, time: float) -> tuple[Array, Array, Array]:
-        """Return positions, velocities, accelerations at one time, each of shape (dof,)."""
-        q, v, a = self.states_at([time])
-        return q[0], v[0], a[0]
+        """Return positions, velocities, accelerations [rad, rad/s, rad/s^2], each (dof,)."""
+        if self.before is not None and time < self.start_time:
+            return self.before.state_at(time)
+        rate = self.time_scale
+        q, v, a = sample(self.trajectory, [rate * (time - self.start_time)])
+        return q[0], v[0] * rate, a[0] * rate**2
 
 
 def standing(q: ArrayLike) -> Playback:
@@ -93,7 +76,6 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
 
     Parameters
     ----------
-    playback : Playback
     limits : MotionLimits
         Of the arm, by the clock.
     time : float

@@ -5,7 +5,7 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rrth_planner.collision.world import arm_world, World
@@ -21,18 +21,8 @@ STOPPING = 'stopping'
 DIAGNOSTICS_DELAY = 0.3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CommandedMotion:
-    """
-    A commanded motion.
-
-    Parameters
-    ----------
-    begin : float
-        When it begins [s].
-    trajectory : Trajectory
-
-    """
+class CommandedMotion(NamedTuple):
+    """A commanded motion, and when it begins [s]."""
 
     begin: float
     trajectory: Trajectory

@@ -8,7 +8,14 @@ import numpy as np
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import leads_out
-from rrth_planner.collision.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
+from rrth_planner.collision.world import (
+    arm_rows,
+    arm_world,
+    mount_inverse,
+    RESOLUTION,
+    SLACK,
+    World,
+)
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arm import ArmModel
@@ -84,94 +91,27 @@ def is_remaining_free(
     """
     Return whether the remaining motion is proven free of the present wearer.
 
+    At its end with the pointing ray to the target.
+
     Parameters
     ----------
-    running : ExecutingMotion
     phase : float
         Time within the motion that the arm is at [s].
-    arm : ArmModel
     scene : Scene
         The wearer in the base frame.
     margin, ray_guard_length : float
         [m].
 
     """
-    trajectory = running.trajectory
-    checked = phase
+    trajectory, begin = running.trajectory, phase
     if phase < running.escape_time:
         world = arm_world(arm, scene, margin, ray_guard_length)
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
-        checked = running.escape_time
-    return _is_certified(running, checked, arm, scene, margin, ray_guard_length)
-
-
-def escapes_by_continuing(
-    running: ExecutingMotion,
-    phase: float,
-    arm: ArmModel,
-    scene: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
-) -> bool:
-    """
-    Return whether the arm violates the margin now, and is proven to escape by continuing.
-
-    Then no clearance decreases below its present value or below the margin, and the motion ends
-    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
-    violation lies ahead this is False: a stop, along the same path, is never nearer to it.
-
-    Parameters
-    ----------
-    running, phase, arm, scene, margin, ray_guard_length
-        As for `is_remaining_free`.
-
-    """
-    trajectory = running.trajectory
-    here = positions_at(trajectory, [phase])[0]
-    # Most often it is, and a stop waits for the answer.
-    if is_place_free(here, arm, scene, margin, ray_guard_length):
-        return False
-    world = arm_world(arm, scene, margin, ray_guard_length)
-    return world.is_valid(
-        trajectory.positions[-1], max(ray_guard_length, running.target_distance)
-    ) and leads_out(trajectory, world, trajectory.duration, phase)
-
-
-def is_place_free(
-    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
-) -> bool:
-    """
-    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
-
-    With the margin, and with the pointing ray up to `ray_guard_length` [m].
-    """
-    _, chain = arm_rows(arm, ray_guard_length)
-    boxes, T_arm_base = scene.numbers, mount_inverse(arm)
-    depth = tree_depth(len(scene.boxes))
-    return bool(
-        trajectory_check.is_place_free(
-            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
-        )
-    )
-
-
-def _is_certified(
-    running: ExecutingMotion,
-    begin: float,
-    arm: ArmModel,
-    scene: Scene,
-    margin: float,
-    ray_guard_length: float,
-) -> bool:
-    """Return `certify` of the remaining motion, and of its end with the ray to the target."""
-    trajectory = running.trajectory
+        begin = running.escape_time
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        return world.is_valid(
-            trajectory.positions[0], max(ray_guard_length, running.target_distance)
-        )
+        return _is_end_free(running, world, ray_guard_length)
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_remaining_motion_free(
@@ -192,3 +132,53 @@ def _is_certified(
             BERNSTEIN_3,
         )
     )
+
+
+def escapes_by_continuing(
+    running: ExecutingMotion,
+    phase: float,
+    arm: ArmModel,
+    scene: Scene,
+    *,
+    margin: float,
+    ray_guard_length: float,
+) -> bool:
+    """
+    Return whether the arm violates the margin now, and is proven to escape by continuing.
+
+    Then no clearance decreases below its present value or below the margin, and the motion ends
+    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
+    violation lies ahead this is False: a stop, along the same path, is never nearer to it. The
+    parameters are those of `is_remaining_free`.
+    """
+    trajectory = running.trajectory
+    here = positions_at(trajectory, [phase])[0]
+    # Most often it is, and a stop waits for the answer.
+    if is_place_free(here, arm, scene, margin, ray_guard_length):
+        return False
+    world = arm_world(arm, scene, margin, ray_guard_length)
+    is_end_free = _is_end_free(running, world, ray_guard_length)
+    return is_end_free and leads_out(trajectory, world, trajectory.duration, phase)
+
+
+def is_place_free(
+    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
+) -> bool:
+    """
+    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
+
+    With the margin, and with the pointing ray up to `ray_guard_length` [m].
+    """
+    _, chain = arm_rows(arm, ray_guard_length)
+    boxes, T_arm_base = scene.numbers, mount_inverse(arm)
+    depth = tree_depth(len(scene.boxes))
+    return bool(
+        trajectory_check.is_place_free(
+            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
+        )
+    )
+
+
+def _is_end_free(running: ExecutingMotion, world: World, ray_guard_length: float) -> bool:
+    reach = max(ray_guard_length, running.target_distance)
+    return world.is_valid(running.trajectory.positions[-1], reach)
