@@ -3,12 +3,13 @@
 """The question that files and arguments ask a planner, and its answer."""
 
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.cli.program import say
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.settings import PlanSettings
+from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -29,6 +30,12 @@ def folded() -> list[float]:
 def new_seed(seed: int) -> int:
     """Return a seed, a new one for -1."""
     return int(np.random.default_rng().integers(2**31)) if seed == -1 else seed
+
+
+def settings_of(arm: ArmModel, file: Path | None, **changes: float | None) -> PlanSettings:
+    """Return the settings of a file, or those of the package, with the changes that are given."""
+    given = {name: value for name, value in changes.items() if value is not None}
+    return load_settings(arm.dof, file, **given)
 
 
 def question_of(

@@ -10,14 +10,21 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of
-from rrth_planner.cli.program import add_files, add_start, add_target, command_parser, run, say
+from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
+from rrth_planner.cli.program import (
+    add_files,
+    add_start,
+    add_target,
+    command_parser,
+    joint_values,
+    run,
+    say,
+)
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
-from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.model.arm import ArmModel, tool_pose
-from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.status import PlanStatus
 
@@ -66,7 +73,9 @@ def _plan(options: argparse.Namespace) -> int:
             '--period: given without --output, expected a file to write the points to'
         )
     arm, scene = load_arm(options.arm), load_wearer(options.body)
-    settings = _settings(options, arm)
+    settings = settings_of(arm, options.settings, margin=options.margin, seed=options.seed)
+    if not -1 <= settings.seed < SEEDS:
+        raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
     q_start, seed = _start(options, arm), new_seed(settings.seed)
     question = question_of(arm, scene, q_start, options.target, settings, seed)
     plan = plan_of(question, 'plan')
@@ -87,27 +96,10 @@ def _plan(options: argparse.Namespace) -> int:
     return REJECTED
 
 
-def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
-    changes = {
-        name: value
-        for name, value in (('margin', options.margin), ('seed', options.seed))
-        if value is not None
-    }
-    settings = load_settings(arm.dof, options.settings, **changes)
-    if not -1 <= settings.seed < SEEDS:
-        raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
-    return settings
-
-
 def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
     """Return the start configuration, (dof,) [rad or m]."""
     if options.q_from is not None:
-        if len(options.q_from) != arm.dof:
-            raise OptionsError(
-                f'--from: {len(options.q_from)} values, expected {arm.dof}, one for each of '
-                f'{list(arm.joint_names)} [rad or m]'
-            )
-        return frozen_array(options.q_from, (arm.dof,), '--from', 'rad or m', OptionsError)
+        return joint_values(options.q_from, '--from', arm.joint_names)
     if options.arm is None:
         return np.array(folded())
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))

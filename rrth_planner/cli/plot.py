@@ -9,11 +9,10 @@ import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of
+from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
 from rrth_planner.cli.program import add_files, add_start, add_target, command_parser, run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
-from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
@@ -53,7 +52,8 @@ def _draw(draw: Callable[[argparse.Namespace], 'Figure'], options: argparse.Name
 
 
 def _draw_plan(options: argparse.Namespace) -> 'Figure':
-    arm, settings = _arm_and_settings(options)
+    arm = load_arm(options.arm)
+    settings = settings_of(arm, options.settings, seed=options.seed)
     if not -1 <= settings.seed < 2**31:
         raise OptionsError(f'seed: {settings.seed}, expected 0 to 2147483647, or -1 for a new one')
     scene, q_start = load_wearer(options.body), _start(arm, options.q_from)
@@ -83,7 +83,8 @@ def _draw_recording(options: argparse.Namespace) -> 'Figure':
     from rrth_planner.ros.client.recording_reader import RecordingReader
     from rrth_planner.visualization.recording_figure import recording_figure
 
-    arm, settings = _arm_and_settings(options)
+    arm = load_arm(options.arm)
+    settings = settings_of(arm, options.settings)
     reader = RecordingReader(options.file, arm, options.base_frame, options.namespace)
     recording = reader.recording()
     for topic, sentence in reader.rejected.items():
@@ -100,12 +101,6 @@ def _time(given: float | None, default: float, last: float) -> float:
     if given is None:
         return default
     return given + last if given < 0.0 else given
-
-
-def _arm_and_settings(options: argparse.Namespace) -> tuple[ArmModel, PlanSettings]:
-    arm = load_arm(options.arm)
-    changes = {} if getattr(options, 'seed', None) is None else {'seed': options.seed}
-    return arm, load_settings(arm.dof, options.settings, **changes)
 
 
 def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:

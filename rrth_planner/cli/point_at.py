@@ -21,8 +21,11 @@ from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import MessageError, OptionsError, RrthError
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
-from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
-from rrth_planner.ros.client.remote_parameters import parameters_of_planner
+from rrth_planner.ros.client.planner_client import (
+    NotInTimeError,
+    parameters_of_planner,
+    PlannerClient,
+)
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body_writer import body_from_file
 from rrth_planner.ros.messages.error_codes import ErrorCode
@@ -101,9 +104,7 @@ def _run(options: argparse.Namespace, given: list[str], report: Report, stack: E
     parameters = parameters_of_planner(client)
     client.wait_for_planner()
     client.wait_for_state(parameters.arm.joint_names)
-    body = None
-    if options.body is not None:
-        body = _checked(_body(options.body, parameters.base_frame), options.body, parameters)
+    body = None if options.body is None else _accepted(options.body, parameters.base_frame)
     target = PointStamped()
     target.header.frame_id = options.frame or parameters.base_frame
     target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
@@ -161,13 +162,14 @@ def _body(path: Path, frame: str) -> MarkerArray:
         raise OptionsError(f'--body: {problem}') from problem
 
 
-def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
+def _accepted(path: Path, frame: str) -> MarkerArray:
     """Return a body that the planner accepts; it would keep its previous one otherwise."""
     # Imported here: loads kernels, which takes seconds and is only needed with --body.
     from rrth_planner.ros.messages.body import WearerBody
 
+    body = _body(path, frame)
     try:
-        taken = WearerBody().apply(body, 0.0, parameters.base_frame)
+        taken = WearerBody().apply(body, 0.0, frame)
     except MessageError as problem:
         raise OptionsError(f'--body: file {path}: {problem}') from problem
     if taken.n_boxes == 0:

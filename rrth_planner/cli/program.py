@@ -3,14 +3,15 @@
 """What commands have in common: name, arguments, output, and how they end."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
 import signal
 import sys
 from typing import NoReturn
 
-from rrth_planner.model.errors import one_line, RrthError
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import one_line, OptionsError, RrthError
 
 INTERRUPTED = 130
 # As a shell reports a program that SIGPIPE has ended.
@@ -54,6 +55,17 @@ def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True
 def add_start(parser: argparse.ArgumentParser, text: str) -> None:
     """Add the option of a start configuration, with its help."""
     parser.add_argument('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=text)
+
+
+def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]) -> Array:
+    """Return the values of an option, one for each joint, (dof,) [rad or m], or raise."""
+    n = len(joint_names)
+    if len(given) != n:
+        raise OptionsError(
+            f'{option}: {len(given)} values, expected {n}, one for each of {list(joint_names)} '
+            '[rad or m]'
+        )
+    return frozen_array(given, (n,), option, 'rad or m', OptionsError)
 
 
 def run(name: str, action: Callable[[], int | None], failed: int) -> int:

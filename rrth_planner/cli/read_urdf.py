@@ -8,7 +8,7 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.cli.program import command_parser, run
+from rrth_planner.cli.program import command_parser, joint_values, run
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.chain import RAYS, read_chain
 from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
@@ -59,13 +59,7 @@ def _import(options: argparse.Namespace) -> None:
     check_pointing_arm(arm)
     lines = _report(found)
     if options.check is not None:
-        if len(options.check) != arm.dof:
-            raise ModelError(
-                f'--check: {len(options.check)} values, expected {arm.dof}, one for each of '
-                f'{list(arm.joint_names)} [rad or m]'
-            )
-        q = frozen_array(options.check, (arm.dof,), '--check', 'rad or m', ModelError)
-        lines += _report_ray(found, q)
+        lines += _report_ray(found, joint_values(options.check, '--check', arm.joint_names))
     comments = [
         f'The arm of {options.file.name} from link {chain.base} to {chain.tool}, '
         f'ray along {options.ray}.'

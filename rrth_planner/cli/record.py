@@ -11,9 +11,6 @@ import signal
 import sys
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped, PoseStamped
-from nav_msgs.msg import Path as ToolPath
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
@@ -24,20 +21,7 @@ from rrth_planner.cli.program import say
 from rrth_planner.cli.ros_parsers import record, TOPICS
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
 
-TYPES = (
-    MarkerArray,
-    PointStamped,
-    JointState,
-    JointTrajectory,
-    ToolPath,
-    MarkerArray,
-    DiagnosticArray,
-    PoseStamped,
-)
 SOURCE_LINES = re.compile(r', at /\S+\.c:\d+')
 
 
@@ -60,7 +44,6 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
     from rrth_planner.ros.client.recorder import Recorder, RecordingFile
     from tqdm import tqdm  # type: ignore[import-untyped]
 
-    types = dict(zip(TOPICS, TYPES, strict=True))
     for topic in options.topics or ():
         validate_topic_name(topic)
     signals: list[int] = []
@@ -74,7 +57,7 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
         rclpy.init(args=list(given), signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
         recording = stack.enter_context(RecordingFile(file))
-        recorder = Recorder(recording, types, options.topics or list(TOPICS))
+        recorder = Recorder(recording, TOPICS, options.topics or list(TOPICS))
         stack.callback(recorder.destroy_node)
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)

@@ -8,17 +8,17 @@ from pathlib import Path
 
 from rrth_planner.cli.program import command_parser
 
-# What `record` records: all topics of a planner and an arm.
-TOPICS = (
-    'body_boxes',
-    'target',
-    'joint_states',
-    'joint_trajectory',
-    'rrth_planner/tool_path',
-    'rrth_planner/markers',
-    '/diagnostics',
-    'arm_playback/tool_pose',
-)
+# What `record` records: all topics of a planner and an arm, with their types.
+TOPICS = {
+    'body_boxes': 'visualization_msgs/msg/MarkerArray',
+    'target': 'geometry_msgs/msg/PointStamped',
+    'joint_states': 'sensor_msgs/msg/JointState',
+    'joint_trajectory': 'trajectory_msgs/msg/JointTrajectory',
+    'rrth_planner/tool_path': 'nav_msgs/msg/Path',
+    'rrth_planner/markers': 'visualization_msgs/msg/MarkerArray',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    'arm_playback/tool_pose': 'geometry_msgs/msg/PoseStamped',
+}
 POINT_AT = """\
 Request a motion that points the arm at X Y Z [m], and wait until the arm has arrived. A planner
 node and an arm (playback_node, or a controller) must run in the same ROS domain."""

@@ -58,15 +58,7 @@ def urdf_of_file(
     radius: float = 0.015,
     base_frame: str = 'torso',
 ) -> str:
-    """
-    Return the URDF of an arm's file, named as there; without files, those of the package.
-
-    Raises
-    ------
-    RrthError
-        A file that cannot be read, or that describes no arm or no settings.
-
-    """
+    """Return the URDF of an arm's file, named as there; without files, those of the package."""
     arm = load_arm(arm_file)
     name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
     speeds = load_settings(arm.dof, settings_file).limits.velocity

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from rrth_planner.collision.world import arm_world, World
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RecordError
@@ -132,13 +132,13 @@ def measured_clearances(recording: Recording, arm: ArmModel, ray_guard_length: f
     there was no wearer yet.
     """
     result = np.full(len(recording.times), np.nan)
-    worlds: dict[int, World] = {}
+    shown: Scene | None = None
     for i, (time, q) in enumerate(zip(recording.times, recording.positions, strict=True)):
         scene = at(recording.bodies, float(time))
         if scene is not None and scene.boxes:
-            if id(scene) not in worlds:
-                worlds = {id(scene): arm_world(arm, scene, 0.0, ray_guard_length)}
-            result[i] = worlds[id(scene)].clearances(q).min()
+            if scene is not shown:
+                shown, world = scene, arm_world(arm, scene, 0.0, ray_guard_length)
+            result[i] = world.clearances(q).min()
     return result
 
 

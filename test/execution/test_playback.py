@@ -449,5 +449,6 @@ def test_a_stop_before_the_handover_stops_the_running_motion():
     accepted = accept(running, back, ARM, rules(), start_time=1.2, time=0.8)
     times = np.linspace(0.9, 3.0, 40)
     expected = states_at(stop(running, LIMITS, 0.9), times)
-    for one, other in zip(stop(accepted, LIMITS, 0.9).states_at(times), expected, strict=True):
+    stopped = stop(accepted, LIMITS, 0.9)
+    for one, other in zip(states_at(stopped, times), expected, strict=True):
         np.testing.assert_array_equal(one, other)

@@ -12,18 +12,28 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.ros.interface.parameters import (
+    declared,
+    parameters_from_values,
+    PlannerParameters,
+)
 from rrth_planner.ros.messages.joint_state import configuration_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
+from rrth_planner.ros.middleware.parameter_declaration import ARM
 from rrth_planner.ros.middleware.qos import LATCHED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+NODE = 'rrth_planner'
 NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
 # Between two requests to a planner that still lacks an input [s].
 PAUSE = 0.3
@@ -64,7 +74,7 @@ class PlannerClient(Node):
         self.create_subscription(
             JointTrajectory, 'joint_trajectory', lambda msg: self.commanded.append(msg), LATCHED
         )
-        self._plan = self.create_client(Trigger, 'rrth_planner/plan')
+        self._plan = self.create_client(Trigger, f'{NODE}/plan')
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
@@ -97,7 +107,7 @@ class PlannerClient(Node):
 
     def wait_for_planner(self) -> None:
         """Wait for the service of the planner."""
-        service = self.resolve_service_name('rrth_planner/plan')
+        service = self.resolve_service_name(f'{NODE}/plan')
         self.wait_for(self._plan.service_is_ready, f'service {service}')
 
     def wait_for_state(self, joint_names: Sequence[str]) -> None:
@@ -181,3 +191,35 @@ def is_matched(node: Node, publisher: Publisher) -> bool:
     infos = node.get_subscriptions_info_by_topic(publisher.topic)
     is_reliable = any(info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos)
     return is_reliable and publisher.get_subscription_count() >= len(infos)
+
+
+def parameters_of_planner(client: PlannerClient) -> PlannerParameters:
+    """
+    Return the present parameters of the planner.
+
+    Raises
+    ------
+    NotInTimeError
+        No planner answers.
+    RrthError
+        It has other parameters, or its arm is described by a file that is not here.
+
+    """
+    asking = AsyncParameterClient(client, NODE)
+    node = client.resolve_service_name(NODE)
+    client.wait_for(asking.services_are_ready, f'the parameter services of {node}')
+
+    def values_of(names: Sequence[str]) -> dict[str, Any]:
+        future = asking.get_parameters(list(names))
+        client.wait_for(future.done, f'the parameters of {node}')
+        found = [parameter_value_to_python(value) for value in future.result().values]
+        values = dict(zip(names, found, strict=False))
+        missing = [name for name in names if values.get(name) is None]
+        if missing:
+            raise RrthError(
+                f'{node}: no parameter {missing[0]}, expected a planner of this version'
+            )
+        return values
+
+    arm = load_arm(values_of([ARM.name])[ARM.name])
+    return parameters_from_values(values_of([s.name for s in declared(arm.dof)]), arm)

@@ -5,7 +5,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from mcap.writer import Writer
@@ -61,19 +60,14 @@ class RecordingFile:
         """Return the open file."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Finish the file; one without any message is removed."""
         try:
             with self._writing():
                 self._writer.finish()
                 self._file.close()
         except RecordError:
-            if problem is None:
+            if kind is None:
                 raise
         finally:
             with suppress(OSError):
@@ -125,9 +119,8 @@ class Recorder(Node):
 
     Parameters
     ----------
-    file : RecordingFile
     known : mapping
-        Types by topic.
+        Names of types by topic.
     topics : sequence of str
         What is recorded, relative to the node's namespace; the types of those that are not known
         are looked up once there is a publisher.
@@ -135,7 +128,7 @@ class Recorder(Node):
     """
 
     def __init__(
-        self, file: RecordingFile, known: Mapping[str, Any], topics: Sequence[str]
+        self, file: RecordingFile, known: Mapping[str, str], topics: Sequence[str]
     ) -> None:
         """Subscribe."""
         super().__init__('rrth_recorder')
@@ -154,10 +147,11 @@ class Recorder(Node):
         if self._problem is not None:
             raise self._problem
 
-    def _add_topic(self, topic: str, msg_type: Any) -> None:
+    def _add_topic(self, topic: str, type_name: str) -> None:
         name = self.resolve_topic_name(topic)
         if name in self._file.counts:
             return
+        msg_type = type_of_name(type_name)
         self._file.add_topic(name, msg_type)
 
         def write(data: bytes, arrival: Arrival) -> None:
@@ -178,6 +172,6 @@ class Recorder(Node):
                 continue
             self._missing.remove(topic)
             try:
-                self._add_topic(topic, type_of_name(types[0]))
+                self._add_topic(topic, types[0])
             except RrthError as problem:
                 self._problem = problem
