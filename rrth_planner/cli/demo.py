@@ -74,19 +74,14 @@ def _run(options: argparse.Namespace) -> None:
     print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
     print('The first start compiles the planner, which may take a minute or two.', flush=True)
     with ExitStack() as stack:
-        children = [
-            stack.enter_context(
-                ChildProcess(
-                    f'rrth_planner.ros.{name}_node',
-                    ['--ros-args', '--params-file', str(file), *extra],
-                    partial(_show, name),
-                )
-            )
-            for name, file, extra in (
-                ('planner', planner_file, ['-p', f'seed:={options.seed}']),
-                ('playback', resource_path('config/playback.yaml'), []),
-            )
-        ]
+        children = []
+        for name, file, extra in (
+            ('planner', planner_file, ['-p', f'seed:={options.seed}']),
+            ('playback', resource_path('config/playback.yaml'), []),
+        ):
+            words = ['--ros-args', '--params-file', str(file), *extra]
+            child = ChildProcess(f'rrth_planner.ros.{name}_node', words, partial(_show, name))
+            children.append(stack.enter_context(child))
 
         def check() -> None:
             for child in children:
@@ -97,7 +92,7 @@ def _run(options: argparse.Namespace) -> None:
         client = DemoClient(arm, options.timeout, check)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
-        client.publish_body(body)
+        client.publish(body)
         lines, figure = _visit(client, settings, frame, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
         avoided = _raise_arm(client, settings, frame)
@@ -119,7 +114,7 @@ def _visit(
     motions, lines = [], []
     for name, message in targets.items():
         target = goal_from_msg(message, frame).target
-        client.publish_target(message)
+        client.publish(message)
         q_present = client.positions()
         trajectory, planning_time = client.ask_for_motion()
         found = inspect_motion(
@@ -164,7 +159,7 @@ def _raise_arm(client: DemoClient, settings: PlanSettings, frame: str) -> str:
     scene = scene_of(WearerBody().apply(raised, 0.0, frame))
     for name in RAISED_TARGETS:
         message = _example(f'target_{name}', PointStamped)
-        client.publish_target(message)
+        client.publish(message)
         trajectory, _ = client.ask_for_motion()
         if name != RAISED_TARGETS[-1]:
             client.wait_for_arrival(trajectory)

@@ -37,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _draw(draw: Callable[[argparse.Namespace], 'Figure'], options: argparse.Namespace) -> None:
+    # Before anything that takes time.
     output: Path = options.output
     if output.suffix.lower() not in KINDS:
         raise OptionsError(f'-o {output}, expected a name that ends in {", ".join(KINDS)}')

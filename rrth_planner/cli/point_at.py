@@ -132,8 +132,8 @@ def _move(
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
-        client.publish_body(body)
-    client.publish_target(target)
+        client.publish(body)
+    client.publish(target)
     report.take(answer_from_text(client.ask(PATIENCE).message))
     if report.exit_code != DONE:
         return

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replay an incident: plan again from the same inputs, and compare all collision checkers."""
 
-import argparse
 from collections.abc import Sequence
 from pathlib import Path
 import sys
@@ -42,7 +41,9 @@ example:    %(prog)s ~/.ros/log/rrth_planner/incident-20261121T213655123456-1f0c
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the incident of a file and return the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = command_parser('replay', DESCRIPTION, EPILOG)
+    parser.add_argument('file', type=Path, metavar='FILE', help='YAML file of the incident')
+    options = parser.parse_args(arguments)
     return run('replay', lambda: replay(read_incident(options.file)), 2)
 
 
@@ -57,7 +58,7 @@ def replay(incident: Incident) -> int:
         return _conclude_error(incident, planned)
     assert incident.trajectory is not None
     is_same = _is_same_motion(planned, incident.trajectory)
-    comparison = compare_on_recorded(incident, incident.trajectory)
+    comparison = _compare_on_recorded(incident, incident.trajectory)
     _print_comparison(comparison, incident.question.margin)
     if is_same and comparison.is_disagreement:
         print('reproduced: the two collision checks disagree about the same motion as recorded')
@@ -87,7 +88,7 @@ def _sentence_of(planned: 'MotionPlan | Exception') -> str:
     return f'{planned.status.value}: {planned.sentence}'
 
 
-def compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionComparison':
+def _compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionComparison':
     """Compare the checkers on a motion, with the wearer that it was checked against."""
     from rrth_planner.collision.checker_comparison import compare_checkers
 
@@ -162,23 +163,13 @@ def _print_comparison(comparison: 'MotionComparison', margin: float) -> None:
             f'  {name:>5} {piece.begin:9.4f} {piece.end:9.4f} {piece.certificate:>12} '
             f'{fcl.distance:12.7f} {piece.reference:13.7f}  {fcl.bar}, "{fcl.box}"'
         )
-    violation = comparison.violation
-    found = 'free'
-    if violation is not None:
-        found = (
-            f'{violation.bar} at {violation.distance:.7f} m from "{violation.box}" '
-            f'at {violation.time:.4f} s'
-        )
+    found, wrong = 'free', comparison.violation
+    if wrong is not None:
+        found = f'{wrong.bar} at {wrong.distance:.7f} m from "{wrong.box}" at {wrong.time:.4f} s'
     print(f'certificate: {"proven free" if comparison.is_proven else "not proven"}')
     print(f'python-fcl: {found}')
     word = 'keeps the margin' if comparison.clearance >= margin else 'below the margin'
     print(f'reference checker: least clearance {comparison.clearance:.7f} m, {word}')
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser('replay', DESCRIPTION, EPILOG)
-    parser.add_argument('file', type=Path, metavar='FILE', help='YAML file of the incident')
-    return parser
 
 
 if __name__ == '__main__':

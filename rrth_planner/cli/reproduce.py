@@ -133,16 +133,10 @@ def _positive(text: str) -> int:
 
 def _portable(arguments: Sequence[str]) -> list[str]:
     """Return the arguments without what belongs to one machine: folders and addresses."""
-    kept, skip = [], False
-    for argument in arguments:
-        name = argument.partition('=')[0]
-        if skip:
-            skip = False
-        elif name in ('--output', '--data', '--scheduler'):
-            skip = '=' not in argument
-        else:
-            kept.append(argument)
-    return kept
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for name in ('--output', '--data', '--scheduler'):
+        parser.add_argument(name)
+    return parser.parse_known_args(arguments)[1]
 
 
 if __name__ == '__main__':

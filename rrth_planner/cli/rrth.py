@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from rrth_planner import __version__
 from rrth_planner.cli import ros_parsers
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.program import command_parser, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.model.errors import NotInstalledError
@@ -69,10 +69,7 @@ COMMANDS = {
         'config/playback.yaml',
     ),
     'point_at': Command(
-        'point the arm and wait until it has arrived',
-        'cli.point_at',
-        (ROS, 'tqdm'),
-        'ros,tools',
+        'point the arm and wait until it has arrived', 'cli.point_at', (ROS, 'tqdm'), 'ros,tools'
     ),
     'record': Command(
         'record a run of the nodes in an MCAP file',
@@ -113,33 +110,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser_of(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command that needs ROS, without loading ROS."""
     command = COMMANDS[name]
+    parser: argparse.ArgumentParser
     if not command.settings:
-        parser: argparse.ArgumentParser = getattr(ros_parsers, name)()
+        parser = getattr(ros_parsers, name)()
         return parser
-    return argparse.ArgumentParser(
-        prog=program(name),
-        usage='%(prog)s [--ros-args ...]',
-        description=f'{command.summary[0].upper()}{command.summary[1:]}.',
-        epilog=NODE_HELP.format(resource_path(command.settings)),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    help_of_node = NODE_HELP.format(resource_path(command.settings))
+    parser = command_parser(
+        name, f'{command.summary[0].upper()}{command.summary[1:]}.', help_of_node
     )
+    parser.usage = '%(prog)s [--ros-args ...]'
+    return parser
 
 
 def _parser() -> argparse.ArgumentParser:
-    lists = {
-        title: '\n'.join(
-            f'  {name:14} {command.summary}'
-            for name, command in COMMANDS.items()
-            if (ROS in command.needs) == is_ros
-        )
-        for title, is_ros in (('commands', False), ('commands that need ROS 2 Jazzy', True))
-    }
+    lists: dict[str, list[str]] = {}
+    for name, command in COMMANDS.items():
+        title = 'commands that need ROS 2 Jazzy' if ROS in command.needs else 'commands'
+        lists.setdefault(title, []).append(f'  {name:14} {command.summary}')
+    epilog = '\n\n'.join('\n'.join([f'{title}:', *lines]) for title, lines in lists.items())
     parser = argparse.ArgumentParser(
         prog='rrth',
         usage='%(prog)s COMMAND ...',
         description='Motion planner for a body-worn pointing arm.',
-        epilog='\n\n'.join(f'{title}:\n{text}' for title, text in lists.items())
-        + '\n\nrrth COMMAND --help describes each command.',
+        epilog=f'{epilog}\n\nrrth COMMAND --help describes each command.',
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')

@@ -33,7 +33,18 @@ example:    %(prog)s --arm my_arm.yaml --output my_arm.urdf
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the URDF and return the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = command_parser('write_urdf', DESCRIPTION, EPILOG)
+    add_files(
+        parser,
+        arm='the arm, as config/arm.yaml (default: that one)',
+        settings='parameters of the node, as config/planner.yaml (default: those)',
+        output='file to write (default: standard output)',
+    )
+    radius = 'radius of bars that have none of their own [m] (default: %(default)s)'
+    parser.add_argument('--radius', type=float, default=0.015, metavar='M', help=radius)
+    frame = 'link that the arm is mounted on, as base_frame of the node (default: %(default)s)'
+    parser.add_argument('--base-frame', default='torso', metavar='NAME', help=frame)
+    options = parser.parse_args(arguments)
     return run('write_urdf', lambda: _export(options), 2)
 
 
@@ -63,21 +74,6 @@ def urdf_of_file(
     name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
     speeds = load_settings(arm.dof, settings_file).limits.velocity
     return arm_to_urdf(arm, speeds, radius, base_frame, name)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser('write_urdf', DESCRIPTION, EPILOG)
-    add_files(
-        parser,
-        arm='the arm, as config/arm.yaml (default: that one)',
-        settings='parameters of the node, as config/planner.yaml (default: those)',
-        output='file to write (default: standard output)',
-    )
-    radius = 'radius of bars that have none of their own [m] (default: %(default)s)'
-    parser.add_argument('--radius', type=float, default=0.015, metavar='M', help=radius)
-    frame = 'link that the arm is mounted on, as base_frame of the node (default: %(default)s)'
-    parser.add_argument('--base-frame', default='torso', metavar='NAME', help=frame)
-    return parser
 
 
 if __name__ == '__main__':

@@ -33,6 +33,8 @@ class Recording:
     """
     A run on one clock, whose zero is where the recording begins.
 
+    Raises RecordError for no instant at all, shapes that differ, times that do not increase.
+
     Parameters
     ----------
     times : array_like, shape (n,)
@@ -47,11 +49,6 @@ class Recording:
         From when [s] the target was where, (3,) in the base frame [m].
     monitor_states : sequence of (float, str)
         From when [s] the monitor was in which state.
-
-    Raises
-    ------
-    RecordError
-        No instant at all, shapes that differ, times that do not increase.
 
     """
 
@@ -80,11 +77,7 @@ def section(recording: Recording, begin: float, end: float) -> Recording:
     """
     Return the run from one time to another [s]; the zero of the clock stays.
 
-    Raises
-    ------
-    RecordError
-        There are no joint states then.
-
+    Raises RecordError where there are no joint states then.
     """
     chosen = (recording.times >= begin) & (recording.times <= end)
     if not chosen.any():

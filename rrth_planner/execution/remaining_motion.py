@@ -91,17 +91,8 @@ def is_remaining_free(
     """
     Return whether the remaining motion is proven free of the present wearer.
 
-    At its end with the pointing ray to the target.
-
-    Parameters
-    ----------
-    phase : float
-        Time within the motion that the arm is at [s].
-    scene : Scene
-        The wearer in the base frame.
-    margin, ray_guard_length : float
-        [m].
-
+    The arm is at a time `phase` within it [s], the scene is in the base frame, `margin` and
+    `ray_guard_length` are in metres. At the end the ray must be free up to the target.
     """
     trajectory, begin = running.trajectory, phase
     if phase < running.escape_time:

@@ -20,8 +20,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
-from rrth_planner.execution.acceptance import accept
-from rrth_planner.execution.playback import Playback, standing, stop
+from rrth_planner.execution.playback import accept, Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.interface.playback_parameters import (

@@ -11,8 +11,7 @@ import sys
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.execution.acceptance import accept, PlaybackRules
-from rrth_planner.execution.playback import Playback, standing, stop
+from rrth_planner.execution.playback import accept, Playback, PlaybackRules, standing, stop
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.path import Path

@@ -27,13 +27,7 @@ class DemoClient(PlannerClient):
     """
     Publishes body and target, requests motions, and follows the arm.
 
-    Parameters
-    ----------
-    timeout : float
-        Longest wait for anything [s].
-    check : callable
-        Raises where waiting is useless.
-
+    See PlannerClient for `timeout` [s] and `check`.
     """
 
     def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
@@ -49,7 +43,7 @@ class DemoClient(PlannerClient):
 
     def ask_for_motion(self) -> tuple[Trajectory, float]:
         """Return the motion that the planner publishes, and its planning time [ms]."""
-        self.clear_history()
+        self.commanded, self.observed = [], []
         response = self.ask(self.timeout)
         if not response.success:
             raise DemoError(f'the planner rejected the request: {response.message}')
@@ -82,7 +76,7 @@ class DemoClient(PlannerClient):
         self.receive_for(after)
         n = len(self.commanded)
         self.observed = []
-        self.publish_body(body)
+        self.publish(body)
         # The stop begins in motion, what comes after it at rest.
         self.wait_for(
             lambda: (

@@ -26,13 +26,8 @@ def plan_without_moving(
     """
     Return what the planner would answer, and by how much the motion would miss the target [m].
 
-    Without a body the one on `body_boxes` counts.
-
-    Raises
-    ------
-    NotInTimeError
-        No joint positions, or no body.
-
+    Without a body the one on `body_boxes` counts. Raises NotInTimeError where there are no joint
+    positions, or no body.
     """
     inputs = Inputs(
         *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))

@@ -51,18 +51,9 @@ def follow(
     """
     Return once the arm stands at the end of its motion, or of one that has replaced it.
 
-    Parameters
-    ----------
-    target : ndarray, shape (3,), or None
-        A motion that does not point there, as a stop, is not the last one [m].
-    tolerance : float
-        Greatest distance of a joint from the end [rad].
-
-    Raises
-    ------
-    NotInTimeError
-        It does not end within the duration of the motion and the client's timeout.
-
+    A motion that does not point to the target, (3,) [m], as a stop, is not the last one. A joint
+    may be off the end by the tolerance [rad]. Raises NotInTimeError where the arm is not there
+    within the duration of the motion and the client's timeout.
     """
     n_commanded = len(client.commanded)
     begin = present = time.monotonic()

@@ -65,11 +65,13 @@ class PlannerClient(Node):
         # Of the arm: other joint states are ignored.
         self.joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
-        # The commanded motions and the joint states since `clear_history` was called.
+        # The commanded motions and the joint states, until they are cleared.
         self.commanded: list[JointTrajectory] = []
         self.observed: list[JointState] = []
-        self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
-        self._target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self._publishers_by_type = {
+            kind: self.create_publisher(kind, topic, LATCHED)
+            for kind, topic in ((MarkerArray, 'body_boxes'), (PointStamped, 'target'))
+        }
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
         self.create_subscription(
             JointTrajectory, 'joint_trajectory', lambda msg: self.commanded.append(msg), LATCHED
@@ -133,32 +135,24 @@ class PlannerClient(Node):
             return True
         return all(abs(self.state.velocity[names.index(n)]) <= speed for n in self.joint_names)
 
-    def publish_body(self, body: MarkerArray) -> None:
-        """Publish the wearer's body; return once the planner has it."""
-        self._publish(self._body, body)
-
-    def publish_target(self, target: PointStamped) -> None:
-        """Publish a target; return once the planner has it."""
-        self._publish(self._target, target)
-
     def ask(self, patience: float) -> Trigger.Response:
         """Return the planner's answer; ask again while it lacks an input, for a time [s]."""
         end = time.monotonic() + patience
-        answer = self._call()
-        while answer.message.startswith(NO_INPUT_YET) and time.monotonic() < end:
+        while True:
+            future = self._plan.call_async(Trigger.Request())
+            self.wait_for(future.done, 'an answer of rrth_planner/plan')
+            answer = future.result()
+            if not answer.message.startswith(NO_INPUT_YET) or time.monotonic() >= end:
+                return answer
             self.receive_for(PAUSE)
-            answer = self._call()
-        return answer
-
-    def clear_history(self) -> None:
-        """Forget the commanded motions and the joint states so far."""
-        self.commanded, self.observed = [], []
 
     def count_arms(self) -> int:
         """Return the number of other subscribers of the motions."""
         return self.count_subscribers('joint_trajectory') - 1
 
-    def _publish(self, publisher: Any, message: Any) -> None:
+    def publish(self, message: MarkerArray | PointStamped) -> None:
+        """Publish a body or a target; return once the planner has it."""
+        publisher = self._publishers_by_type[type(message)]
         self.wait_for(
             lambda: is_matched(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
@@ -166,11 +160,6 @@ class PlannerClient(Node):
         # The request that follows must not overtake the message.
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
             raise NotInTimeError(f'{publisher.topic}: not acknowledged within {self.timeout:g} s')
-
-    def _call(self) -> Trigger.Response:
-        future = self._plan.call_async(Trigger.Request())
-        self.wait_for(future.done, 'an answer of rrth_planner/plan')
-        return future.result()
 
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
@@ -197,13 +186,8 @@ def parameters_of_planner(client: PlannerClient) -> PlannerParameters:
     """
     Return the present parameters of the planner.
 
-    Raises
-    ------
-    NotInTimeError
-        No planner answers.
-    RrthError
-        It has other parameters, or its arm is described by a file that is not here.
-
+    Raises NotInTimeError where no planner answers, and another RrthError where it has other
+    parameters, or its arm is described by a file that is not here.
     """
     asking = AsyncParameterClient(client, NODE)
     node = client.resolve_service_name(NODE)

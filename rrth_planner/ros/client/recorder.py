@@ -22,23 +22,10 @@ PERIOD = 0.2
 
 class RecordingFile:
     """
-    An MCAP file of ROS 2 messages, complete when its `with` block is left.
+    A new MCAP file of ROS 2 messages, complete when its `with` block is left.
 
-    Parameters
-    ----------
-    path : Path
-        Must not exist yet.
-
-    Attributes
-    ----------
-    counts : dict
-        Messages by topic, those without any included.
-
-    Raises
-    ------
-    RecordError
-        The file exists, or cannot be made; later, it cannot be written.
-
+    Raises RecordError where it exists, or cannot be written. The messages by topic are counted in
+    `counts`, those without any included.
     """
 
     def __init__(self, path: Path) -> None:
@@ -117,14 +104,8 @@ class Recorder(Node):
     """
     Records topics from publishers of any quality of service.
 
-    Parameters
-    ----------
-    known : mapping
-        Names of types by topic.
-    topics : sequence of str
-        What is recorded, relative to the node's namespace; the types of those that are not known
-        are looked up once there is a publisher.
-
+    Topics are relative to the node's namespace. `known` names the types of some; those of others
+    are looked up once there is a publisher.
     """
 
     def __init__(

@@ -45,26 +45,17 @@ class RecordedMessage(NamedTuple):
 
 class RecordingReader:
     """
-    The messages of a file, checked as by the nodes.
+    The messages of a file, checked as by the nodes; bad ones are left out.
+
+    `rejected` says, by topic, why the last bad one was. Raises RecordError where the file cannot
+    be read, or holds no run, or several.
 
     Parameters
     ----------
-    arm : ArmModel
-        The arm of the run.
     base_frame : str
         Of the planner; messages in other frames are rejected.
     namespace : str, optional
         Of the run; without, there must be one only.
-
-    Attributes
-    ----------
-    rejected : dict
-        By topic, why its last bad message was rejected; bad messages are left out.
-
-    Raises
-    ------
-    RecordError
-        The file cannot be read, or holds no run, or several.
 
     """
 
@@ -148,15 +139,14 @@ class RecordingReader:
         before: JointReading | None = None
         names = self._arm.joint_names
 
-        def read(recorded: RecordedMessage) -> JointReading:
+        def read(recorded: RecordedMessage) -> JointReading | None:
             nonlocal before
+            if not has_joint_of(recorded.msg, names):
+                return None
             before = joint_reading(recorded.msg, names, recorded.received / NANOSECONDS, before)
             return before
 
-        self._messages['joint_states'] = [
-            h for h in self._messages['joint_states'] if has_joint_of(h.msg, names)
-        ]
-        return self._good('joint_states', read)
+        return [reading for reading in self._good('joint_states', read) if reading is not None]
 
     def _commanded(self) -> list[CommandedMotion]:
         def read(recorded: RecordedMessage) -> CommandedMotion:

@@ -181,20 +181,9 @@ def following(
     """
     Give a feed that spins in a thread of its own while the block runs.
 
-    Parameters
-    ----------
-    arm : Path or None
-        File of the arm, laid out as `config/arm.yaml`; None: as the settings or `ros_args` say.
-    settings : Path or None
-        Parameters, laid out as `config/planner.yaml`.
-    ros_args : sequence of str
-        From `--ros-args` on: remaps and parameters.
-
-    Raises
-    ------
-    RrthError
-        A rejected argument or parameter.
-
+    The files are laid out as `config/arm.yaml` and `config/planner.yaml`; without one for the arm
+    it is as the settings or `ros_args` (remaps and parameters, from `--ros-args` on) say. Raises
+    RrthError for a rejected argument or parameter.
     """
     own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []
     overrides = [Parameter('arm', value=str(arm))] if arm else []
