@@ -49,13 +49,7 @@ def question_of(
     """
     Return the question for a motion with some settings, but for their seed.
 
-    Parameters
-    ----------
-    q_start : ndarray, shape (dof,)
-        [rad].
-    target : ndarray, shape (3,)
-        In the base frame [m].
-
+    From q_start, shape (dof,) [rad], to a target, shape (3,) in the base frame [m].
     """
     return PlanQuestion(
         arm=arm,

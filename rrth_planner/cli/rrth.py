@@ -25,28 +25,15 @@ the namespace. All parameters, with units, ranges and defaults, are in
 
 
 class Command(NamedTuple):
-    """
-    A command and its requirements.
-
-    Parameters
-    ----------
-    summary : str
-        What it does, for the list of all.
-    module : str
-        Of the package, with its `main`. Where it needs ROS, its parser is in `cli.ros_parsers`.
-    needs : tuple of str
-        Libraries that it requires, if its module does not find out by itself.
-    extras : str
-        Extras of the package that install these.
-    settings : str
-        The parameters of a node, which has no arguments of its own.
-
-    """
+    """A command: what it does, for the list of all, and what it requires."""
 
     summary: str
+    # With its `main`; where it needs ROS, its parser is in `cli.ros_parsers`.
     module: str
+    # Libraries that it requires before it is loaded, and the extras that install them.
     needs: tuple[str, ...] = ()
     extras: str = ''
+    # The parameters of a node, which has no arguments of its own.
     settings: str = ''
 
 

@@ -21,7 +21,6 @@ from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
 from rrth_planner.model.errors import OptionsError, RrthError
-from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.examples import example_target, start_of
 from rrth_planner.visualization.viewer.screenshot import save_picture
 
@@ -96,7 +95,16 @@ def _run_planning(options: argparse.Namespace) -> None:
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    question = _question(options)
+    arm, changes = load_arm(options.arm), {}
+    for text in options.set:
+        name, sign, value = text.partition('=')
+        if not sign:
+            raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
+        changes[name] = parse_yaml(value, f'--set {name}')
+    settings = load_settings(arm.dof, options.settings, **changes)
+    target = example_target('front') if options.target is None else options.target
+    scene, q_start = load_wearer(options.body), start_of(arm)
+    question = question_of(arm, scene, q_start, target, settings, max(0, settings.seed))
     prepare_kernels(partial(say, 'viewer'))
     from rrth_planner.pipeline.plan_motion import warm_up
     from rrth_planner.visualization.viewer.page import ViewerPage
@@ -132,20 +140,6 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
         _served(options) as (server, _),
     ):
         LivePage(server, feed).run()
-
-
-def _question(options: argparse.Namespace) -> PlanQuestion:
-    arm = load_arm(options.arm)
-    changes = {}
-    for text in options.set:
-        name, sign, value = text.partition('=')
-        if not sign:
-            raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
-        changes[name] = parse_yaml(value, f'--set {name}')
-    settings = load_settings(arm.dof, options.settings, **changes)
-    target = example_target('front') if options.target is None else options.target
-    scene, q_start = load_wearer(options.body), start_of(arm)
-    return question_of(arm, scene, q_start, target, settings, max(0, settings.seed))
 
 
 @contextmanager

@@ -58,16 +58,9 @@ class ExecutingMotion:
         """
         Return the time within the motion that the arm is at now [s]; None where it is off it.
 
-        An arm may be late, slow, or a little off its motion: the nearest point counts. Before the
-        motion begins the time is negative. Velocities are not needed: not every driver has them.
-
-        Parameters
-        ----------
-        q : ndarray, shape (dof,)
-            A reading of the arm [rad].
-        taken, now : float
-            When it was read, and now [s].
-
+        The arm was at q, shape (dof,) [rad], at the time `taken`; both times in seconds. It may be
+        late, slow, or a little off its motion: the nearest point counts. Before the motion begins
+        the time is negative. Velocities are not needed: not every driver has them.
         """
         motion, guess = self.trajectory, taken - self.start_time
         if now < self.start_time <= now + LONGEST_LEAD and not self._has_begun(q, guess):

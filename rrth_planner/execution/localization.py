@@ -35,12 +35,10 @@ def predict_start_state(
     ----------
     positions, velocities : ndarray, shape (dof,)
         Of the reading [rad, rad/s].
-    running : Trajectory or None
-        The last commanded motion.
     ahead : float
         From the reading on, >= 0 [s].
     known : tuple of float, optional
-        The time within that motion [s], and the rate at which the arm executes it, if known.
+        The time within the running motion [s], and the rate at which the arm executes it.
 
     """
     found = known

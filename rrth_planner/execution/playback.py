@@ -88,15 +88,8 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     Return the motion of an arm that stops along its path from now on.
 
     The stop is `fast_stop.fast_stop`, with the same limits. An arm that comes to rest by itself as
-    soon does that; one that is stopping already continues.
-
-    Parameters
-    ----------
-    limits : MotionLimits
-        Of the arm, by the clock.
-    time : float
-        Now [s].
-
+    soon does that; one that is stopping already continues. The time is now [s], and the limits of
+    the arm are by the clock.
     """
     playback = at_present(playback, time)
     if playback.is_stopping or time >= playback.end_time:

@@ -43,15 +43,8 @@ def with_lead_in(
     """
     Return a motion that begins a little later, preceded by the present motion until then.
 
-    Parameters
-    ----------
-    before : ExecutingMotion
-        The motion until then.
-    phase, now : float
-        The time within it that the arm is at now, and now [s].
-    after : ExecutingMotion
-        The next one; returned as it is where it does not continue `before`.
-
+    The arm is now at the time `phase` within the motion before [s]. The motion after is returned
+    as it is where it does not continue that.
     """
     duration = before.trajectory.duration
     if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:

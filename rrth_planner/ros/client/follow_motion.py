@@ -29,16 +29,14 @@ SPACING = 0.01
 
 def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> Trajectory:
     """Return the motion of an answer with this duration [s], once it was received."""
-    found: list[Trajectory] = []
 
-    def is_received() -> bool:
+    def received() -> list[Trajectory]:
         # The motion of an earlier request, latched on the topic, may come first.
         motions = _motions_of(client.commanded, arm)
-        found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
-        return bool(found)
+        return [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
 
-    client.wait_for(is_received, client.resolve_topic_name('joint_trajectory'))
-    return found[-1]
+    client.wait_for(lambda: bool(received()), client.resolve_topic_name('joint_trajectory'))
+    return received()[-1]
 
 
 def follow(

@@ -47,13 +47,7 @@ class PlannerClient(Node):
     """
     The common part of the clients of a planner; it receives messages only while it waits.
 
-    Parameters
-    ----------
-    timeout : float
-        Longest wait for anything [s].
-    check : callable
-        Raises where waiting is useless.
-
+    The timeout is the longest wait for anything [s]; `check` raises where waiting is useless.
     """
 
     def __init__(

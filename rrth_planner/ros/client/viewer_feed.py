@@ -102,12 +102,7 @@ class ViewerFeed(Node):
     @property
     def said(self) -> str:
         """The last answer of the planner, or what is still missing."""
-        inputs = self._inputs
-        missing = [
-            topic.topic
-            for topic in (inputs.body, inputs.target, inputs.joints)
-            if not topic.n_good
-        ]
+        missing = [topic.topic for topic in self._inputs.all.values() if not topic.n_good]
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
