@@ -24,7 +24,7 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
-from rrth_planner.ros.client.demo_client import DemoClient, DemoError
+from rrth_planner.ros.client.planner_client import DemoClient, DemoError
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.message_file import message_from_file
@@ -96,8 +96,7 @@ def _run(options: argparse.Namespace) -> None:
         lines, figure = _visit(client, settings, frame, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
         avoided = _raise_arm(client, settings, frame)
-    print('\n' + '\n'.join([HEADER, *lines]))
-    print(avoided)
+    print('\n' + '\n'.join([HEADER, *lines, avoided]))
     print(f'\nEvery motion passed an independent collision check. Picture: {options.output}')
 
 

@@ -11,15 +11,7 @@ from typing import Any, TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
-from rrth_planner.cli.program import (
-    add_files,
-    add_start,
-    add_target,
-    command_parser,
-    joint_values,
-    run,
-    say,
-)
+from rrth_planner.cli.program import add_files, add_target, command_parser, joint_values, run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
@@ -159,12 +151,10 @@ def _parser() -> argparse.ArgumentParser:
     parser = command_parser('plan', DESCRIPTION, EPILOG)
     add_target(parser, 'target of the pointing ray [m]')
     add_files(parser, arm='the arm (config/arm.yaml)', body=WEARER_HELP)
-    add_start(
-        parser,
-        'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)',
-    )
-    add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
     add = parser.add_argument
+    start = 'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)'
+    add('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
+    add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
     add('--margin', type=float, metavar='M', help='clearance demanded from every box [m]')
     add('--seed', type=int, metavar='N', help='random seed; -1: a new one each time')
     add_files(parser, output='file of the motion, .yaml or .csv')

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
-from rrth_planner.cli.program import add_files, add_start, add_target, command_parser, run, say
+from rrth_planner.cli.program import add_files, add_target, command_parser, run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.wearer_file import load_wearer, WEARER_HELP
@@ -128,7 +128,8 @@ def _parser() -> argparse.ArgumentParser:
     plan.set_defaults(draw=_draw_plan)
     add_target(plan, 'target of the pointing ray, in the base frame [m]')
     add_files(plan, body=WEARER_HELP)
-    add_start(plan, 'joint positions at the start [rad] (as in config/playback.yaml)')
+    start = 'joint positions at the start [rad] (as in config/playback.yaml)'
+    plan.add_argument('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
     plan.add_argument('--seed', type=int, help='random seed; -1: a new one (as in the settings)')
     recording = commands.add_parser('recording', help='draw a run recorded by `record`')
     recording.set_defaults(draw=_draw_recording)

@@ -52,11 +52,6 @@ def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True
     parser.add_argument('--target', type=float, nargs=3, required=required, metavar=xyz, help=text)
 
 
-def add_start(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the option of a start configuration, with its help."""
-    parser.add_argument('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=text)
-
-
 def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]) -> Array:
     """Return the values of an option, one for each joint, (dof,) [rad or m], or raise."""
     n = len(joint_names)

@@ -35,7 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options, ros_args = _parse(given[:at]), given[at:]
     interrupt_on_signals()
     try:
-        _run(options, ros_args)
+        if ros_args and not options.live:
+            raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
+        require('tools', 'viser')
+        if options.live:
+            _run_live(options, ros_args)
+        else:
+            _run_planning(options)
     except (RrthError, OSError) as problem:
         say('viewer', ' '.join(str(problem).split()))
         return 1
@@ -78,16 +84,6 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     add('--live', action='store_true', help='show the running nodes instead of planning')
     add_files(parser, screenshot='save a picture of the page with the arm at the goal, and exit')
     return parser.parse_args(arguments)
-
-
-def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
-    if ros_args and not options.live:
-        raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
-    require('tools', 'viser')
-    if options.live:
-        _run_live(options, ros_args)
-    else:
-        _run_planning(options)
 
 
 def _run_planning(options: argparse.Namespace) -> None:

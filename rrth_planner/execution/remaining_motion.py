@@ -8,14 +8,7 @@ import numpy as np
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import leads_out
-from rrth_planner.collision.world import (
-    arm_rows,
-    arm_world,
-    mount_inverse,
-    RESOLUTION,
-    SLACK,
-    World,
-)
+from rrth_planner.collision.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arm import ArmModel
@@ -95,7 +88,8 @@ def is_remaining_free(
         begin = running.escape_time
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        return _is_end_free(running, world, ray_guard_length)
+        reach = max(ray_guard_length, running.target_distance)
+        return world.is_valid(trajectory.positions[0], reach)
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_remaining_motion_free(
@@ -141,7 +135,8 @@ def escapes_by_continuing(
     if is_place_free(here, arm, scene, margin, ray_guard_length):
         return False
     world = arm_world(arm, scene, margin, ray_guard_length)
-    is_end_free = _is_end_free(running, world, ray_guard_length)
+    reach = max(ray_guard_length, running.target_distance)
+    is_end_free = world.is_valid(trajectory.positions[-1], reach)
     return is_end_free and leads_out(trajectory, world, trajectory.duration, phase)
 
 
@@ -161,8 +156,3 @@ def is_place_free(
             q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
         )
     )
-
-
-def _is_end_free(running: ExecutingMotion, world: World, ray_guard_length: float) -> bool:
-    reach = max(ray_guard_length, running.target_distance)
-    return world.is_valid(running.trajectory.positions[-1], reach)

@@ -148,11 +148,9 @@ class Recorder(Node):
     def _find_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}
         for topic in tuple(self._missing):
-            types = offered.get(self.resolve_topic_name(topic))
-            if not types:
-                continue
-            self._missing.remove(topic)
-            try:
-                self._add_topic(topic, types[0])
-            except RrthError as problem:
-                self._problem = problem
+            if types := offered.get(self.resolve_topic_name(topic)):
+                self._missing.remove(topic)
+                try:
+                    self._add_topic(topic, types[0])
+                except RrthError as problem:
+                    self._problem = problem
