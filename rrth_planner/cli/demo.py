@@ -7,24 +7,24 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 import os
-import signal
 import sys
-from typing import Any, NoReturn
+from typing import Any
 
 from geometry_msgs.msg import PointStamped
-import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.cli.demo_options import parser
+from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED
 from rrth_planner.collision.motion_inspection import inspect_motion
 from rrth_planner.collision.reference_checker import first_contact, least_clearance
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
-from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.ros.client.demo_client import DemoClient, DemoError
+from rrth_planner.ros.client.planner_client import DemoClient, DemoError
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.message_file import message_from_file
@@ -44,9 +44,8 @@ HEADER = (
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demo and return the exit code."""
-    options = parser().parse_args(arguments)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _end)
+    options = ros_parsers.demo().parse_args(arguments)
+    interrupt_on_signals()
     try:
         _run(options)
     except (RrthError, OSError) as problem:
@@ -54,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         print('demo interrupted', file=sys.stderr)
-        return 130
+        return INTERRUPTED
     return 0
 
 
@@ -65,7 +64,9 @@ def _run(options: argparse.Namespace) -> None:
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     planner_file = resource_path('config/planner.yaml')
-    settings = load_yaml(planner_file)['/**']['ros__parameters']
+    parameters = load_yaml(planner_file)['/**']['ros__parameters']
+    arm, frame = load_arm(parameters.get('arm')), parameters['base_frame']
+    settings = load_settings(arm.dof, planner_file)
     body = _example(options.body, MarkerArray)
     targets = {name: _example(f'target_{name}', PointStamped) for name in options.targets}
 
@@ -73,19 +74,14 @@ def _run(options: argparse.Namespace) -> None:
     print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
     print('The first start compiles the planner, which may take a minute or two.', flush=True)
     with ExitStack() as stack:
-        children = [
-            stack.enter_context(
-                ChildProcess(
-                    f'rrth_planner.ros.{name}_node',
-                    ['--ros-args', '--params-file', str(file), *extra],
-                    partial(_show, name),
-                )
-            )
-            for name, file, extra in (
-                ('planner', planner_file, ['-p', f'seed:={options.seed}']),
-                ('playback', resource_path('config/playback.yaml'), []),
-            )
-        ]
+        children = []
+        for name, file, extra in (
+            ('planner', planner_file, ['-p', f'seed:={options.seed}']),
+            ('playback', resource_path('config/playback.yaml'), []),
+        ):
+            words = ['--ros-args', '--params-file', str(file), *extra]
+            child = ChildProcess(f'rrth_planner.ros.{name}_node', words, partial(_show, name))
+            children.append(stack.enter_context(child))
 
         def check() -> None:
             for child in children:
@@ -93,38 +89,32 @@ def _run(options: argparse.Namespace) -> None:
 
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        client = DemoClient(load_arm(settings.get('arm')), options.timeout, check)
+        client = DemoClient(arm, options.timeout, check)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
-        client.publish_body(body)
-        lines, figure = _visit(client, settings, body, targets)
+        client.publish(body)
+        lines, figure = _visit(client, settings, frame, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
-        avoided = _raise_arm(client, settings)
-    print('\n' + '\n'.join([HEADER, *lines]))
-    print(avoided)
+        avoided = _raise_arm(client, settings, frame)
+    print('\n' + '\n'.join([HEADER, *lines, avoided]))
     print(f'\nEvery motion passed an independent collision check. Picture: {options.output}')
 
 
 def _visit(
     client: DemoClient,
-    settings: dict[str, Any],
+    settings: PlanSettings,
+    frame: str,
     body: MarkerArray,
     targets: dict[str, PointStamped],
 ) -> tuple[list[str], Any]:
     """Return one table row per target, and the figure of all motions."""
-    frame, margin = settings['base_frame'], settings['margin']
-    arm, scene = load_arm(settings.get('arm')), scene_of(WearerBody().apply(body, 0.0, frame))
-    ray_guard_length = settings['ray_guard_length']
-    limits = MotionLimits(
-        velocity=np.broadcast_to(settings['max_velocity'], (arm.dof,)),
-        acceleration=np.broadcast_to(settings['max_acceleration'], (arm.dof,)),
-        jerk=np.broadcast_to(settings['max_jerk'], (arm.dof,)),
-    )
+    arm, limits, length = client.arm, settings.limits, settings.ray_guard_length
+    scene = scene_of(WearerBody().apply(body, 0.0, frame))
     motions, lines = [], []
     for name, message in targets.items():
         target = goal_from_msg(message, frame).target
-        client.publish_target(message)
-        q_present = client.present()
+        client.publish(message)
+        q_present = client.positions()
         trajectory, planning_time = client.ask_for_motion()
         found = inspect_motion(
             arm,
@@ -133,13 +123,11 @@ def _visit(
             limits,
             q_present=q_present,
             target=target,
-            margin=margin,
-            ray_guard_length=ray_guard_length,
+            margin=settings.margin,
+            ray_guard_length=length,
         )
         client.wait_for_arrival(trajectory)
-        error = pointing_error(arm, client.present(), target)
-        if not error <= POINTING_TOLERANCE:
-            raise DemoError(f'target {name}: the ray misses it by {1e3 * error:.2f} mm')
+        error = _checked_error(client, name, target)
         lines.append(
             f'{name:10}{planning_time:9.1f} ms{found.length:7.2f} rad{found.duration:9.2f} s'
             f'{found.clearance:10.3f} m{1e3 * error:9.3f} mm'
@@ -153,31 +141,36 @@ def _visit(
                 f'{1e3 * found.clearance:.0f} mm clearance, planned in {planning_time:.0f} ms',
             )
         )
-    return lines, motion_figure(arm, scene, motions, limits, ray_guard_length)
+    return lines, motion_figure(arm, scene, motions, limits, length)
 
 
-def _raise_arm(client: DemoClient, settings: dict[str, Any]) -> str:
+def _checked_error(client: DemoClient, name: str, target: Array) -> float:
+    """Return by how much the ray misses a target, (3,) [m], or raise DemoError."""
+    error = pointing_error(client.arm, client.positions(), target)
+    if not error <= POINTING_TOLERANCE:
+        raise DemoError(f'target {name}: the ray misses it by {1e3 * error:.2f} mm')
+    return error
+
+
+def _raise_arm(client: DemoClient, settings: PlanSettings, frame: str) -> str:
     """Have the wearer raise an arm across a running motion; return the result in a sentence."""
-    frame, arm = settings['base_frame'], load_arm(settings.get('arm'))
     raised = _example(RAISED, MarkerArray)
     scene = scene_of(WearerBody().apply(raised, 0.0, frame))
     for name in RAISED_TARGETS:
         message = _example(f'target_{name}', PointStamped)
-        client.publish_target(message)
+        client.publish(message)
         trajectory, _ = client.ask_for_motion()
         if name != RAISED_TARGETS[-1]:
             client.wait_for_arrival(trajectory)
     print('The wearer raises an arm during the motion.', flush=True)
     q = client.raise_arm(raised, trajectory.positions[0], RAISED_AFTER)
-    contact = first_contact(arm, scene, q, settings['ray_guard_length'], 0.0)
+    contact = first_contact(client.arm, scene, q, settings.ray_guard_length, 0.0)
     if contact is not None:
         raise DemoError(
             f'bar {contact.bar} of the arm was in contact with {contact.box} after it was raised'
         )
-    clearance = least_clearance(arm, scene, q, settings['ray_guard_length'])
-    error = pointing_error(arm, client.present(), goal_from_msg(message, frame).target)
-    if not error <= POINTING_TOLERANCE:
-        raise DemoError(f'target {name}: the ray misses it by {1e3 * error:.2f} mm')
+    clearance = least_clearance(client.arm, scene, q, settings.ray_guard_length)
+    error = _checked_error(client, name, goal_from_msg(message, frame).target)
     return (
         f'{name:10} the wearer raised an arm during the motion: the arm stopped, avoided it with '
         f'{clearance:.3f} m clearance, and its ray misses the target by {1e3 * error:.3f} mm'
@@ -190,11 +183,6 @@ def _show(name: str, line: str) -> None:
 
 def _example(name: str, message_type: Any) -> Any:
     return message_from_file(resource_path(f'msg_examples/{name}.yaml'), message_type)
-
-
-def _end(*_: Any) -> NoReturn:
-    """Turn a signal into an interrupt, so that the child processes are ended."""
-    raise KeyboardInterrupt
 
 
 if __name__ == '__main__':

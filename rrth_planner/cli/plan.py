@@ -4,30 +4,26 @@
 
 import argparse
 from collections.abc import Sequence
-from functools import partial
 import json
 from pathlib import Path
 import sys
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
+from rrth_planner.cli.program import add_files, add_target, command_parser, joint_values, run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
-from rrth_planner.io.resources import resource_path
-from rrth_planner.io.settings import load_settings, PlanSettings
-from rrth_planner.io.text_file import load_yaml
 from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.arm import ArmModel, tool_pose
-from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import one_line, OptionsError, RrthError
-from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.status import PlanStatus
 
 if TYPE_CHECKING:
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
-SOLVED, REJECTED, WRONG, INTERRUPTED = 0, 1, 2, 130
+SOLVED, REJECTED, WRONG = 0, 1, 2
 SEEDS = 2**31
 DESCRIPTION = """\
 Plan one motion after which the arm's pointing ray meets a target, and which keeps the margin from
@@ -58,17 +54,10 @@ example:    %(prog)s --target 1.5 0.8 0.6 --output motion.csv --period 0.01
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan a motion, print its figures, write it, and return the exit code."""
     options = _parser().parse_args(arguments)
-    try:
-        return _run(options)
-    except (RrthError, OSError) as problem:
-        say('plan', one_line(str(problem)))
-        return WRONG
-    except KeyboardInterrupt:
-        say('plan', 'interrupted')
-        return INTERRUPTED
+    return run('plan', lambda: _plan(options), WRONG)
 
 
-def _run(options: argparse.Namespace) -> int:
+def _plan(options: argparse.Namespace) -> int:
     if options.output is not None:
         check_suffix(options.output)
     elif options.period is not None:
@@ -76,35 +65,18 @@ def _run(options: argparse.Namespace) -> int:
             '--period: given without --output, expected a file to write the points to'
         )
     arm, scene = load_arm(options.arm), load_body(options.body)
-    settings = _settings(options, arm)
-    q_start, goal = _start(options, arm), PointingGoal(options.target)
-    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
-    from rrth_planner.kernels.precompile import prepare_kernels
-
-    prepare_kernels(partial(say, 'plan'))
-    from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
-
-    # Compiling and loading do not count as planning time.
-    warm_up(arm, settings.options)
-    seed = settings.seed if settings.seed >= 0 else int(np.random.default_rng().integers(SEEDS))
-    plan = plan_motion(
-        arm,
-        scene,
-        q_start,
-        goal,
-        settings.limits,
-        settings.options,
-        margin=settings.margin,
-        ray_guard_length=settings.ray_guard_length,
-        seed=seed,
-        escape_depth=settings.escape_depth,
-    )
+    settings = settings_of(arm, options.settings, margin=options.margin, seed=options.seed)
+    if not -1 <= settings.seed < SEEDS:
+        raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
+    q_start, seed = _start(options, arm), new_seed(settings.seed)
+    question = question_of(arm, scene, q_start, options.target, settings, seed)
+    plan = plan_of(question, 'plan')
     figures = _figures(arm, q_start, plan)
     if plan.trajectory is not None and options.output is not None:
         motion = motion_of(arm, plan.trajectory)
         if options.period is not None:
             motion = sampled(motion, options.period)
-        said = f'Target {_listed(goal.target)} m: {plan.sentence}.'
+        said = f'Target {_listed(question.goal.target)} m: {plan.sentence}.'
         write_motion(motion, options.output, [said])
     if options.json:
         print(json.dumps(figures, indent=2))
@@ -116,30 +88,12 @@ def _run(options: argparse.Namespace) -> int:
     return REJECTED
 
 
-def _settings(options: argparse.Namespace, arm: ArmModel) -> PlanSettings:
-    changes = {
-        name: value
-        for name, value in (('margin', options.margin), ('seed', options.seed))
-        if value is not None
-    }
-    settings = load_settings(arm.dof, options.settings, **changes)
-    if not -1 <= settings.seed < SEEDS:
-        raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
-    return settings
-
-
 def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
     """Return the start configuration, (dof,) [rad or m]."""
     if options.q_from is not None:
-        if len(options.q_from) != arm.dof:
-            raise OptionsError(
-                f'--from: {len(options.q_from)} values, expected {arm.dof}, one for each of '
-                f'{list(arm.joint_names)} [rad or m]'
-            )
-        return frozen_array(options.q_from, (arm.dof,), '--from', 'rad or m', OptionsError)
+        return joint_values(options.q_from, '--from', arm.joint_names)
     if options.arm is None:
-        file = load_yaml(resource_path('config/playback.yaml'))
-        return np.array(file['/**']['ros__parameters']['initial_positions'])
+        return np.array(folded())
     return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
 
 
@@ -194,49 +148,18 @@ def _listed(numbers: Any) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program('plan'),
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        '--target',
-        type=float,
-        nargs=3,
-        required=True,
-        metavar=('X', 'Y', 'Z'),
-        help='target of the pointing ray [m]',
-    )
-    parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm (config/arm.yaml)')
-    parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
-    parser.add_argument(
-        '--from',
-        dest='q_from',
-        type=float,
-        nargs='+',
-        metavar='Q',
-        help='start configuration, one value per joint [rad or m] (folded; with --arm, all 0)',
-    )
-    parser.add_argument(
-        '--settings',
-        type=Path,
-        metavar='FILE',
-        help='parameters of the node; defaults are those of config/planner.yaml',
-    )
-    parser.add_argument(
-        '--margin', type=float, metavar='M', help='clearance demanded from every box [m]'
-    )
-    parser.add_argument(
-        '--seed', type=int, metavar='N', help='random seed; -1: a new one each time'
-    )
-    parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='file of the motion, .yaml or .csv'
-    )
-    parser.add_argument(
-        '--period', type=float, metavar='S', help='time between two points in that file [s]'
-    )
-    parser.add_argument('--json', action='store_true', help='print the figures as JSON')
+    parser = command_parser('plan', DESCRIPTION, EPILOG)
+    add_target(parser, 'target of the pointing ray [m]')
+    add_files(parser, arm='the arm (config/arm.yaml)', body=WEARER_HELP)
+    add = parser.add_argument
+    start = 'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)'
+    add('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
+    add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
+    add('--margin', type=float, metavar='M', help='clearance demanded from every box [m]')
+    add('--seed', type=int, metavar='N', help='random seed; -1: a new one each time')
+    add_files(parser, output='file of the motion, .yaml or .csv')
+    add('--period', type=float, metavar='S', help='time between two points in that file [s]')
+    add('--json', action='store_true', help='print the figures as JSON')
     return parser
 
 

@@ -8,23 +8,24 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
 import json
 from pathlib import Path
-import signal
 import sys
-from typing import Any, NoReturn
 
 from geometry_msgs.msg import PointStamped
 import rclpy
 from rclpy.exceptions import InvalidNamespaceException, ROSInterruptException
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-from rrth_planner.cli.point_at_options import parser
-from rrth_planner.cli.program import say
+from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.arm import pointing_error
-from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.errors import MessageError, OptionsError, RrthError
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
-from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
-from rrth_planner.ros.client.remote_parameters import parameters_of_planner
+from rrth_planner.ros.client.planner_client import (
+    NotInTimeError,
+    parameters_of_planner,
+    PlannerClient,
+)
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body_writer import body_from_file
 from rrth_planner.ros.messages.error_codes import ErrorCode
@@ -32,7 +33,7 @@ from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from visualization_msgs.msg import MarkerArray
 
-DONE, REJECTED, USAGE, NOT_HEARD, NOT_ARRIVED, INTERRUPTED = 0, 1, 2, 3, 4, 130
+DONE, REJECTED, USAGE, NOT_HEARD, NOT_ARRIVED = 0, 1, 2, 3, 4
 # Time for the planner to process the messages just published [s].
 PATIENCE = 2.0
 
@@ -61,17 +62,12 @@ class Report:
         self.exit_code, self.sentence = exit_code, sentence
 
 
-class UsageError(RrthError):
-    """An invalid argument on the command line."""
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Point the arm and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _end)
+    interrupt_on_signals()
     try:
-        options = parser().parse_args(remove_ros_args(['point_at', *given])[1:])
+        options = ros_parsers.point_at().parse_args(remove_ros_args(['point_at', *given])[1:])
     except RuntimeError as problem:
         say('point_at', _of_ros_args(problem))
         return USAGE
@@ -103,14 +99,12 @@ def _run(options: argparse.Namespace, given: list[str], report: Report, stack: E
         stack.callback(rclpy.try_shutdown)
         client = PlannerClient('point_at', options.timeout)
     except (RuntimeError, ValueError, InvalidNamespaceException) as problem:
-        raise UsageError(_of_ros_args(problem)) from problem
+        raise OptionsError(_of_ros_args(problem)) from problem
     stack.callback(client.destroy_node)
     parameters = parameters_of_planner(client)
     client.wait_for_planner()
     client.wait_for_state(parameters.arm.joint_names)
-    body = None
-    if options.body is not None:
-        body = _checked(_body(options.body, parameters.base_frame), options.body, parameters)
+    body = None if options.body is None else _accepted(options.body, parameters.base_frame)
     target = PointStamped()
     target.header.frame_id = options.frame or parameters.base_frame
     target.point.x, target.point.y, target.point.z = options.x, options.y, options.z
@@ -138,8 +132,8 @@ def _move(
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
-        client.publish_body(body)
-    client.publish_target(target)
+        client.publish(body)
+    client.publish(target)
     report.take(answer_from_text(client.ask(PATIENCE).message))
     if report.exit_code != DONE:
         return
@@ -154,7 +148,7 @@ def _move(
     except NotInTimeError as problem:
         report.end(NOT_ARRIVED, str(problem))
     if point is not None:
-        report.pointing_error = pointing_error(arm, client.positions(arm.joint_names), point)
+        report.pointing_error = pointing_error(arm, client.positions(), point)
 
 
 def _of_ros_args(problem: Exception) -> str:
@@ -165,20 +159,21 @@ def _body(path: Path, frame: str) -> MarkerArray:
     try:
         return body_from_file(path, frame)
     except RrthError as problem:
-        raise UsageError(f'--body: {problem}') from problem
+        raise OptionsError(f'--body: {problem}') from problem
 
 
-def _checked(body: MarkerArray, path: Path, parameters: PlannerParameters) -> MarkerArray:
+def _accepted(path: Path, frame: str) -> MarkerArray:
     """Return a body that the planner accepts; it would keep its previous one otherwise."""
     # Imported here: loads kernels, which takes seconds and is only needed with --body.
     from rrth_planner.ros.messages.body import WearerBody
 
+    body = _body(path, frame)
     try:
-        taken = WearerBody().apply(body, 0.0, parameters.base_frame)
+        taken = WearerBody().apply(body, 0.0, frame)
     except MessageError as problem:
-        raise UsageError(f'--body: file {path}: {problem}') from problem
+        raise OptionsError(f'--body: file {path}: {problem}') from problem
     if taken.n_boxes == 0:
-        raise UsageError(f'--body: file {path}: no box, expected at least one')
+        raise OptionsError(f'--body: file {path}: no box, expected at least one')
     return body
 
 
@@ -191,11 +186,6 @@ def _print(report: Report) -> None:
     if report.pointing_error is not None:
         verb = 'misses' if report.arrived else 'would miss'
         print(f'the ray {verb} the target by {1e3 * report.pointing_error:.2f} mm')
-
-
-def _end(*_: Any) -> NoReturn:
-    """Turn a signal into an interrupt, so that everything is cleaned up."""
-    raise KeyboardInterrupt
 
 
 if __name__ == '__main__':

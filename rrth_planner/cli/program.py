@@ -1,9 +1,21 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Name and output of a command."""
+"""What commands have in common: name, arguments, output, and how they end."""
 
+import argparse
+from collections.abc import Callable, Sequence
+import os
 from pathlib import Path
+import signal
 import sys
+from typing import NoReturn
+
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import one_line, OptionsError, RrthError
+
+INTERRUPTED = 130
+# As a shell reports a program that SIGPIPE has ended.
+OUTPUT_CLOSED = 141
 
 
 def program(name: str) -> str:
@@ -14,3 +26,66 @@ def program(name: str) -> str:
 def say(name: str, sentence: str) -> None:
     """Print a sentence of a command to standard error, at once."""
     print(f'{program(name)}: {sentence}', file=sys.stderr, flush=True)
+
+
+def command_parser(
+    name: str, description: str | None, epilog: str | None = None
+) -> argparse.ArgumentParser:
+    """Return the parser of a command; with an epilog, lines are printed as they are."""
+    return argparse.ArgumentParser(
+        prog=program(name),
+        description=description,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter if epilog else argparse.HelpFormatter,
+    )
+
+
+def add_files(parser: argparse.ArgumentParser, **helps: str) -> None:
+    """Add an option for each file of a command, with its help."""
+    for name, text in helps.items():
+        parser.add_argument(f'--{name}', type=Path, metavar='FILE', help=text)
+
+
+def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True) -> None:
+    """Add the option of a target, with its help."""
+    xyz = ('X', 'Y', 'Z')
+    parser.add_argument('--target', type=float, nargs=3, required=required, metavar=xyz, help=text)
+
+
+def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]) -> Array:
+    """Return the values of an option, one for each joint, (dof,) [rad or m], or raise."""
+    n = len(joint_names)
+    if len(given) != n:
+        raise OptionsError(
+            f'{option}: {len(given)} values, expected {n}, one for each of {list(joint_names)} '
+            '[rad or m]'
+        )
+    return frozen_array(given, (n,), option, 'rad or m', OptionsError)
+
+
+def run(name: str, action: Callable[[], int | None], failed: int) -> int:
+    """Run a command; return its exit code, which `failed` is where it raises an RrthError."""
+    try:
+        code = action()
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Its reader, as `head`, has ended; Python must not fail to flush the rest at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return OUTPUT_CLOSED
+    except (RrthError, OSError) as problem:
+        say(name, one_line(' '.join(str(problem).split())))
+        return failed
+    except KeyboardInterrupt:
+        say(name, 'interrupted')
+        return INTERRUPTED
+    return code or 0
+
+
+def interrupt_on_signals() -> None:
+    """Turn the signals that end a process into an interrupt, so that everything is cleaned up."""
+
+    def interrupt(*_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, interrupt)

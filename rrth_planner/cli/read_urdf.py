@@ -8,12 +8,12 @@ from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.program import command_parser, joint_values, run
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.chain import RAYS, read_chain
 from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
 from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import ModelError, one_line, RrthError
+from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import pose_matrix
 
 # Bars this much longer than all links together are no links.
@@ -45,15 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if given[k - 1] == '--ray' and given[k] in RAYS:
             given[k - 1 : k + 1] = [f'--ray={given[k]}']
     options = _parser().parse_args(given)
-    try:
-        _import(options)
-    except (RrthError, OSError) as problem:
-        say('read_urdf', one_line(str(problem)))
-        return 2
-    except KeyboardInterrupt:
-        say('read_urdf', 'interrupted')
-        return 130
-    return 0
+    return run('read_urdf', lambda: _import(options), 2)
 
 
 def _import(options: argparse.Namespace) -> None:
@@ -67,13 +59,7 @@ def _import(options: argparse.Namespace) -> None:
     check_pointing_arm(arm)
     lines = _report(found)
     if options.check is not None:
-        if len(options.check) != arm.dof:
-            raise ModelError(
-                f'--check: {len(options.check)} values, expected {arm.dof}, one for each of '
-                f'{list(arm.joint_names)} [rad or m]'
-            )
-        q = frozen_array(options.check, (arm.dof,), '--check', 'rad or m', ModelError)
-        lines += _report_ray(found, q)
+        lines += _report_ray(found, joint_values(options.check, '--check', arm.joint_names))
     comments = [
         f'The arm of {options.file.name} from link {chain.base} to {chain.tool}, '
         f'ray along {options.ray}.'
@@ -144,45 +130,29 @@ def _report_ray(found: ImportedArm, q: Array) -> list[str]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program('read_urdf'),
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument('file', type=Path, metavar='FILE', help='the URDF file')
-    parser.add_argument('--base', metavar='LINK', help='first link of the chain (the root)')
-    parser.add_argument('--tool', metavar='LINK', help='last link (the one that ends the chain)')
-    parser.add_argument(
+    parser = command_parser('read_urdf', DESCRIPTION, EPILOG)
+    add = parser.add_argument
+    add('file', type=Path, metavar='FILE', help='the URDF file')
+    add('--base', metavar='LINK', help='first link of the chain (the root)')
+    add('--tool', metavar='LINK', help='last link (the one that ends the chain)')
+    add(
         '--ray',
         default='+z',
         metavar='AXIS',
         help='axis of the tool link that is the pointing ray: +x -x +y -y +z -z (%(default)s)',
     )
-    parser.add_argument(
+    add(
         '--mount',
         type=float,
         nargs=7,
         metavar=('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW'),
         help="pose of the first link in the wearer's base frame [m] (the same frame)",
     )
-    parser.add_argument(
-        '--radius',
-        type=float,
-        default=0.03,
-        metavar='M',
-        help='radius of the links [m] (%(default)s)',
-    )
-    parser.add_argument(
-        '--output', type=Path, required=True, metavar='FILE', help='arm file to write'
-    )
-    parser.add_argument(
-        '--check',
-        type=float,
-        nargs='+',
-        metavar='Q',
-        help='print the tool pose at these joint positions [rad or m]',
-    )
+    radius = 'radius of the links [m] (%(default)s)'
+    add('--radius', type=float, default=0.03, metavar='M', help=radius)
+    add('--output', type=Path, required=True, metavar='FILE', help='arm file to write')
+    check = 'print the tool pose at these joint positions [rad or m]'
+    add('--check', type=float, nargs='+', metavar='Q', help=check)
     return parser
 
 

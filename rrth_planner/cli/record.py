@@ -11,9 +11,6 @@ import signal
 import sys
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped, PoseStamped
-from nav_msgs.msg import Path as ToolPath
 import rclpy
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.executors import SingleThreadedExecutor
@@ -21,23 +18,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from rclpy.validate_topic_name import validate_topic_name
 from rrth_planner.cli.program import say
-from rrth_planner.cli.record_options import parser, TOPICS
+from rrth_planner.cli.ros_parsers import record, TOPICS
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
-from sensor_msgs.msg import JointState
-from trajectory_msgs.msg import JointTrajectory
-from visualization_msgs.msg import MarkerArray
 
-TYPES = (
-    MarkerArray,
-    PointStamped,
-    JointState,
-    JointTrajectory,
-    ToolPath,
-    MarkerArray,
-    DiagnosticArray,
-    PoseStamped,
-)
 SOURCE_LINES = re.compile(r', at /\S+\.c:\d+')
 
 
@@ -45,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Record until a signal or the end of the duration, and return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        options = parser().parse_args(remove_ros_args(['record', *given])[1:])
+        options = record().parse_args(remove_ros_args(['record', *given])[1:])
         return _record(options, given)
     except (RrthError, OSError, RuntimeError, InvalidTopicNameException) as problem:
         # Errors of ROS name lines of its own sources.
@@ -57,10 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
     require('tools', 'mcap', 'tqdm')
     # Imported here: `require` has checked that they are installed.
-    from rrth_planner.ros.client.recorder import Recorder, RecordingFile, since
+    from rrth_planner.ros.client.recorder import Recorder, RecordingFile
     from tqdm import tqdm  # type: ignore[import-untyped]
 
-    types = dict(zip(TOPICS, TYPES, strict=True))
     for topic in options.topics or ():
         validate_topic_name(topic)
     signals: list[int] = []
@@ -74,14 +57,14 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
         rclpy.init(args=list(given), signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
         recording = stack.enter_context(RecordingFile(file))
-        recorder = Recorder(recording, types, options.topics or list(TOPICS))
+        recorder = Recorder(recording, TOPICS, options.topics or list(TOPICS))
         stack.callback(recorder.destroy_node)
         executor = SingleThreadedExecutor()
         executor.add_node(recorder)
         print(f'recording to {file}; Ctrl-C ends it', flush=True)
         bar = stack.enter_context(tqdm(unit=' messages', disable=None, dynamic_ncols=True))
-        while not signals and since(begin) < options.duration:
-            executor.spin_once(timeout_sec=min(0.1, max(0.0, options.duration - since(begin))))
+        while not signals and (left := begin + options.duration - time.monotonic()) > 0.0:
+            executor.spin_once(timeout_sec=min(0.1, left))
             recorder.check()
             received = {topic: n for topic, n in recording.counts.items() if n}
             for topic in received.keys() - known:
@@ -92,13 +75,13 @@ def _record(options: argparse.Namespace, given: Sequence[str]) -> int:
             bar.update(sum(recording.counts.values()) - bar.n)
     for topic, count in recording.counts.items():
         print(f'{count:8d}  {topic}')
-    n = sum(recording.counts.values())
+    n, passed = sum(recording.counts.values()), time.monotonic() - begin
     if n == 0:
         raise OptionsError(
-            f'no message received in {since(begin):.1f} s, {file} not written; expected nodes '
+            f'no message received in {passed:.1f} s, {file} not written; expected nodes '
             'running with the same ROS_DOMAIN_ID'
         )
-    print(f'{n} messages in {since(begin):.1f} s: {file}')
+    print(f'{n} messages in {passed:.1f} s: {file}')
     return 0
 
 

@@ -2,20 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replay an incident: plan again from the same inputs, and compare all collision checkers."""
 
-import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 import sys
 import traceback
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.file_question import plan_of
+from rrth_planner.cli.program import command_parser, run
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
-from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -42,55 +39,26 @@ example:    %(prog)s ~/.ros/log/rrth_planner/incident-20261121T213655123456-1f0c
 """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Replanned:
-    """Result of planning again: a plan, or an error with its traceback."""
-
-    plan: 'MotionPlan | None' = None
-    error: str = ''
-    sentence: str = ''
-    traceback: str = ''
-
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """The planned motion, certified or not."""
-        if self.plan is None:
-            return None
-        if self.plan.disagreement is not None:
-            return self.plan.disagreement.trajectory
-        return self.plan.trajectory
-
-    def __str__(self) -> str:
-        """Return it in a sentence."""
-        if self.plan is None:
-            return f'{self.error}: {self.sentence}'
-        return f'{self.plan.status.value}: {self.plan.sentence}'
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the incident of a file and return the exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        incident = read_incident(options.file)
-    except RrthError as problem:
-        say('replay', ' '.join(str(problem).split()))
-        return 2
-    return replay(incident)
+    parser = command_parser('replay', DESCRIPTION, EPILOG)
+    parser.add_argument('file', type=Path, metavar='FILE', help='YAML file of the incident')
+    options = parser.parse_args(arguments)
+    return run('replay', lambda: replay(read_incident(options.file)), 2)
 
 
 def replay(incident: Incident) -> int:
     """Plan again as in an incident, print the result, and return the exit code."""
     _print_record(incident)
-    replanned = plan_again(incident)
-    print(f'planned again: {replanned}')
-    if replanned.traceback:
-        print(replanned.traceback.rstrip())
+    planned = _plan_again(incident)
+    print(f'planned again: {_sentence_of(planned)}')
+    if isinstance(planned, Exception):
+        print(''.join(traceback.format_exception(planned)).rstrip())
     if incident.kind is IncidentKind.ERROR:
-        return _conclude_error(incident, replanned)
+        return _conclude_error(incident, planned)
     assert incident.trajectory is not None
-    is_same = is_same_motion(replanned.trajectory, incident.trajectory)
-    print(f'motion identical to the bit: {"yes" if is_same else "no"}')
-    comparison = compare_on_recorded(incident, incident.trajectory)
+    is_same = _is_same_motion(planned, incident.trajectory)
+    comparison = _compare_on_recorded(incident, incident.trajectory)
     _print_comparison(comparison, incident.question.margin)
     if is_same and comparison.is_disagreement:
         print('reproduced: the two collision checks disagree about the same motion as recorded')
@@ -106,24 +74,21 @@ def replay(incident: Incident) -> int:
     return 1
 
 
-def plan_again(incident: Incident) -> Replanned:
+def _plan_again(incident: Incident) -> 'MotionPlan | Exception':
     """Return the result of planning again from the request of an incident."""
-    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
-    from rrth_planner.kernels.precompile import prepare_kernels
-
-    prepare_kernels(partial(say, 'replay'))
-    from rrth_planner.pipeline.plan_motion import plan_question, warm_up
-
-    question = incident.question
     try:
-        # Compilation must not count as planning time.
-        warm_up(question.arm, question.options)
-        return Replanned(plan_question(question))
+        return plan_of(incident.question, 'replay')
     except Exception as problem:
-        return Replanned(None, type(problem).__name__, str(problem), traceback.format_exc())
+        return problem
 
 
-def compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionComparison':
+def _sentence_of(planned: 'MotionPlan | Exception') -> str:
+    if isinstance(planned, Exception):
+        return f'{type(planned).__name__}: {planned}'
+    return f'{planned.status.value}: {planned.sentence}'
+
+
+def _compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionComparison':
     """Compare the checkers on a motion, with the wearer that it was checked against."""
     from rrth_planner.collision.checker_comparison import compare_checkers
 
@@ -139,24 +104,33 @@ def compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionCo
     )
 
 
-def is_same_motion(one: Trajectory | None, other: Trajectory) -> bool:
-    """Return whether two motions are identical to the bit."""
-    return one is not None and all(
-        np.array_equal(getattr(one, name).view(np.int64), getattr(other, name).view(np.int64))
+def _is_same_motion(planned: 'MotionPlan | Exception', recorded: Trajectory) -> bool:
+    """Return whether the planned motion, certified or not, is the recorded one; print it."""
+    motion = None
+    if not isinstance(planned, Exception):
+        wrong = planned.disagreement
+        motion = planned.trajectory if wrong is None else wrong.trajectory
+    is_same = motion is not None and all(
+        np.array_equal(
+            getattr(motion, name).view(np.int64), getattr(recorded, name).view(np.int64)
+        )
         for name in ('times', 'positions', 'velocities', 'accelerations')
     )
+    print(f'motion identical to the bit: {"yes" if is_same else "no"}')
+    return is_same
 
 
-def _conclude_error(incident: Incident, replanned: Replanned) -> int:
-    if replanned.error == incident.error:
+def _conclude_error(incident: Incident, planned: 'MotionPlan | Exception') -> int:
+    is_error = isinstance(planned, Exception)
+    if is_error and type(planned).__name__ == incident.error:
         print(f'reproduced: {incident.error}, as recorded')
         return 0
-    if incident.trajectory is not None and replanned.plan is not None:
-        is_same = is_same_motion(replanned.trajectory, incident.trajectory)
-        print(f'motion identical to the bit: {"yes" if is_same else "no"}')
+    if incident.trajectory is not None and not is_error:
+        _is_same_motion(planned, incident.trajectory)
         print(f'not reproduced: the {incident.error} occurred after the motion had been planned')
     else:
-        print(f'not reproduced: recorded was {incident.error}, now: {replanned}')
+        now = _sentence_of(planned)
+        print(f'not reproduced: recorded was {incident.error}, now: {now}')
     return 1
 
 
@@ -189,28 +163,13 @@ def _print_comparison(comparison: 'MotionComparison', margin: float) -> None:
             f'  {name:>5} {piece.begin:9.4f} {piece.end:9.4f} {piece.certificate:>12} '
             f'{fcl.distance:12.7f} {piece.reference:13.7f}  {fcl.bar}, "{fcl.box}"'
         )
-    violation = comparison.violation
-    found = 'free'
-    if violation is not None:
-        found = (
-            f'{violation.bar} at {violation.distance:.7f} m from "{violation.box}" '
-            f'at {violation.time:.4f} s'
-        )
+    found, wrong = 'free', comparison.violation
+    if wrong is not None:
+        found = f'{wrong.bar} at {wrong.distance:.7f} m from "{wrong.box}" at {wrong.time:.4f} s'
     print(f'certificate: {"proven free" if comparison.is_proven else "not proven"}')
     print(f'python-fcl: {found}')
     word = 'keeps the margin' if comparison.clearance >= margin else 'below the margin'
     print(f'reference checker: least clearance {comparison.clearance:.7f} m, {word}')
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program('replay'),
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument('file', type=Path, metavar='FILE', help='YAML file of the incident')
-    return parser
 
 
 if __name__ == '__main__':

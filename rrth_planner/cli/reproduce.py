@@ -12,9 +12,9 @@ import platform
 import sys
 from typing import TYPE_CHECKING
 
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.program import command_parser, INTERRUPTED, say
 from rrth_planner.io.extras import require
-from rrth_planner.model.errors import NotInstalledError, OptionsError, RrthError
+from rrth_planner.model.errors import OptionsError, RrthError
 
 if TYPE_CHECKING:
     from rrth_planner.reproduction.experiments import Extent
@@ -28,13 +28,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         require('campaign', *LIBRARIES)
-    except NotInstalledError as problem:
+        # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
+        from rrth_planner.kernels.precompile import prepare_kernels
+
+        prepare_kernels(partial(say, 'reproduce'))
+        extent = _extent(options)
+    except RrthError as problem:
         say('reproduce', str(problem))
         return 2
-    # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
-    from rrth_planner.kernels.precompile import prepare_kernels
-
-    prepare_kernels(partial(say, 'reproduce'))
     from rrth_planner.reproduction.cluster import cluster_client, run_campaign
     from rrth_planner.reproduction.experiments import spread_runs, timed_runs
     from rrth_planner.reproduction.figures.all import draw_pictures
@@ -43,11 +44,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rrth_planner.reproduction.run import processor_name, source_digest
     from rrth_planner.reproduction.statistics import Rows
 
-    try:
-        extent = _extent(options)
-    except OptionsError as problem:
-        say('reproduce', str(problem))
-        return 2
     output = options.output or Path('build/reproduction' if options.quick else 'docs')
     data = options.data or output / 'reproduction.parquet'
     try:
@@ -69,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     except KeyboardInterrupt:
         print(f'interrupted; the next start continues from {data}', file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except (RrthError, OSError) as problem:
         say('reproduce', str(problem))
         return 1
@@ -98,48 +94,34 @@ def _extent(options: argparse.Namespace) -> 'Extent':
             arm=min(extent.arm, options.seeds),
             arm_modes=min(extent.arm_modes, options.seeds),
         )
-    if options.maps:
-        extent = replace(extent, maps=tuple(options.maps))
-    if options.targets:
-        extent = replace(extent, targets=tuple(options.targets))
-    return extent
+    return replace(
+        extent,
+        maps=tuple(options.maps or extent.maps),
+        targets=tuple(options.targets or extent.targets),
+    )
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=program('reproduce'), description=__doc__)
-    parser.add_argument('--quick', action='store_true', help='few runs: a minute or two')
-    parser.add_argument(
-        '--output',
-        type=Path,
-        help='folder of reproduction.md and its pictures (docs; --quick: build/reproduction)',
-    )
-    parser.add_argument(
-        '--data', type=Path, help='Parquet file of the runs (reproduction.parquet in the output)'
-    )
-    parser.add_argument(
-        '--runs',
-        type=_positive,
-        nargs='+',
-        metavar='N',
-        help='timed runs per planner and map; the fewest and most are reported (10 100)',
-    )
-    parser.add_argument(
-        '--seeds',
-        type=_positive,
-        metavar='N',
-        help='runs for each share and number of draws (1000)',
-    )
-    parser.add_argument('--maps', nargs='+', metavar='NAME', help='only these maps')
-    parser.add_argument(
-        '--targets', nargs='+', metavar='NAME', help='only these targets of the arm'
-    )
-    where = parser.add_mutually_exclusive_group()
-    where.add_argument(
+    parser = command_parser('reproduce', __doc__)
+    add = parser.add_argument
+    add('--quick', action='store_true', help='few runs: a minute or two')
+    output = 'folder of reproduction.md and its pictures (docs; --quick: build/reproduction)'
+    add('--output', type=Path, help=output)
+    data = 'Parquet file of the runs (reproduction.parquet in the output)'
+    add('--data', type=Path, help=data)
+    runs = 'timed runs per planner and map; the fewest and most are reported (10 100)'
+    add('--runs', type=_positive, nargs='+', metavar='N', help=runs)
+    seeds = 'runs for each share and number of draws (1000)'
+    add('--seeds', type=_positive, metavar='N', help=seeds)
+    add('--maps', nargs='+', metavar='NAME', help='only these maps')
+    add('--targets', nargs='+', metavar='NAME', help='only these targets of the arm')
+    add_where = parser.add_mutually_exclusive_group().add_argument
+    add_where(
         '--scheduler',
         metavar='tcp://HOST:PORT',
         help='address of a dask scheduler (default: a local cluster)',
     )
-    where.add_argument('--serial', action='store_true', help='run all in this process, one by one')
+    add_where('--serial', action='store_true', help='run all in this process, one by one')
     return parser
 
 
@@ -151,16 +133,10 @@ def _positive(text: str) -> int:
 
 def _portable(arguments: Sequence[str]) -> list[str]:
     """Return the arguments without what belongs to one machine: folders and addresses."""
-    kept, skip = [], False
-    for argument in arguments:
-        name = argument.partition('=')[0]
-        if skip:
-            skip = False
-        elif name in ('--output', '--data', '--scheduler'):
-            skip = '=' not in argument
-        else:
-            kept.append(argument)
-    return kept
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    for name in ('--output', '--data', '--scheduler'):
+        parser.add_argument(name)
+    return parser.parse_known_args(arguments)[1]
 
 
 if __name__ == '__main__':

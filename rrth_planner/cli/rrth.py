@@ -4,13 +4,13 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 
 from rrth_planner import __version__
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli import ros_parsers
+from rrth_planner.cli.program import command_parser, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.model.errors import NotInstalledError
@@ -24,34 +24,17 @@ the namespace. All parameters, with units, ranges and defaults, are in
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """
-    A command and its requirements.
-
-    Parameters
-    ----------
-    summary : str
-        What it does, for the list of all.
-    module : str
-        Of the package, with its `main`.
-    parser : str
-        Module with its `parser`, where `module` itself needs ROS to be loaded.
-    settings : str
-        The parameters of a node, which has no arguments of its own.
-    needs : tuple of str
-        Libraries that it requires.
-    extras : str
-        Extras of the package that install these.
-
-    """
+class Command(NamedTuple):
+    """A command: what it does, for the list of all, and what it requires."""
 
     summary: str
+    # With its `main`; where it needs ROS, its parser is in `cli.ros_parsers`.
     module: str
-    parser: str = ''
-    settings: str = ''
+    # Libraries that it requires before it is loaded, and the extras that install them.
     needs: tuple[str, ...] = ()
     extras: str = ''
+    # The parameters of a node, which has no arguments of its own.
+    settings: str = ''
 
 
 COMMANDS = {
@@ -63,39 +46,29 @@ COMMANDS = {
     'replay': Command('replay an incident', 'cli.replay'),
     'reproduce': Command("regenerate the paper's comparison", 'cli.reproduce'),
     'planner_node': Command(
-        'run the planner as a ROS node',
-        'ros.planner_node',
-        settings='config/planner.yaml',
-        needs=(ROS,),
-        extras='ros',
+        'run the planner as a ROS node', 'ros.planner_node', (ROS,), 'ros', 'config/planner.yaml'
     ),
     'playback_node': Command(
         'run a kinematic arm as a ROS node',
         'ros.playback_node',
-        settings='config/playback.yaml',
-        needs=(ROS,),
-        extras='ros',
+        (ROS,),
+        'ros',
+        'config/playback.yaml',
     ),
     'point_at': Command(
-        'point the arm and wait until it has arrived',
-        'cli.point_at',
-        parser='cli.point_at_options',
-        needs=(ROS, 'tqdm'),
-        extras='ros,tools',
+        'point the arm and wait until it has arrived', 'cli.point_at', (ROS, 'tqdm'), 'ros,tools'
     ),
     'record': Command(
         'record a run of the nodes in an MCAP file',
         'cli.record',
-        parser='cli.record_options',
-        needs=(ROS, 'mcap', 'tqdm'),
-        extras='ros,tools',
+        (ROS, 'mcap', 'tqdm'),
+        'ros,tools',
     ),
     'demo': Command(
         'run both nodes with a moving wearer; check and draw the motions',
         'cli.demo',
-        parser='cli.demo_options',
-        needs=(ROS, 'matplotlib'),
-        extras='ros',
+        (ROS, 'matplotlib'),
+        'ros',
     ),
 }
 
@@ -109,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     name, rest = given[0], given[1:]
     command = COMMANDS[name]
     own = rest[: rest.index('--ros-args')] if '--ros-args' in rest else rest
-    if not set(own).isdisjoint(HELP) and (command.parser or command.settings):
+    if ROS in command.needs and not set(own).isdisjoint(HELP):
         _parser_of(name).print_help()
         return 0
     try:
@@ -117,44 +90,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NotInstalledError as problem:
         say(name, str(problem))
         return WRONG
-    return int(_load(command.module).main(rest))
-
-
-def _load(module: str) -> Any:
-    return import_module(f'rrth_planner.{module}')
+    module: Any = import_module(f'rrth_planner.{command.module}')
+    return int(module.main(rest))
 
 
 def _parser_of(name: str) -> argparse.ArgumentParser:
     """Return the parser of a command that needs ROS, without loading ROS."""
     command = COMMANDS[name]
-    if command.parser:
-        found = _load(command.parser).parser()
-        assert isinstance(found, argparse.ArgumentParser)
-        return found
-    return argparse.ArgumentParser(
-        prog=program(name),
-        usage='%(prog)s [--ros-args ...]',
-        description=f'{command.summary[0].upper()}{command.summary[1:]}.',
-        epilog=NODE_HELP.format(resource_path(command.settings)),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser: argparse.ArgumentParser
+    if not command.settings:
+        parser = getattr(ros_parsers, name)()
+        return parser
+    help_of_node = NODE_HELP.format(resource_path(command.settings))
+    parser = command_parser(
+        name, f'{command.summary[0].upper()}{command.summary[1:]}.', help_of_node
     )
+    parser.usage = '%(prog)s [--ros-args ...]'
+    return parser
 
 
 def _parser() -> argparse.ArgumentParser:
-    lists = {
-        title: '\n'.join(
-            f'  {name:14} {command.summary}'
-            for name, command in COMMANDS.items()
-            if (ROS in command.needs) == is_ros
-        )
-        for title, is_ros in (('commands', False), ('commands that need ROS 2 Jazzy', True))
-    }
+    lists: dict[str, list[str]] = {}
+    for name, command in COMMANDS.items():
+        title = 'commands that need ROS 2 Jazzy' if ROS in command.needs else 'commands'
+        lists.setdefault(title, []).append(f'  {name:14} {command.summary}')
+    epilog = '\n\n'.join('\n'.join([f'{title}:', *lines]) for title, lines in lists.items())
     parser = argparse.ArgumentParser(
         prog='rrth',
         usage='%(prog)s COMMAND ...',
         description='Motion planner for a body-worn pointing arm.',
-        epilog='\n\n'.join(f'{title}:\n{text}' for title, text in lists.items())
-        + '\n\nrrth COMMAND --help describes each command.',
+        epilog=f'{epilog}\n\nrrth COMMAND --help describes each command.',
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')

@@ -8,22 +8,19 @@ from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import StringIO
 import os
-from pathlib import Path
-import signal
 import socket
 import sys
-from typing import Any, NoReturn
+from typing import Any
 import webbrowser
 
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.file_question import question_of
+from rrth_planner.cli.program import add_files, add_target, interrupt_on_signals, program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.errors import OptionsError, RrthError
-from rrth_planner.model.goal import PointingGoal
-from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.examples import example_target, start_of
 from rrth_planner.visualization.viewer.screenshot import save_picture
 
@@ -36,10 +33,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     at = given.index(ROS_ARGS) if ROS_ARGS in given else len(given)
     options, ros_args = _parse(given[:at]), given[at:]
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, _end)
+    interrupt_on_signals()
     try:
-        _run(options, ros_args)
+        if ros_args and not options.live:
+            raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
+        require('tools', 'viser')
+        if options.live:
+            _run_live(options, ros_args)
+        else:
+            _run_planning(options)
     except (RrthError, OSError) as problem:
         say('viewer', ' '.join(str(problem).split()))
         return 1
@@ -55,55 +57,33 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         'Ctrl-C ends it.',
         epilog=f'With --live, arguments after {ROS_ARGS} are passed to ROS: remaps, parameters.',
     )
-    parser.add_argument('--arm', type=Path, metavar='FILE', help='the arm, as config/arm.yaml')
-    parser.add_argument('--body', type=Path, metavar='FILE', help=WEARER_HELP)
-    parser.add_argument(
-        '--settings', type=Path, metavar='FILE', help='parameters, laid out as config/planner.yaml'
+    add_files(
+        parser,
+        arm='the arm, as config/arm.yaml',
+        body=WEARER_HELP,
+        settings='parameters, laid out as config/planner.yaml',
     )
-    parser.add_argument(
-        '--target',
-        type=float,
-        nargs=3,
-        metavar=('X', 'Y', 'Z'),
-        help='initially [m] (1.5 0.1 0.3)',
-    )
-    parser.add_argument(
+    add_target(parser, 'initially [m] (1.5 0.1 0.3)', required=False)
+    add = parser.add_argument
+    add(
         '--set',
         action='append',
         default=[],
         metavar='NAME=VALUE',
         help='a parameter of config/planner.yaml, e.g. seed=3; may be repeated',
     )
-    parser.add_argument('--host', default='127.0.0.1', help='address to listen on (%(default)s)')
-    parser.add_argument(
-        '--port', type=int, default=PORT, help='port to listen on; 0: any free one (%(default)s)'
-    )
-    parser.add_argument(
+    add('--host', default='127.0.0.1', help='address to listen on (%(default)s)')
+    port = 'port to listen on; 0: any free one (%(default)s)'
+    add('--port', type=int, default=PORT, help=port)
+    add(
         '--open',
         action=argparse.BooleanOptionalAction,
         default=None,
         help='open the page in the browser (default: if there is a display)',
     )
-    parser.add_argument(
-        '--live', action='store_true', help='show the running nodes instead of planning'
-    )
-    parser.add_argument(
-        '--screenshot',
-        type=Path,
-        metavar='FILE',
-        help='save a picture of the page with the arm at the goal, and exit',
-    )
+    add('--live', action='store_true', help='show the running nodes instead of planning')
+    add_files(parser, screenshot='save a picture of the page with the arm at the goal, and exit')
     return parser.parse_args(arguments)
-
-
-def _run(options: argparse.Namespace, ros_args: list[str]) -> None:
-    if ros_args and not options.live:
-        raise OptionsError(f'{ROS_ARGS}: given, expected only with --live')
-    require('tools', 'viser')
-    if options.live:
-        _run_live(options, ros_args)
-    else:
-        _run_planning(options)
 
 
 def _run_planning(options: argparse.Namespace) -> None:
@@ -111,7 +91,16 @@ def _run_planning(options: argparse.Namespace) -> None:
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 
-    question = _question(options)
+    arm, changes = load_arm(options.arm), {}
+    for text in options.set:
+        name, sign, value = text.partition('=')
+        if not sign:
+            raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
+        changes[name] = parse_yaml(value, f'--set {name}')
+    settings = load_settings(arm.dof, options.settings, **changes)
+    target = example_target('front') if options.target is None else options.target
+    scene, q_start = load_body(options.body), start_of(arm)
+    question = question_of(arm, scene, q_start, target, settings, max(0, settings.seed))
     prepare_kernels(partial(say, 'viewer'))
     from rrth_planner.pipeline.plan_motion import warm_up
     from rrth_planner.visualization.viewer.page import ViewerPage
@@ -149,35 +138,6 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
         LivePage(server, feed).run()
 
 
-def _question(options: argparse.Namespace) -> PlanQuestion:
-    arm = load_arm(options.arm)
-    settings = load_settings(arm.dof, options.settings, **_changes(options.set))
-    target = example_target('front') if options.target is None else options.target
-    return PlanQuestion(
-        arm=arm,
-        scene=load_body(options.body),
-        q_start=start_of(arm),
-        goal=PointingGoal(target),
-        limits=settings.limits,
-        options=settings.options,
-        margin=settings.margin,
-        ray_guard_length=settings.ray_guard_length,
-        seed=max(0, settings.seed),
-        escape_depth=settings.escape_depth,
-    )
-
-
-def _changes(given: Sequence[str]) -> dict[str, Any]:
-    """Return the values that are given as NAME=VALUE, or raise OptionsError."""
-    changes = {}
-    for text in given:
-        name, sign, value = text.partition('=')
-        if not sign:
-            raise OptionsError(f'--set {text}: expected NAME=VALUE, as seed=3')
-        changes[name] = parse_yaml(value, f'--set {name}')
-    return changes
-
-
 @contextmanager
 def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
     """Serve an empty page while the block runs; give the server and the page's address."""
@@ -187,7 +147,8 @@ def _served(options: argparse.Namespace) -> Iterator[tuple[Any, str]]:
     # It draws a box round its address, whether verbose or not.
     with redirect_stdout(StringIO()):
         server = viser.ViserServer(host=options.host, port=port, verbose=False)
-    url = f'http://{_host_of_page(options.host)}:{server.get_port()}'
+    host = 'localhost' if options.host in ('0.0.0.0', '::') else options.host
+    url = f'http://{f"[{host}]" if ":" in host else host}:{server.get_port()}'
     print(f'The viewer is at {url} (Ctrl-C ends it).', flush=True)
     has_display = any(os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY'))
     is_wanted = has_display and options.screenshot is None
@@ -214,18 +175,6 @@ def _free_port(host: str, port: int) -> int:
             f'--host {host} --port {port}: {problem}; expected an address of this machine and a '
             'port that is free (--port 0: any that is)'
         ) from problem
-
-
-def _host_of_page(host: str) -> str:
-    """Return what stands for a host in the address of a page."""
-    if host in ('0.0.0.0', '::'):
-        return 'localhost'
-    return f'[{host}]' if ':' in host else host
-
-
-def _end(*_: Any) -> NoReturn:
-    """Turn a signal into an interrupt."""
-    raise KeyboardInterrupt
 
 
 if __name__ == '__main__':

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.cli.program import program, say
+from rrth_planner.cli.program import add_files, command_parser, run
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.io.urdf.export import arm_to_urdf
-from rrth_planner.model.errors import ModelError, RrthError
+from rrth_planner.model.errors import ModelError
 
 DESCRIPTION = """\
 Write an arm as a URDF, from the DH rows that the planner uses: a link for each frame,
@@ -33,41 +33,27 @@ example:    %(prog)s --arm my_arm.yaml --output my_arm.urdf
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the URDF and return the exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        text = urdf_of_file(options.arm, options.settings, options.radius, options.base_frame)
-        if options.output is None:
-            print(text, end='')
-        else:
-            _write(options.output, text)
-    except RrthError as problem:
-        say('write_urdf', str(problem))
-        return 2
-    return 0
+    parser = command_parser('write_urdf', DESCRIPTION, EPILOG)
+    add_files(
+        parser,
+        arm='the arm, as config/arm.yaml (default: that one)',
+        settings='parameters of the node, as config/planner.yaml (default: those)',
+        output='file to write (default: standard output)',
+    )
+    radius = 'radius of bars that have none of their own [m] (default: %(default)s)'
+    parser.add_argument('--radius', type=float, default=0.015, metavar='M', help=radius)
+    frame = 'link that the arm is mounted on, as base_frame of the node (default: %(default)s)'
+    parser.add_argument('--base-frame', default='torso', metavar='NAME', help=frame)
+    options = parser.parse_args(arguments)
+    return run('write_urdf', lambda: _export(options), 2)
 
 
-def urdf_of_file(
-    arm_file: Path | None = None,
-    settings_file: Path | None = None,
-    radius: float = 0.015,
-    base_frame: str = 'torso',
-) -> str:
-    """
-    Return the URDF of an arm's file, named as there; without files, those of the package.
-
-    Raises
-    ------
-    RrthError
-        A file that cannot be read, or that describes no arm or no settings.
-
-    """
-    arm = load_arm(arm_file)
-    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
-    speeds = load_settings(arm.dof, settings_file).limits.velocity
-    return arm_to_urdf(arm, speeds, radius, base_frame, name)
-
-
-def _write(path: Path, text: str) -> None:
+def _export(options: argparse.Namespace) -> None:
+    text = urdf_of_file(options.arm, options.settings, options.radius, options.base_frame)
+    path: Path | None = options.output
+    if path is None:
+        print(text, end='')
+        return
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding='utf-8')
@@ -77,39 +63,17 @@ def _write(path: Path, text: str) -> None:
         ) from problem
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=program('write_urdf'),
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument(
-        '--arm', type=Path, metavar='FILE', help='the arm, as config/arm.yaml (default: that one)'
-    )
-    parser.add_argument(
-        '--settings',
-        type=Path,
-        metavar='FILE',
-        help='parameters of the node, as config/planner.yaml (default: those)',
-    )
-    parser.add_argument(
-        '--output', type=Path, metavar='FILE', help='file to write (default: standard output)'
-    )
-    parser.add_argument(
-        '--radius',
-        type=float,
-        default=0.015,
-        metavar='M',
-        help='radius of bars that have none of their own [m] (default: %(default)s)',
-    )
-    parser.add_argument(
-        '--base-frame',
-        default='torso',
-        metavar='NAME',
-        help='link that the arm is mounted on, as base_frame of the node (default: %(default)s)',
-    )
-    return parser
+def urdf_of_file(
+    arm_file: Path | None = None,
+    settings_file: Path | None = None,
+    radius: float = 0.015,
+    base_frame: str = 'torso',
+) -> str:
+    """Return the URDF of an arm's file, named as there; without files, those of the package."""
+    arm = load_arm(arm_file)
+    name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
+    speeds = load_settings(arm.dof, settings_file).limits.velocity
+    return arm_to_urdf(arm, speeds, radius, base_frame, name)
 
 
 if __name__ == '__main__':

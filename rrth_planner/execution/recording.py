@@ -5,10 +5,10 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from rrth_planner.collision.world import arm_world, World
+from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import RecordError
@@ -21,18 +21,8 @@ STOPPING = 'stopping'
 DIAGNOSTICS_DELAY = 0.3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CommandedMotion:
-    """
-    A commanded motion.
-
-    Parameters
-    ----------
-    begin : float
-        When it begins [s].
-    trajectory : Trajectory
-
-    """
+class CommandedMotion(NamedTuple):
+    """A commanded motion, and when it begins [s]."""
 
     begin: float
     trajectory: Trajectory
@@ -42,6 +32,8 @@ class CommandedMotion:
 class Recording:
     """
     A run on one clock, whose zero is where the recording begins.
+
+    Raises RecordError for no instant at all, shapes that differ, times that do not increase.
 
     Parameters
     ----------
@@ -57,11 +49,6 @@ class Recording:
         From when [s] the target was where, (3,) in the base frame [m].
     monitor_states : sequence of (float, str)
         From when [s] the monitor was in which state.
-
-    Raises
-    ------
-    RecordError
-        No instant at all, shapes that differ, times that do not increase.
 
     """
 
@@ -90,11 +77,7 @@ def section(recording: Recording, begin: float, end: float) -> Recording:
     """
     Return the run from one time to another [s]; the zero of the clock stays.
 
-    Raises
-    ------
-    RecordError
-        There are no joint states then.
-
+    Raises RecordError where there are no joint states then.
     """
     chosen = (recording.times >= begin) & (recording.times <= end)
     if not chosen.any():
@@ -142,13 +125,13 @@ def measured_clearances(recording: Recording, arm: ArmModel, ray_guard_length: f
     there was no wearer yet.
     """
     result = np.full(len(recording.times), np.nan)
-    worlds: dict[int, World] = {}
+    shown: Scene | None = None
     for i, (time, q) in enumerate(zip(recording.times, recording.positions, strict=True)):
         scene = at(recording.bodies, float(time))
         if scene is not None and scene.boxes:
-            if id(scene) not in worlds:
-                worlds = {id(scene): arm_world(arm, scene, 0.0, ray_guard_length)}
-            result[i] = worlds[id(scene)].clearances(q).min()
+            if scene is not shown:
+                shown, world = scene, arm_world(arm, scene, 0.0, ray_guard_length)
+            result[i] = world.clearances(q).min()
     return result
 
 

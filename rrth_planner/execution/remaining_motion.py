@@ -36,15 +36,8 @@ def with_lead_in(
     """
     Return a motion that begins a little later, preceded by the present motion until then.
 
-    Parameters
-    ----------
-    before : ExecutingMotion
-        The motion until then.
-    phase, now : float
-        The time within it that the arm is at now, and now [s].
-    after : ExecutingMotion
-        The next one; returned as it is where it does not continue `before`.
-
+    The arm is now at the time `phase` within the motion before [s]. The motion after is returned
+    as it is where it does not continue that.
     """
     duration = before.trajectory.duration
     if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:
@@ -84,94 +77,19 @@ def is_remaining_free(
     """
     Return whether the remaining motion is proven free of the present wearer.
 
-    Parameters
-    ----------
-    running : ExecutingMotion
-    phase : float
-        Time within the motion that the arm is at [s].
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    margin, ray_guard_length : float
-        [m].
-
+    The arm is at a time `phase` within it [s], the scene is in the base frame, `margin` and
+    `ray_guard_length` are in metres. At the end the ray must be free up to the target.
     """
-    trajectory = running.trajectory
-    checked = phase
+    trajectory, begin = running.trajectory, phase
     if phase < running.escape_time:
         world = arm_world(arm, scene, margin, ray_guard_length)
         if not leads_out(trajectory, world, running.escape_time, phase):
             return False
-        checked = running.escape_time
-    return _is_certified(running, checked, arm, scene, margin, ray_guard_length)
-
-
-def escapes_by_continuing(
-    running: ExecutingMotion,
-    phase: float,
-    arm: ArmModel,
-    scene: Scene,
-    *,
-    margin: float,
-    ray_guard_length: float,
-) -> bool:
-    """
-    Return whether the arm violates the margin now, and is proven to escape by continuing.
-
-    Then no clearance decreases below its present value or below the margin, and the motion ends
-    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
-    violation lies ahead this is False: a stop, along the same path, is never nearer to it.
-
-    Parameters
-    ----------
-    running, phase, arm, scene, margin, ray_guard_length
-        As for `is_remaining_free`.
-
-    """
-    trajectory = running.trajectory
-    here = positions_at(trajectory, [phase])[0]
-    # Most often it is, and a stop waits for the answer.
-    if is_place_free(here, arm, scene, margin, ray_guard_length):
-        return False
-    world = arm_world(arm, scene, margin, ray_guard_length)
-    return world.is_valid(
-        trajectory.positions[-1], max(ray_guard_length, running.target_distance)
-    ) and leads_out(trajectory, world, trajectory.duration, phase)
-
-
-def is_place_free(
-    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
-) -> bool:
-    """
-    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
-
-    With the margin, and with the pointing ray up to `ray_guard_length` [m].
-    """
-    _, chain = arm_rows(arm, ray_guard_length)
-    boxes, T_arm_base = scene.numbers, mount_inverse(arm)
-    depth = tree_depth(len(scene.boxes))
-    return bool(
-        trajectory_check.is_place_free(
-            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
-        )
-    )
-
-
-def _is_certified(
-    running: ExecutingMotion,
-    begin: float,
-    arm: ArmModel,
-    scene: Scene,
-    margin: float,
-    ray_guard_length: float,
-) -> bool:
-    """Return `certify` of the remaining motion, and of its end with the ray to the target."""
-    trajectory = running.trajectory
+        begin = running.escape_time
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        return world.is_valid(
-            trajectory.positions[0], max(ray_guard_length, running.target_distance)
-        )
+        reach = max(ray_guard_length, running.target_distance)
+        return world.is_valid(trajectory.positions[0], reach)
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_remaining_motion_free(
@@ -190,5 +108,51 @@ def _is_certified(
             tree_depth(len(scene.boxes)),
             BERNSTEIN_4,
             BERNSTEIN_3,
+        )
+    )
+
+
+def escapes_by_continuing(
+    running: ExecutingMotion,
+    phase: float,
+    arm: ArmModel,
+    scene: Scene,
+    *,
+    margin: float,
+    ray_guard_length: float,
+) -> bool:
+    """
+    Return whether the arm violates the margin now, and is proven to escape by continuing.
+
+    Then no clearance decreases below its present value or below the margin, and the motion ends
+    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
+    violation lies ahead this is False: a stop, along the same path, is never nearer to it. The
+    parameters are those of `is_remaining_free`.
+    """
+    trajectory = running.trajectory
+    here = positions_at(trajectory, [phase])[0]
+    # Most often it is, and a stop waits for the answer.
+    if is_place_free(here, arm, scene, margin, ray_guard_length):
+        return False
+    world = arm_world(arm, scene, margin, ray_guard_length)
+    reach = max(ray_guard_length, running.target_distance)
+    is_end_free = world.is_valid(trajectory.positions[-1], reach)
+    return is_end_free and leads_out(trajectory, world, trajectory.duration, phase)
+
+
+def is_place_free(
+    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
+) -> bool:
+    """
+    Return whether the arm is free at q, shape (dof,) [rad], regardless of its joint limits.
+
+    With the margin, and with the pointing ray up to `ray_guard_length` [m].
+    """
+    _, chain = arm_rows(arm, ray_guard_length)
+    boxes, T_arm_base = scene.numbers, mount_inverse(arm)
+    depth = tree_depth(len(scene.boxes))
+    return bool(
+        trajectory_check.is_place_free(
+            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
         )
     )

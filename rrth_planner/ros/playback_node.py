@@ -20,8 +20,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
-from rrth_planner.execution.acceptance import accept
-from rrth_planner.execution.playback import Playback, standing, stop
+from rrth_planner.execution.playback import accept, Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.interface.playback_parameters import (
@@ -61,11 +60,9 @@ class PlaybackNode(Node):
         self._pose = PoseStamped()
         # Since when the messages above hold the final state of the arm [s].
         self._rest_published = float('inf')
+        # Volatile: an old latched motion must not start by itself.
         reliable = QoSProfile(
-            depth=1,
-            reliability=ReliabilityPolicy.RELIABLE,
-            # An old latched motion must not start by itself.
-            durability=DurabilityPolicy.VOLATILE,
+            depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
         )
         self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
         self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
@@ -84,9 +81,8 @@ class PlaybackNode(Node):
             raw=True,
         )
         self.create_service(Trigger, '~/stop', self._on_stop, qos_profile=SERVICE)
-        self.create_timer(
-            1.0 / self.get_parameter('rate').value, self._publish, clock=self._motion_clock
-        )
+        period = 1.0 / self.get_parameter('rate').value
+        self.create_timer(period, self._publish, clock=self._motion_clock)
 
     def _now(self) -> tuple[float, int]:
         """Return the present on the clock of the motion [s], and on the node's clock [ns]."""
@@ -153,9 +149,8 @@ class PlaybackNode(Node):
                 )
             )
         except RrthError as problem:
-            stays = (
-                'continues its motion' if time < self._playback.end_time else 'holds its position'
-            )
+            is_moving = time < self._playback.end_time
+            stays = 'continues its motion' if is_moving else 'holds its position'
             self.get_logger().warning(f'joint_trajectory rejected, arm {stays}: {problem}')
             return
         self.get_logger().info(
@@ -178,12 +173,8 @@ class PlaybackNode(Node):
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         left = self._stop()
-        response.success = True
-        response.message = (
-            f'SUCCESS (1): stop along the path, at rest in {left:.2f} s'
-            if left > 0.0
-            else 'SUCCESS (1): already at rest'
-        )
+        what = f'stop along the path, at rest in {left:.2f} s' if left > 0.0 else 'already at rest'
+        response.success, response.message = True, f'SUCCESS (1): {what}'
         self.get_logger().info(f'stop: {response.message}')
         return response
 

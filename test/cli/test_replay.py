@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.localization import predict_start_state
+from rrth_planner.execution.executing_motion import predict_start_state
 from rrth_planner.io.incident import disagreement_incident, error_incident, IncidentKind
 from rrth_planner.io.incident_file import write_incident
 from rrth_planner.model.goal import PointingGoal

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command of an installation by pip, also where ROS and the extras are missing."""
 
+import os
 from pathlib import Path
 import re
 import subprocess
@@ -100,6 +101,23 @@ def test_what_is_no_command_is_answered_by_rrth_itself(arguments, code, told, ca
     assert end.value.code == code
     said = capsys.readouterr()
     assert told in (said.err if code else said.out)
+
+
+def test_a_reader_that_has_ended_ends_a_command_silently():
+    pytest.importorskip('yaml')
+    # Of two processes that share a pipe, the one that reads is gone before the other prints.
+    read, write = os.pipe()
+    os.close(read)
+    ended = subprocess.run(
+        [sys.executable, '-m', 'rrth_planner.cli.rrth', 'write_urdf'],
+        stdout=write,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (141, '')
 
 
 def test_the_readme_lists_every_command():

@@ -77,6 +77,7 @@ LATE = {
         f'rrth_planner.cli.{name}'
         for name in (
             *('plan', 'plot', 'point_at', 'read_urdf', 'record', 'replay', 'reproduce', 'viewer'),
+            'file_question',
         )
     ),
 }

@@ -298,6 +298,7 @@ def turn(to, duration):
 
 def test_a_motion_of_another_machine_is_ignored(client):
     arm = load_arm()
+    client.joint_names = arm.joint_names
     first, message = turn(np.array(FOLDED) + 0.1, 0.1)
     second, newer = turn(np.array(FOLDED) + 0.2, 0.2)
     other = JointTrajectory(joint_names=['wheel'])
@@ -318,15 +319,15 @@ def test_a_motion_of_another_machine_is_ignored(client):
 
     client.take_messages = take_messages
     follow(client, arm, first, None, 1e-3)
-    assert client.positions(arm.joint_names).tolist() == second.positions[-1].tolist()
+    assert client.positions().tolist() == second.positions[-1].tolist()
 
 
 def test_joint_positions_that_are_none_do_not_count(client):
-    client._joint_names = load_arm().joint_names
+    client.joint_names = load_arm().joint_names
     client._on_state(joints(FOLDED), ARRIVAL)
     for bad in (joints(FOLDED[:2]), joints([float('nan')] * 4), JointState(name=['wheel'])):
         client._on_state(bad, ARRIVAL)
-    assert client.positions(client._joint_names).tolist() == FOLDED
+    assert client.positions().tolist() == FOLDED
     assert len(client.observed) == 1
 
 

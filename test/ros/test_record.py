@@ -25,10 +25,10 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
 from rrth_planner.cli.plot import main as plot  # noqa: E402
-from rrth_planner.cli.record import TOPICS, TYPES  # noqa: E402
+from rrth_planner.cli.ros_parsers import TOPICS  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.ros.client.recording_reader import RecordingReader  # noqa: E402
-from rrth_planner.ros.messages.definitions import definition_of, type_name  # noqa: E402
+from rrth_planner.ros.messages.definitions import definition_of, type_name, type_of_name  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from samples import target, wearer  # noqa: E402
@@ -160,8 +160,7 @@ def test_a_recorder_ends_well_and_says_what_it_has(run):
 def test_all_topics_of_a_run_are_there_with_their_types(run):
     with rosbags.AnyReader([run[0]]) as reader:
         types = {c.topic.lstrip('/'): c.msgtype for c in reader.connections}
-    expected = zip(TOPICS, TYPES, strict=True)
-    assert types == {topic.lstrip('/'): type_name(kind) for topic, kind in expected}
+    assert types == {topic.lstrip('/'): name for topic, name in TOPICS.items()}
 
 
 def test_the_recorded_trajectory_is_the_received_one(run):
@@ -370,10 +369,9 @@ def test_a_disk_that_is_full_ends_the_recording_with_one_sentence(tmp_path):
     assert said == f'{path}: File too large, expected to write there'
 
 
-@pytest.mark.parametrize('kind', [*dict.fromkeys([*TYPES, String])], ids=type_name)
-def test_definitions_are_those_that_others_know(kind):
-    name = type_name(kind)
-    found = get_types_from_msg(definition_of(kind), name)
+@pytest.mark.parametrize('name', [*dict.fromkeys([*TOPICS.values(), type_name(String)])])
+def test_definitions_are_those_that_others_know(name):
+    found = get_types_from_msg(definition_of(type_of_name(name)), name)
     known = get_typestore(Stores.ROS2_JAZZY).fielddefs
     assert name in found
     for inner, definition in found.items():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import quintic_states
-from rrth_planner.execution.localization import predict_start_state, sharp_phase_of
+from rrth_planner.execution.executing_motion import predict_start_state, sharp_phase_of
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path

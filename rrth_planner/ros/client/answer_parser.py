@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parser of the answers of a planner: code, sentence and figures."""
 
-from dataclasses import dataclass
 import re
+from typing import NamedTuple
 
 from rrth_planner.model.errors import MessageError, one_line, shown
 from rrth_planner.ros.messages.error_codes import ErrorCode
@@ -22,19 +22,12 @@ FIGURES = {
 WHOLE = ('waypoints', 'seed')
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """
     An answer of the planner.
 
-    Parameters
-    ----------
-    code : ErrorCode
-    sentence : str
-    figures : dict of str to float
-        `waypoints`, `duration` [s], `path_length` [rad], `least_clearance` [m],
-        `planning_time_ms` and `seed`, as far as the sentence has them.
-
+    The figures are `waypoints`, `duration` [s], `path_length` [rad], `least_clearance` [m],
+    `planning_time_ms` and `seed`, as far as the sentence has them.
     """
 
     code: ErrorCode
@@ -43,15 +36,7 @@ class Answer:
 
 
 def answer_from_text(text: str) -> Answer:
-    """
-    Return the answer that a text is, `NAME (number): sentence`.
-
-    Raises
-    ------
-    MessageError
-        It is none.
-
-    """
+    """Return the answer that a text `NAME (number): sentence` is, or raise MessageError."""
     # An answer may hold anything; what is read of it may be printed.
     text = one_line(text)
     found = ANSWER.fullmatch(text)

@@ -13,8 +13,7 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
-from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome
-from rrth_planner.ros.requests.revalidation import Revalidation
+from rrth_planner.ros.requests.plan_request import plan_request
 from visualization_msgs.msg import MarkerArray
 
 
@@ -27,21 +26,8 @@ def plan_without_moving(
     """
     Return what the planner would answer, and by how much the motion would miss the target [m].
 
-    Parameters
-    ----------
-    client : PlannerClient
-        Receives the joint states.
-    parameters : PlannerParameters
-        Of the planner.
-    target : PointStamped
-    body : MarkerArray or None
-        None: what is inputs on `body_boxes`.
-
-    Raises
-    ------
-    NotInTimeError
-        No joint positions, or no body.
-
+    Without a body the one on `body_boxes` counts. Raises NotInTimeError where there are no joint
+    positions, or no body.
     """
     inputs = Inputs(
         *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
@@ -68,13 +54,17 @@ def plan_without_moving(
 
     if body is not None:
         inputs.body.accept(lambda: WearerBody().apply(body, now(), parameters.base_frame), now())
-    outcome = plan_request(inputs, parameters, now, planner, lambda: False, _is_in_time, goal)
+    # Not published, a motion counts as long as it could be.
+    outcome = plan_request(
+        inputs,
+        parameters,
+        now,
+        planner,
+        lambda: False,
+        lambda _, revalidation: not revalidation.is_late(),
+        goal,
+    )
     error = None
     if outcome.trajectory is not None:
         error = pointing_error(parameters.arm, outcome.trajectory.positions[-1], goal.target)
     return answer_from_text(answer(outcome.code, outcome.sentence)), error
-
-
-def _is_in_time(_: PlanOutcome, revalidation: Revalidation) -> bool:
-    """Return whether a motion could still be published."""
-    return not revalidation.is_late()

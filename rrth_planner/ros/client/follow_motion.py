@@ -5,7 +5,6 @@
 from collections.abc import Sequence
 from contextlib import suppress
 import time
-from typing import Any
 
 import numpy as np
 from rrth_planner.model.arm import ArmModel, pointing_error
@@ -30,16 +29,14 @@ SPACING = 0.01
 
 def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> Trajectory:
     """Return the motion of an answer with this duration [s], once it was received."""
-    found: list[Trajectory] = []
 
-    def is_received() -> bool:
+    def received() -> list[Trajectory]:
         # The motion of an earlier request, latched on the topic, may come first.
         motions = _motions_of(client.commanded, arm)
-        found[:] = [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
-        return bool(found)
+        return [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
 
-    client.wait_for(is_received, f'{client.resolve_topic_name("joint_trajectory")}')
-    return found[-1]
+    client.wait_for(lambda: bool(received()), client.resolve_topic_name('joint_trajectory'))
+    return received()[-1]
 
 
 def follow(
@@ -52,23 +49,13 @@ def follow(
     """
     Return once the arm stands at the end of its motion, or of one that has replaced it.
 
-    Parameters
-    ----------
-    client : PlannerClient
-    arm : ArmModel
-    motion : Trajectory
-        The commanded one.
-    target : ndarray, shape (3,), or None
-        A motion that does not point there, as a stop, is not the last one [m].
-    tolerance : float
-        Greatest distance of a joint from the end [rad].
-
-    Raises
-    ------
-    NotInTimeError
-        It does not end within the duration of the motion and the client's timeout.
-
+    A motion that does not point to the target, (3,) [m], as a stop, is not the last one. A joint
+    may be off the end by the tolerance [rad]. Raises NotInTimeError where the arm is not there
+    within the duration of the motion and the client's timeout.
     """
+    n_commanded = len(client.commanded)
+    begin = present = time.monotonic()
+    arrived_at: float | None = None
     with tqdm(
         total=round(motion.duration, 2),
         desc='the arm moves',
@@ -78,42 +65,38 @@ def follow(
         # Only on a terminal.
         disable=None,
     ) as bar:
-        _follow(client, arm, motion, target, tolerance, bar)
-
-
-def _follow(
-    client: PlannerClient,
-    arm: ArmModel,
-    motion: Trajectory,
-    target: Array | None,
-    tolerance: float,
-    bar: Any,
-) -> None:
-    n_commanded = len(client.commanded)
-    begin = present = time.monotonic()
-    arrived_at: float | None = None
-    while present - begin <= motion.duration + client.timeout:
-        client.take_messages(0.02)
-        present = time.monotonic()
-        newer, n_commanded = (
-            _motions_of(client.commanded[n_commanded:], arm),
-            len(client.commanded),
+        while present - begin <= motion.duration + client.timeout:
+            client.take_messages(0.02)
+            present = time.monotonic()
+            newer = _motions_of(client.commanded[n_commanded:], arm)
+            n_commanded = len(client.commanded)
+            if newer:
+                # The wearer moved, and the planner stopped the arm or replanned.
+                motion, begin, arrived_at = newer[-1], present, None
+                bar.reset(total=round(motion.duration, 2))
+            bar.n = max(bar.n, _time_along(motion, client.positions()))
+            bar.refresh()
+            is_there = client.is_still_at(motion.positions[-1], tolerance, REST_SPEED)
+            if not is_there or present - begin < motion.duration:
+                arrived_at = None
+                continue
+            arrived_at = present if arrived_at is None else arrived_at
+            if present - arrived_at >= SETTLED and _aims_at(arm, motion, target):
+                return
+    topic = client.resolve_topic_name('joint_trajectory')
+    if not _aims_at(arm, motion, target):
+        raise NotInTimeError(
+            'the arm was stopped, and no motion to the target was published on '
+            f'{topic} within {client.timeout:g} s'
         )
-        if newer:
-            # The wearer moved, and the planner stopped the arm or replanned.
-            motion, begin, arrived_at = newer[-1], present, None
-            bar.reset(total=round(motion.duration, 2))
-        q = client.positions(arm.joint_names)
-        bar.n = max(bar.n, _time_along(motion, q))
-        bar.refresh()
-        is_there = client.is_still_at(motion.positions[-1], arm.joint_names, tolerance, REST_SPEED)
-        if not is_there or present - begin < motion.duration:
-            arrived_at = None
-            continue
-        arrived_at = present if arrived_at is None else arrived_at
-        if present - arrived_at >= SETTLED and _aims_at(arm, motion, target):
-            return
-    raise NotInTimeError(_why(client, arm, motion, target, tolerance))
+    gaps = np.abs(client.positions() - motion.positions[-1])
+    k = int(np.argmax(gaps))
+    hint = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
+    raise NotInTimeError(
+        f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
+        f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
+        f'{client.timeout:g} s more{hint}'
+    )
 
 
 def _motions_of(commanded: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:
@@ -134,26 +117,3 @@ def _time_along(motion: Trajectory, q: Array) -> float:
 
 def _aims_at(arm: ArmModel, motion: Trajectory, target: Array | None) -> bool:
     return target is None or pointing_error(arm, motion.positions[-1], target) <= OTHER_TARGET
-
-
-def _why(
-    client: PlannerClient,
-    arm: ArmModel,
-    motion: Trajectory,
-    target: Array | None,
-    tolerance: float,
-) -> str:
-    topic = client.resolve_topic_name('joint_trajectory')
-    if not _aims_at(arm, motion, target):
-        return (
-            'the arm was stopped, and no motion to the target was published on '
-            f'{topic} within {client.timeout:g} s'
-        )
-    gaps = np.abs(client.positions(arm.joint_names) - motion.positions[-1])
-    k = int(np.argmax(gaps))
-    hint = '' if client.count_arms() > 0 else f'; {topic} has no other subscriber'
-    return (
-        f'{arm.joint_names[k]} is {gaps[k]:.4f} from the end of its motion of '
-        f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
-        f'{client.timeout:g} s more{hint}'
-    )

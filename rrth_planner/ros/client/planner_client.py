@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node that publishes body and target, requests motions, and follows the arm."""
+"""Clients of a planner: nodes that publish body and target, request motions, follow the arm."""
 
 from collections.abc import Callable, Sequence
 import time
@@ -12,41 +12,52 @@ import numpy as np
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.ros.client.answer_parser import answer_from_text
+from rrth_planner.ros.interface.parameters import (
+    declared,
+    parameters_from_values,
+    PlannerParameters,
+)
 from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
+from rrth_planner.ros.middleware.parameter_declaration import ARM
 from rrth_planner.ros.middleware.qos import LATCHED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+NODE = 'rrth_planner'
 NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
 # Between two requests to a planner that still lacks an input [s].
 PAUSE = 0.3
+# Of an arm at the end of a motion of the demo: greatest deviation [rad] and speed [rad/s].
+ARRIVED, STILL = 1e-3, 1e-6
 
 
 class NotInTimeError(RrthError):
     """A timeout."""
 
 
+class DemoError(RrthError):
+    """An error that ends the demo."""
+
+
 class PlannerClient(Node):
     """
-    The common part of the clients of a planner.
+    The common part of the clients of a planner; it receives messages only while it waits.
 
-    Messages are received only while it waits for something.
-
-    Parameters
-    ----------
-    name : str
-    timeout : float
-        Longest wait for anything [s].
-    check : callable
-        Raises where waiting is useless.
-
+    The timeout is the longest wait for anything [s]; `check` raises where waiting is useless.
     """
 
     def __init__(
@@ -55,17 +66,21 @@ class PlannerClient(Node):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__(name)
         self.timeout, self._check = timeout, check
-        # The joints required in a message; empty: any.
-        self._joint_names: tuple[str, ...] = ()
+        # Of the arm: other joint states are ignored.
+        self.joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
-        # The commanded motions and the joint states since `clear_history` was called.
+        # The commanded motions and the joint states, until they are cleared.
         self.commanded: list[JointTrajectory] = []
         self.observed: list[JointState] = []
-        self._body = self.create_publisher(MarkerArray, 'body_boxes', LATCHED)
-        self._target = self.create_publisher(PointStamped, 'target', LATCHED)
+        self._publishers_by_type = {
+            kind: self.create_publisher(kind, topic, LATCHED)
+            for kind, topic in ((MarkerArray, 'body_boxes'), (PointStamped, 'target'))
+        }
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
-        self.create_subscription(JointTrajectory, 'joint_trajectory', self._on_motion, LATCHED)
-        self._plan = self.create_client(Trigger, 'rrth_planner/plan')
+        self.create_subscription(
+            JointTrajectory, 'joint_trajectory', lambda msg: self.commanded.append(msg), LATCHED
+        )
+        self._plan = self.create_client(Trigger, f'{NODE}/plan')
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
@@ -90,62 +105,58 @@ class PlannerClient(Node):
             raise
         self._check()
 
+    def receive_for(self, span: float) -> None:
+        """Receive messages for a time [s]."""
+        end = time.monotonic() + span
+        while time.monotonic() < end:
+            self.take_messages(0.005)
+
     def wait_for_planner(self) -> None:
         """Wait for the service of the planner."""
-        service = self.resolve_service_name('rrth_planner/plan')
+        service = self.resolve_service_name(f'{NODE}/plan')
         self.wait_for(self._plan.service_is_ready, f'service {service}')
 
-    def wait_for_state(self, joint_names: Sequence[str] = ()) -> None:
-        """Wait for a joint state that has all of these joints."""
-        self._joint_names, self.state = tuple(joint_names), None
-        joints = f' of {", ".join(joint_names)}' if joint_names else ''
-        self.wait_for(lambda: self.state is not None, f'{self._joints.topic_name}{joints}')
+    def wait_for_state(self, joint_names: Sequence[str]) -> None:
+        """Wait for a joint state of the arm that has these joints."""
+        self.joint_names, self.state = tuple(joint_names), None
+        what = f'{self._joints.topic_name} of {", ".join(joint_names)}'
+        self.wait_for(lambda: self.state is not None, what)
 
-    def positions(self, joint_names: Sequence[str]) -> Array:
-        """Return the latest positions of these joints, (dof,) [rad]."""
+    def positions(self) -> Array:
+        """Return the latest positions of the arm, (dof,) [rad]."""
         if self.state is None:
             raise NotInTimeError('joint_states: none yet')
-        return configuration_from_msg(self.state, joint_names)
+        return configuration_from_msg(self.state, self.joint_names)
 
-    def is_still_at(
-        self, q: Array, joint_names: Sequence[str], tolerance: float, speed: float
-    ) -> bool:
+    def is_still_at(self, q: Array, tolerance: float, speed: float) -> bool:
         """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
-        if np.abs(self.positions(joint_names) - q).max() > tolerance:
+        if np.abs(self.positions() - q).max() > tolerance:
             return False
         assert self.state is not None
         names = list(self.state.name)
         if len(self.state.velocity) != len(names):
             # Not every driver has velocities.
             return True
-        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in joint_names)
-
-    def publish_body(self, body: MarkerArray) -> None:
-        """Publish the wearer's body; return once the planner has it."""
-        self._publish(self._body, body)
-
-    def publish_target(self, target: PointStamped) -> None:
-        """Publish a target; return once the planner has it."""
-        self._publish(self._target, target)
+        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in self.joint_names)
 
     def ask(self, patience: float) -> Trigger.Response:
         """Return the planner's answer; ask again while it lacks an input, for a time [s]."""
         end = time.monotonic() + patience
-        answer = self._call()
-        while answer.message.startswith(NO_INPUT_YET) and time.monotonic() < end:
-            self._pause()
-            answer = self._call()
-        return answer
-
-    def clear_history(self) -> None:
-        """Forget the commanded motions and the joint states so far."""
-        self.commanded, self.observed = [], []
+        while True:
+            future = self._plan.call_async(Trigger.Request())
+            self.wait_for(future.done, 'an answer of rrth_planner/plan')
+            answer = future.result()
+            if not answer.message.startswith(NO_INPUT_YET) or time.monotonic() >= end:
+                return answer
+            self.receive_for(PAUSE)
 
     def count_arms(self) -> int:
         """Return the number of other subscribers of the motions."""
         return self.count_subscribers('joint_trajectory') - 1
 
-    def _publish(self, publisher: Any, message: Any) -> None:
+    def publish(self, message: MarkerArray | PointStamped) -> None:
+        """Publish a body or a target; return once the planner has it."""
+        publisher = self._publishers_by_type[type(message)]
         self.wait_for(
             lambda: is_matched(self, publisher), f'a reliable subscription of {publisher.topic}'
         )
@@ -154,43 +165,110 @@ class PlannerClient(Node):
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
             raise NotInTimeError(f'{publisher.topic}: not acknowledged within {self.timeout:g} s')
 
-    def _call(self) -> Trigger.Response:
-        future = self._plan.call_async(Trigger.Request())
-        self.wait_for(future.done, 'an answer of rrth_planner/plan')
-        return future.result()
-
-    def _pause(self) -> None:
-        """Receive messages for a while."""
-        end = time.monotonic() + PAUSE
-        while time.monotonic() < end:
-            self.take_messages()
-
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
-            configuration_from_msg(msg, self._joint_names)
+            configuration_from_msg(msg, self.joint_names)
         except MessageError:
             # Of other joints, or invalid: the last state counts.
             return
         self.state = msg
         self.observed.append(msg)
 
-    def _on_motion(self, msg: JointTrajectory) -> None:
-        self.commanded.append(msg)
+
+class DemoClient(PlannerClient):
+    """The client of the demo, which also follows the arm."""
+
+    def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
+        """Create publishers, subscriptions and the client of the planner."""
+        super().__init__('rrth_demo', timeout, check)
+        self.arm = arm
+
+    def wait_for_nodes(self) -> None:
+        """Wait for the planner, for joint states, and for a subscriber of the motions."""
+        self.wait_for_state(self.arm.joint_names)
+        self.wait_for_planner()
+        self.wait_for(lambda: self.count_arms() > 0, 'a subscriber of joint_trajectory')
+
+    def ask_for_motion(self) -> tuple[Trajectory, float]:
+        """Return the motion that the planner publishes, and its planning time [ms]."""
+        self.commanded, self.observed = [], []
+        response = self.ask(self.timeout)
+        if not response.success:
+            raise DemoError(f'the planner rejected the request: {response.message}')
+        self.wait_for(lambda: bool(self.commanded), 'joint_trajectory')
+        figures = answer_from_text(response.message).figures
+        if 'planning_time_ms' not in figures:
+            raise DemoError(f'no planning time in the answer "{response.message}"')
+        trajectory = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
+        return trajectory, figures['planning_time_ms']
+
+    def wait_for_arrival(self, trajectory: Trajectory) -> None:
+        """Wait until the arm stands still at the end of a motion."""
+        q_end = trajectory.positions[-1]
+        self.wait_for(
+            lambda: self.is_still_at(q_end, ARRIVED, STILL),
+            f'the arm at the end of its motion of {trajectory.duration:.2f} s',
+            trajectory.duration + self.timeout,
+        )
+
+    def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
+        """
+        Publish another body so long after the arm set off [s]; return its states from then on.
+
+        Waits until the arm has left q_start, (dof,) [rad], and then until it was stopped, got a
+        new motion, and has arrived at its end.
+        """
+        self.wait_for(
+            lambda: np.abs(self.positions() - q_start).max() > ARRIVED, 'the arm in motion'
+        )
+        self.receive_for(after)
+        n = len(self.commanded)
+        self.observed = []
+        self.publish(body)
+        # The stop begins in motion, what comes after it at rest.
+        self.wait_for(
+            lambda: (
+                len(self.commanded) > n + 1 and not any(self.commanded[-1].points[0].velocities)
+            ),
+            'a stop and a new motion',
+        )
+        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self.joint_names))
+        return np.array([configuration_from_msg(m, self.joint_names) for m in self.observed])
 
 
 def is_matched(node: Node, publisher: Publisher) -> bool:
     """
-    Return whether all subscribers are connected, a reliable one among them.
+    Return whether all subscribers of a node's publisher are connected, a reliable one among them.
 
     Before that, `wait_for_all_acked` may return too early.
-
-    Parameters
-    ----------
-    node : Node
-        Of the publisher.
-    publisher : Publisher
-
     """
     infos = node.get_subscriptions_info_by_topic(publisher.topic)
     is_reliable = any(info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in infos)
     return is_reliable and publisher.get_subscription_count() >= len(infos)
+
+
+def parameters_of_planner(client: PlannerClient) -> PlannerParameters:
+    """
+    Return the present parameters of the planner.
+
+    Raises NotInTimeError where no planner answers, and another RrthError where it has other
+    parameters, or its arm is described by a file that is not here.
+    """
+    asking = AsyncParameterClient(client, NODE)
+    node = client.resolve_service_name(NODE)
+    client.wait_for(asking.services_are_ready, f'the parameter services of {node}')
+
+    def values_of(names: Sequence[str]) -> dict[str, Any]:
+        future = asking.get_parameters(list(names))
+        client.wait_for(future.done, f'the parameters of {node}')
+        found = [parameter_value_to_python(value) for value in future.result().values]
+        values = dict(zip(names, found, strict=False))
+        missing = [name for name in names if values.get(name) is None]
+        if missing:
+            raise RrthError(
+                f'{node}: no parameter {missing[0]}, expected a planner of this version'
+            )
+        return values
+
+    arm = load_arm(values_of([ARM.name])[ARM.name])
+    return parameters_from_values(values_of([s.name for s in declared(arm.dof)]), arm)

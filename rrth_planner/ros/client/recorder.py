@@ -2,17 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the messages of topics to an MCAP file, byte for byte."""
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-import time
-from types import TracebackType
 from typing import Any
 
 from mcap.writer import Writer
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.model.errors import RrthError
+from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.ros.messages.definitions import definition_of, type_name, type_of_name
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 
@@ -22,29 +20,12 @@ CHUNK = 128 * 1024
 PERIOD = 0.2
 
 
-class RecordingError(RrthError):
-    """A recording that cannot be written or read."""
-
-
 class RecordingFile:
     """
-    An MCAP file of ROS 2 messages, complete when its `with` block is left.
+    A new MCAP file of ROS 2 messages, complete when its `with` block is left.
 
-    Parameters
-    ----------
-    path : Path
-        Must not exist yet.
-
-    Attributes
-    ----------
-    counts : dict
-        Messages by topic, those without any included.
-
-    Raises
-    ------
-    RecordingError
-        The file exists, or cannot be made; later, it cannot be written.
-
+    Raises RecordError where it exists, or cannot be written. The messages by topic are counted in
+    `counts`, those without any included.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,13 +34,12 @@ class RecordingFile:
         self.counts: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        try:
-            # Closed when the block is left.
-            self._file = path.open('xb')
-        except FileExistsError:
-            raise RecordingError(f'{path}: exists already, expected a new file') from None
-        except OSError as problem:
-            raise self._failure(problem) from problem
+        with self._writing():
+            try:
+                # Closed when the block is left.
+                self._file = path.open('xb')
+            except FileExistsError:
+                raise RecordError(f'{path}: exists already, expected a new file') from None
         self._writer = Writer(self._file, chunk_size=CHUNK)
         self._writer.start(profile='ros2', library='rrth_planner')
 
@@ -67,19 +47,15 @@ class RecordingFile:
         """Return the open file."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         """Finish the file; one without any message is removed."""
         try:
-            self._writer.finish()
-            self._file.close()
-        except OSError as failure:
-            if problem is None:
-                raise self._failure(failure) from failure
+            with self._writing():
+                self._writer.finish()
+                self._file.close()
+        except RecordError:
+            if kind is None:
+                raise
         finally:
             with suppress(OSError):
                 self._file.close()
@@ -89,29 +65,30 @@ class RecordingFile:
     def add_topic(self, topic: str, msg_type: Any) -> None:
         """Write the schema of a topic's messages."""
         name = type_name(msg_type)
-        try:
+        with self._writing():
             if name not in self._schemas:
                 text = definition_of(msg_type).encode()
                 self._schemas[name] = self._writer.register_schema(name, 'ros2msg', text)
-            self._channels[topic] = self._writer.register_channel(
-                topic, 'cdr', self._schemas[name]
-            )
-        except OSError as problem:
-            raise self._failure(problem) from problem
+            schema = self._schemas[name]
+            self._channels[topic] = self._writer.register_channel(topic, 'cdr', schema)
         self.counts[topic] = 0
 
     def add(self, topic: str, data: bytes, sent: int, received: int) -> None:
         """Write the bytes of a message, with the times of sending and reception [ns]."""
-        try:
+        with self._writing():
             self._writer.add_message(
                 self._channels[topic], log_time=received, data=data, publish_time=sent
             )
-        except OSError as problem:
-            raise self._failure(problem) from problem
         self.counts[topic] += 1
 
-    def _failure(self, problem: OSError) -> RecordingError:
-        return RecordingError(f'{self._path}: {problem.strerror}, expected to write there')
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as problem:
+            raise RecordError(
+                f'{self._path}: {problem.strerror}, expected to write there'
+            ) from problem
 
 
 class RawSubscription(OpenSubscription):
@@ -127,45 +104,35 @@ class Recorder(Node):
     """
     Records topics from publishers of any quality of service.
 
-    Parameters
-    ----------
-    file : RecordingFile
-    known : mapping
-        Types by topic.
-    topics : sequence of str
-        What is recorded, relative to the node's namespace; the types of those that are not known
-        are looked up once there is a publisher.
-
+    Topics are relative to the node's namespace. `known` names the types of some; those of others
+    are looked up once there is a publisher.
     """
 
     def __init__(
-        self, file: RecordingFile, known: Mapping[str, Any], topics: Sequence[str]
+        self, file: RecordingFile, known: Mapping[str, str], topics: Sequence[str]
     ) -> None:
         """Subscribe."""
         super().__init__('rrth_recorder')
         self._file = file
         # Why the recording must end; raised by `check`, outside of callbacks.
         self._problem: RrthError | None = None
-        self._topics: list[OpenSubscription] = []
-        self._missing: list[str] = []
+        self._missing = [topic for topic in topics if topic not in known]
         for topic in topics:
             if topic in known:
                 self._add_topic(topic, known[topic])
-            else:
-                self._missing.append(topic)
-        self._timer = self.create_timer(
-            PERIOD, self._find_missing, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(PERIOD, self._find_missing, clock=steady)
 
     def check(self) -> None:
         """Raise what ends the recording."""
         if self._problem is not None:
             raise self._problem
 
-    def _add_topic(self, topic: str, msg_type: Any) -> None:
+    def _add_topic(self, topic: str, type_name: str) -> None:
         name = self.resolve_topic_name(topic)
         if name in self._file.counts:
             return
+        msg_type = type_of_name(type_name)
         self._file.add_topic(name, msg_type)
 
         def write(data: bytes, arrival: Arrival) -> None:
@@ -176,21 +143,14 @@ class Recorder(Node):
                     self._problem = problem
 
         # Late latched messages are part of the recording, too.
-        self._topics.append(RawSubscription(self, msg_type, topic, write, on_late=write))
+        RawSubscription(self, msg_type, topic, write, on_late=write)
 
     def _find_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}
         for topic in tuple(self._missing):
-            types = offered.get(self.resolve_topic_name(topic))
-            if not types:
-                continue
-            self._missing.remove(topic)
-            try:
-                self._add_topic(topic, type_of_name(types[0]))
-            except RrthError as problem:
-                self._problem = problem
-
-
-def since(begin: float) -> float:
-    """Return the time since a reading of the monotonic clock [s]."""
-    return time.monotonic() - begin
+            if types := offered.get(self.resolve_topic_name(topic)):
+                self._missing.remove(topic)
+                try:
+                    self._add_topic(topic, types[0])
+                except RrthError as problem:
+                    self._problem = problem

@@ -13,6 +13,7 @@ from mcap_ros2.decoder import DecoderFactory
 import numpy as np
 from rrth_planner.execution.recording import CommandedMotion, Recording
 from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -45,28 +46,11 @@ class RecordedMessage(NamedTuple):
 
 class RecordingReader:
     """
-    The messages of a file, checked as by the nodes.
+    The messages of a file, checked as by the nodes; bad ones are left out.
 
-    Parameters
-    ----------
-    path : Path
-    arm : ArmModel
-        The arm of the run.
-    base_frame : str
-        Of the planner; messages in other frames are rejected.
-    namespace : str, optional
-        Of the run; without, there must be one only.
-
-    Attributes
-    ----------
-    rejected : dict
-        By topic, why its last bad message was rejected; bad messages are left out.
-
-    Raises
-    ------
-    RecordError
-        The file cannot be read, or holds no run, or several.
-
+    `rejected` says, by topic, why the last bad one was. Messages in other frames than the
+    planner's `base_frame` are. Raises RecordError where the file cannot be read, or holds no run,
+    or several and no namespace chooses one.
     """
 
     def __init__(
@@ -77,9 +61,7 @@ class RecordingReader:
         topics, self._begin, self.rejected = _read(path)
         self._topics = {role: self._topic(topics, role, namespace) for role in TYPES}
         self._messages = {
-            role: []
-            if topic is None
-            else sorted(topics[topic], key=lambda recorded: recorded.received)
+            role: sorted(topics.get(topic or '', ()), key=lambda recorded: recorded.received)
             for role, topic in self._topics.items()
         }
 
@@ -101,13 +83,14 @@ class RecordingReader:
             # Where a driver has no velocities they are the differences of the positions.
             changes = np.gradient(positions, times, axis=0) if len(times) > 1 else 0.0 * positions
             velocities = np.where(np.isfinite(velocities), velocities, changes)
+        commanded = self._good('joint_trajectory', self._command)
         return Recording(
             times=times,
             positions=positions,
             velocities=velocities,
-            commanded=tuple(sorted(self._commanded(), key=lambda motion: motion.begin)),
+            commanded=tuple(sorted(commanded, key=lambda motion: motion.begin)),
             bodies=tuple(self._bodies()),
-            targets=tuple(self._good('target', lambda h: (self._when(h), self._target_of(h.msg)))),
+            targets=tuple(self._good('target', self._target)),
             monitor_states=tuple(self._monitor_states()),
         )
 
@@ -138,40 +121,31 @@ class RecordingReader:
                 self.rejected[str(self._topics[role])] = str(problem)
         return result
 
+    def _target(self, recorded: RecordedMessage) -> tuple[float, Array]:
+        return self._when(recorded), goal_from_msg(recorded.msg, self._base_frame).target
+
     def _when(self, recorded: RecordedMessage) -> float:
         """Return when a message was sent, on the clock of the recording [s]."""
         return (recorded.sent - self._begin) / NANOSECONDS
 
     def _readings(self) -> list[JointReading]:
         before: JointReading | None = None
+        names = self._arm.joint_names
 
-        def read(recorded: RecordedMessage) -> JointReading:
+        def read(recorded: RecordedMessage) -> JointReading | None:
             nonlocal before
-            names = self._arm.joint_names
+            if not has_joint_of(recorded.msg, names):
+                return None
             before = joint_reading(recorded.msg, names, recorded.received / NANOSECONDS, before)
             return before
 
-        names = self._arm.joint_names
-        self._messages['joint_states'] = [
-            recorded
-            for recorded in self._messages['joint_states']
-            if has_joint_of(recorded.msg, names)
-        ]
-        return self._good('joint_states', read)
+        return [reading for reading in self._good('joint_states', read) if reading is not None]
 
-    def _commanded(self) -> list[CommandedMotion]:
-        def read(recorded: RecordedMessage) -> CommandedMotion:
-            trajectory = joint_trajectory_from_msg(recorded.msg, self._arm.joint_names)
-            sent = self._when(recorded)
-            stamped = seconds_of(recorded.msg.header.stamp) - self._begin / NANOSECONDS
-            return CommandedMotion(
-                stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory
-            )
-
-        return self._good('joint_trajectory', read)
-
-    def _target_of(self, msg: Any) -> Any:
-        return goal_from_msg(msg, self._base_frame).target
+    def _command(self, recorded: RecordedMessage) -> CommandedMotion:
+        trajectory = joint_trajectory_from_msg(recorded.msg, self._arm.joint_names)
+        sent = self._when(recorded)
+        stamped = seconds_of(recorded.msg.header.stamp) - self._begin / NANOSECONDS
+        return CommandedMotion(stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory)
 
     def _bodies(self) -> list[tuple[float, Scene]]:
         order, body = MarkerOrder(), WearerBody()

@@ -3,7 +3,7 @@
 """The node of the viewer: it shows the running nodes and requests plans."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, ExitStack, suppress
 from pathlib import Path
 from threading import Lock, Thread
 import time
@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.errors import MessageError, one_line, OptionsError, RrthError
+from rrth_planner.model.errors import MessageError, one_line, OptionsError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
@@ -50,15 +50,7 @@ class ViewerFeed(Node):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        """
-        Subscribe.
-
-        Raises
-        ------
-        RrthError, ParameterException
-            A rejected parameter.
-
-        """
+        """Subscribe; a rejected parameter raises RrthError or ParameterException."""
         super().__init__(NAME, **kwargs)
         parameters = declare_parameters(self)
         self.arm, self.margin = parameters.arm, parameters.margin
@@ -73,7 +65,8 @@ class ViewerFeed(Node):
         )
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
-        self._motion: Trajectory | None = None
+        # The last motion that was published.
+        self.trajectory: Trajectory | None = None
         self._shown: tuple[WearerBody | None, Scene] = (None, Scene(()))
         # Of requests: written by the page's threads, read by the executor's.
         self._lock = Lock()
@@ -107,19 +100,9 @@ class ViewerFeed(Node):
         return None if reading is None else reading.positions
 
     @property
-    def trajectory(self) -> Trajectory | None:
-        """The last motion that was published."""
-        return self._motion
-
-    @property
     def said(self) -> str:
         """The last answer of the planner, or what is still missing."""
-        inputs = self._inputs
-        missing = [
-            topic.topic
-            for topic in (inputs.body, inputs.target, inputs.joints)
-            if not topic.n_good
-        ]
+        missing = [topic.topic for topic in self._inputs.all.values() if not topic.n_good]
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
@@ -153,18 +136,15 @@ class ViewerFeed(Node):
             self._is_asking, self._is_wanted = True, False
             target, self._newest = self._newest, None
         if target is not None:
-            self._publish(target)
+            msg = PointStamped()
+            msg.header.frame_id = self._frame
+            msg.header.stamp = self.get_clock().now().to_msg()
+            msg.point.x, msg.point.y, msg.point.z = target.tolist()
+            self._targets.publish(msg)
         # The request must not overtake the target.
         self._targets.wait_for_all_acked(Duration(seconds=LONGEST_WAY))
         self._asked = self._client.call_async(Trigger.Request())
         self._asked.add_done_callback(self._on_answer)
-
-    def _publish(self, target: Array) -> None:
-        msg = PointStamped()
-        msg.header.frame_id = self._frame
-        msg.header.stamp = self.get_clock().now().to_msg()
-        msg.point.x, msg.point.y, msg.point.z = target.tolist()
-        self._targets.publish(msg)
 
     def _on_answer(self, future: Future) -> None:
         problem = future.exception()
@@ -181,7 +161,7 @@ class ViewerFeed(Node):
 
     def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
         try:
-            self._motion = joint_trajectory_from_msg(msg, self.arm.joint_names)
+            self.trajectory = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:
             self._reject(problem)
 
@@ -196,45 +176,29 @@ def following(
     """
     Give a feed that spins in a thread of its own while the block runs.
 
-    Parameters
-    ----------
-    arm : Path or None
-        File of the arm, laid out as `config/arm.yaml`; None: as the settings or `ros_args` say.
-    settings : Path or None
-        Parameters, laid out as `config/planner.yaml`.
-    ros_args : sequence of str
-        From `--ros-args` on: remaps and parameters.
-
-    Raises
-    ------
-    RrthError
-        A rejected argument or parameter.
-
+    The files are laid out as `config/arm.yaml` and `config/planner.yaml`; without one for the arm
+    it is as the settings or `ros_args` (remaps and parameters, from `--ros-args` on) say. Raises
+    RrthError for a rejected argument or parameter.
     """
     own = ['--ros-args', '--params-file', str(settings), '--'] if settings else []
-    try:
-        rclpy.init(args=[*own, *ros_args], signal_handler_options=SignalHandlerOptions.NO)
-        overrides = [Parameter('arm', value=str(arm))] if arm else []
-        node = ViewerFeed(parameter_overrides=overrides)
-    except (ParameterException, RuntimeError) as problem:
-        rclpy.try_shutdown()
-        raise OptionsError(f'--live: {problem}') from problem
-    except RrthError:
-        rclpy.try_shutdown()
-        raise
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    thread = Thread(target=_spin, args=(executor,), name='viewer feed', daemon=True)
-    thread.start()
-    try:
+    overrides = [Parameter('arm', value=str(arm))] if arm else []
+    with ExitStack() as stack:
+        stack.callback(rclpy.try_shutdown)
+        try:
+            rclpy.init(args=[*own, *ros_args], signal_handler_options=SignalHandlerOptions.NO)
+            node = ViewerFeed(parameter_overrides=overrides)
+        except (ParameterException, RuntimeError) as problem:
+            raise OptionsError(f'--live: {problem}') from problem
+        stack.callback(node.destroy_node)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+
+        def spin() -> None:
+            with suppress(ExternalShutdownException):
+                executor.spin()
+
+        thread = Thread(target=spin, name='viewer feed', daemon=True)
+        thread.start()
+        stack.callback(thread.join)
+        stack.callback(executor.shutdown)
         yield node
-    finally:
-        executor.shutdown()
-        thread.join()
-        node.destroy_node()
-        rclpy.try_shutdown()
-
-
-def _spin(executor: SingleThreadedExecutor) -> None:
-    with suppress(ExternalShutdownException):
-        executor.spin()

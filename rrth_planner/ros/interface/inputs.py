@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.localization import predict_start_state, sharp_phase_of
+from rrth_planner.execution.executing_motion import (
+    ExecutingMotion,
+    predict_start_state,
+    sharp_phase_of,
+)
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from rclpy.node import Node
-from rrth_planner.execution.acceptance import PlaybackRules
+from rrth_planner.execution.playback import PlaybackRules
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array

@@ -3,8 +3,7 @@
 """Localization of the arm on the commanded motion, or on the one before."""
 
 import numpy as np
-from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.localization import phase_of
+from rrth_planner.execution.executing_motion import ExecutingMotion, phase_of
 from rrth_planner.execution.remaining_motion import with_lead_in
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import REST_SPEED, sample

@@ -1,17 +1,28 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Command-line arguments of point_at."""
+"""The parsers of commands whose own modules need ROS; these do not, so that --help needs none."""
 
 import argparse
 import math
 from pathlib import Path
 
-from rrth_planner.cli.program import program
+from rrth_planner.cli.program import command_parser
 
-DESCRIPTION = """\
+# What `record` records: all topics of a planner and an arm, with their types.
+TOPICS = {
+    'body_boxes': 'visualization_msgs/msg/MarkerArray',
+    'target': 'geometry_msgs/msg/PointStamped',
+    'joint_states': 'sensor_msgs/msg/JointState',
+    'joint_trajectory': 'trajectory_msgs/msg/JointTrajectory',
+    'rrth_planner/tool_path': 'nav_msgs/msg/Path',
+    'rrth_planner/markers': 'visualization_msgs/msg/MarkerArray',
+    '/diagnostics': 'diagnostic_msgs/msg/DiagnosticArray',
+    'arm_playback/tool_pose': 'geometry_msgs/msg/PoseStamped',
+}
+POINT_AT = """\
 Request a motion that points the arm at X Y Z [m], and wait until the arm has arrived. A planner
 node and an arm (playback_node, or a controller) must run in the same ROS domain."""
-EPILOG = """\
+POINT_AT_EPILOG = """\
 examples:
   %(prog)s 1.5 0.1 0.3                      in front of the chest (x forward, y left, z up)
   %(prog)s 0.2 1.4 -0.1                     to the left, a little down
@@ -38,33 +49,36 @@ the ray from the target [m] (null if unknown).
 --no-move publishes neither body nor target. It plans in its own process with the planner's
 parameters, from the present joint positions, and with the body of --body or the one received on
 body_boxes (whose publisher must be latched, or repeat it)."""
+RECORD = """\
+Record a run of the nodes in an MCAP file until Ctrl-C: every message once, serialized as received,
+from reliable, best-effort and latched publishers. Foxglove opens the file, `plot recording` draws
+it. Names are relative; namespaces and remaps go after --ros-args.
+"""
+RECORD_EPILOG = """\
+default topics:
+  {}
+
+example:    %(prog)s -o run.mcap --duration 30 --ros-args -r __ns:=/left
+"""
 
 
-def parser() -> argparse.ArgumentParser:
+def point_at() -> argparse.ArgumentParser:
     """Return the parser of everything but the words for ROS."""
-    command = argparse.ArgumentParser(
-        prog=program('point_at'),
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    command = command_parser('point_at', POINT_AT, POINT_AT_EPILOG)
+    add = command.add_argument
     for axis, direction in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
-        command.add_argument(axis, type=_coordinate, metavar=axis.upper(), help=f'{direction} [m]')
-    command.add_argument(
-        '--frame', metavar='NAME', help="frame of the target (the planner's base_frame: torso)"
-    )
-    command.add_argument(
+        add(axis, type=_coordinate, metavar=axis.upper(), help=f'{direction} [m]')
+    add('--frame', metavar='NAME', help="frame of the target (the planner's base_frame: torso)")
+    add(
         '--body',
         type=Path,
         metavar='FILE',
         help='the wearer: a YAML file of boxes (config/body.yaml) or markers '
         '(msg_examples/body.yaml), which replaces the body that the planner has',
     )
-    command.add_argument(
-        '--json', action='store_true', help='print one JSON object on standard output'
-    )
-    command.add_argument('--no-move', action='store_true', help='plan only, and publish nothing')
-    command.add_argument(
+    add('--json', action='store_true', help='print one JSON object on standard output')
+    add('--no-move', action='store_true', help='plan only, and publish nothing')
+    add(
         '--timeout',
         type=_positive,
         default=30.0,
@@ -72,17 +86,52 @@ def parser() -> argparse.ArgumentParser:
         help='timeout of every wait, and of the arrival after the end of the motion [s] '
         '(%(default)g)',
     )
-    command.add_argument(
+    add(
         '--tolerance',
         type=_positive,
         default=0.01,
         metavar='RAD',
         help='tolerance of each joint at the end of the motion [rad] (%(default)g)',
     )
-    command.add_argument(
+    add(
         '--ros-args',
         action='store_true',
         help='everything after it is passed to ROS: namespace, remaps, parameters',
+    )
+    return command
+
+
+def record() -> argparse.ArgumentParser:
+    """Return the parser of all arguments but those of ROS."""
+    command = command_parser('record', RECORD, RECORD_EPILOG.format('\n  '.join(TOPICS)))
+    add = command.add_argument
+    add('-o', '--output', type=Path, metavar='FILE', help='new file to write (run-DATE-TIME.mcap)')
+    add(
+        '--duration', type=_seconds, default=math.inf, metavar='S', help='stop after this time [s]'
+    )
+    add(
+        '--topics',
+        nargs='+',
+        metavar='NAME',
+        help='record these topics instead, of any installed type',
+    )
+    return command
+
+
+def demo() -> argparse.ArgumentParser:
+    """Return the parser of all arguments."""
+    command = command_parser('demo', 'Plan and play motions around a wearer, check and draw them.')
+    add = command.add_argument
+    add('--output', type=Path, default=Path('demo.png'), help='picture file (%(default)s)')
+    add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')
+    add('--timeout', type=float, default=180.0, help='timeout of every wait [s] (%(default)s)')
+    add('--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)')
+    add(
+        '--targets',
+        nargs='+',
+        default=['front', 'left', 'high'],
+        metavar='NAME',
+        help='msg_examples/target_NAME.yaml each (front left high)',
     )
     return command
 
@@ -105,4 +154,11 @@ def _number(text: str, expected: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f'"{text}", expected {expected}')
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f'{text}, expected a time > 0 [s]')
     return value
