@@ -63,6 +63,10 @@ class Rows:
         """Return how many found a path."""
         return len(self.values('cost_final'))
 
+    def found(self) -> str:
+        """Return for a table how many of all found a path."""
+        return f'{self.n_solved()} of {len(self)}'
+
 
 def histories_on(rows: Rows, axis: str, grid: Array) -> Array:
     """

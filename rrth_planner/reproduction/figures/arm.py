@@ -2,33 +2,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of the arm's plans by RRT and RRT-H, as the paper's Figures 20 and 21."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from matplotlib.figure import Figure
 import numpy as np
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
-from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.reproduction.problems import RAY, TARGETS
 from rrth_planner.visualization.arm_view import draw_motion
-from rrth_planner.visualization.motion_figure import JOINT_COLOURS
+from rrth_planner.visualization.motion_figure import joint_colour, plain
+from rrth_planner.visualization.viewer.examples import example_body
 
 Pair = tuple[Path, Path]
 NAMES = ('RRT', 'RRT-H')
 
 
 def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
-    """
-    Return the joints along the paths to each target: RRT thin, RRT-H thick.
-
-    Parameters
-    ----------
-    pairs : mapping
-        By name of the target, the paths of RRT and of RRT-H from the same growth [rad].
-
-    """
+    """Return the joints along the paths to each target, by its name: RRT thin, RRT-H thick."""
     n_columns = min(4, len(pairs))
     n_rows = -(-len(pairs) // n_columns)
     figure = Figure(figsize=(3.6 * n_columns, 3.0 * n_rows + 0.5), layout='constrained', dpi=100)
@@ -43,7 +36,7 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
                 (handle,) = axes.plot(
                     along,
                     values,
-                    color=JOINT_COLOURS[j % len(JOINT_COLOURS)],
+                    color=joint_colour(j),
                     lw=2.4 if name == NAMES[1] else 0.9,
                     ls='-' if name == NAMES[1] else (0, (4, 1.5)),
                 )
@@ -53,14 +46,12 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
             f'{target.replace("_", " ")}\n{lengths[0]:.1f} rad to {lengths[1]:.1f} rad',
             fontsize=9.5,
         )
-        axes.grid(color='#e4e6ea', lw=0.8)
+        plain(axes)
         if k >= len(pairs) - n_columns:
             axes.set_xlabel('length along the path [rad]')
         if k % n_columns == 0:
             axes.set_ylabel('position [rad]')
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
-    labels = sorted(handles, key=lambda label: (label.split(', ')[0], label))
+    labels = sorted(handles)
     figure.legend(
         [handles[label] for label in labels],
         labels,
@@ -72,29 +63,9 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
     return figure
 
 
-def motions_figure(
-    arm: ArmModel,
-    scene: Scene,
-    pairs: Mapping[str, Pair],
-    targets: Mapping[str, Sequence[float]],
-    ray_length: float,
-) -> Figure:
-    """
-    Return the arm's motion round its wearer, a row a target: left RRT, right RRT-H.
-
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    pairs : mapping
-        By name of the target, the paths of RRT and of RRT-H [rad].
-    targets : mapping
-        Where they are in the base frame, three coordinates each [m].
-    ray_length : float
-        How much of the pointing ray counted as arm [m].
-
-    """
+def motions_figure(pairs: Mapping[str, Pair]) -> Figure:
+    """Return the arm's motion round its wearer, a row a target: left RRT, right RRT-H."""
+    arm, scene = load_arm(), example_body('body')
     figure = Figure(figsize=(12.0, 4.9 * len(pairs)), dpi=80)
     for row, (target, pair) in enumerate(pairs.items()):
         for column, (name, path) in enumerate(zip(NAMES, pair, strict=True)):
@@ -103,15 +74,14 @@ def motions_figure(
                 (0.5 * column + 0.04, 1.0 - (row + 0.9) * height, 0.41, 0.78 * height),
                 projection='3d',
             )
-            trajectory = unhurried(path)
-            draw_motion(axes, arm, scene, trajectory, np.array(targets[target]), ray_length)
+            draw_motion(axes, arm, scene, _unhurried(path), np.array(TARGETS[target]), RAY)
             axes.set_title(
                 f'{name}, {target.replace("_", " ")}: {path.length:.1f} rad', fontsize=11, y=1.08
             )
     return figure
 
 
-def unhurried(path: Path) -> Trajectory:
+def _unhurried(path: Path) -> Trajectory:
     """Return a motion along a path that rests at each waypoint: a straight line stays one."""
     times = _distances(path.waypoints)
     # A waypoint on the one before it takes no time, and times must increase.

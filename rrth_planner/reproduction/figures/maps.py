@@ -13,6 +13,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.planning.result import PlanResult, Tree
 from rrth_planner.reproduction.path_club import goes_over_the_top
+from rrth_planner.visualization.motion_figure import GRID
 
 WALL, FRAME, TREE = '#4c5560', '#30343b', '#9fb4c9'
 FIRST, FINAL, START, GOAL = '#d9822b', '#c2185b', '#2f9e6e', '#1b6ca8'
@@ -26,11 +27,10 @@ def trees_figure(
 
     Parameters
     ----------
-    maps : sequence of BoxMap
     results : mapping
         By name of the map and of the planner.
     names : sequence of str
-        The planners.
+        Of the planners.
 
     """
     figure = Figure(
@@ -67,7 +67,6 @@ def escape_figure(
 
     Parameters
     ----------
-    box_map : BoxMap
     with_club, without : sequence of ndarray, shape (n, 2), or None
         First paths of successive growths, before shortening [map units].
     shares : mapping
@@ -99,7 +98,7 @@ def escape_figure(
     right.set_xlabel('growths')
     right.set_ylabel('runs that have found both ways round [%]')
     right.set_ylim(-2.0, 103.0)
-    right.grid(color='#e4e6ea')
+    right.grid(color=GRID)
     right.legend(frameon=False, loc='center right')
     return figure
 
@@ -138,15 +137,9 @@ def draw_ends(axes: Any, box_map: BoxMap) -> None:
 
 def _legend(figure: Figure, *entries: tuple[str, str]) -> None:
     axes: Any = figure.axes[0]
-    handles = [axes.plot([], [], color=colour, lw=2)[0] for _, colour in entries]
+    for label, colour in entries:
+        axes.plot([], [], color=colour, lw=2, label=label)
     for label, colour, mark in (('start', START, 'o'), ('goal', GOAL, '*')):
-        handles.append(axes.plot([], [], ls='', marker=mark, color=colour, ms=9)[0])
-        entries = (*entries, (label, colour))
-    figure.legend(
-        handles,
-        [label for label, _ in entries],
-        loc='outside lower center',
-        ncols=len(entries),
-        frameon=False,
-        fontsize=9,
-    )
+        axes.plot([], [], ls='', marker=mark, color=colour, ms=9, label=label)
+    n = len(entries) + 2
+    figure.legend(loc='outside lower center', ncols=n, frameon=False, fontsize=9)
