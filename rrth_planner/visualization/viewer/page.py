@@ -21,8 +21,6 @@ import viser
 
 # Frame period of a playing motion, and longest sleep of an idle page [s].
 FRAME, NAP = 1.0 / 30.0, 0.5
-# Widths of the paths of the tool [m].
-FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.007, 0.007, 0.010
 
 
 class ViewerPage:
@@ -31,7 +29,6 @@ class ViewerPage:
 
     Parameters
     ----------
-    server : viser.ViserServer
     question : PlanQuestion
         The first request.
 
@@ -48,15 +45,16 @@ class ViewerPage:
         self._drawn: Response | None = None
         self._body: Any = None
         self.view = SceneView(server, question.arm, question.ray_guard_length)
-        self.panel = Panel(server, is_live=False, on_layer=self._on_layer)
+        self.panel = Panel(server, self.view.layers, is_live=False)
         panel = self.panel
         panel.target.value = tuple(question.goal.target.tolist())
-        panel.margin.max = max(panel.margin.max, question.margin)
-        panel.margin.value = question.margin
-        panel.seed.max = max(panel.seed.max, question.seed)
-        panel.seed.value = question.seed
-        panel.step_size.max = max(panel.step_size.max, question.options.step_size)
-        panel.step_size.value = question.options.step_size
+        for slider, value in (
+            (panel.margin, question.margin),
+            (panel.seed, question.seed),
+            (panel.step_size, question.options.step_size),
+        ):
+            slider.max = max(slider.max, value)
+            slider.value = value
         self.view.target.position = question.goal.target
         self.model = ViewerModel(question, lambda response: self._wake.set())
         self._connect()
@@ -111,19 +109,15 @@ class ViewerPage:
         nothing = np.empty((0, 3))
         search = None if plan is None else plan.search
         self.view.show_trees(() if search is None else search.trees)
-        for layer, path, width in (
-            ('first', None if search is None else search.raw_path, FIRST_WIDTH),
-            ('short', None if plan is None else plan.path, SHORT_WIDTH),
+        for layer, path in (
+            ('first', None if search is None else search.raw_path),
+            ('short', None if plan is None else plan.path),
         ):
             curve = nothing if path is None else path_curve(self._arm, path.waypoints)
             corners = nothing if path is None else tool_positions(self._arm, path.waypoints)
-            self.view.show_path(layer, curve, corners, width)
+            self.view.show_path(layer, curve, corners)
         curve = nothing if trajectory is None else trajectory_curve(self._arm, trajectory)
-        self.view.show_path('timed', curve, nothing, TIMED_WIDTH)
-        self._load(trajectory)
-
-    def _load(self, trajectory: Trajectory | None) -> None:
-        """Load another motion; with none the arm stays at the start."""
+        self.view.show_path('timed', curve, nothing)
         duration = 0.0 if trajectory is None else trajectory.duration
         with self._lock:
             self._trajectory = trajectory
@@ -203,6 +197,3 @@ class ViewerPage:
         with self._lock:
             player = change(self._player)
             self._player = player if is_on else replace(player, is_playing=False)
-
-    def _on_layer(self, name: str, is_shown: bool) -> None:
-        self.view.layers[name].visible = is_shown

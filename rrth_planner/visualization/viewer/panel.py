@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The controls of the page, and its description of a response."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from functools import partial
 from html import escape
 from typing import Any
 
 from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
 from rrth_planner.visualization.viewer.planning_worker import Response
-from rrth_planner.visualization.viewer.scene_view import FIRST, LAYERS, SHORT, TIMED, TREES
+from rrth_planner.visualization.viewer.scene_view import FIRST, SHORT, TIMED, TREES
 import viser
 
 OWN = 'own'
@@ -80,16 +81,15 @@ class Panel:
 
     Parameters
     ----------
-    server : viser.ViserServer
+    layers : mapping
+        What the checkboxes show and hide, by name.
     is_live : bool
         The nodes plan: without the controls that need a plan of this process.
-    on_layer : callable
-        Called with a layer's name and whether it is shown.
 
     """
 
     def __init__(
-        self, server: viser.ViserServer, *, is_live: bool, on_layer: Callable[[str, bool], None]
+        self, server: viser.ViserServer, layers: Mapping[str, Any], *, is_live: bool
     ) -> None:
         """Create the controls."""
         gui = server.gui
@@ -127,11 +127,11 @@ class Panel:
             self.speed = gui.add_dropdown('speed', SPEEDS, initial_value='1')
             self.repeat = gui.add_checkbox('repeat', False)
         with gui.add_folder('Show'):
-            for name in LAYERS:
-                if is_live and name in ('start', 'tree', 'first', 'short'):
-                    continue
-                self._layer(gui, name, on_layer)
+            for name, layer in layers.items():
+                if not is_live or name in ('margin', 'timed'):
+                    box = gui.add_checkbox(SHOWN[name], True)
+                    box.on_update(partial(_show, layer))
 
-    def _layer(self, gui: Any, name: str, on_layer: Callable[[str, bool], None]) -> None:
-        box = gui.add_checkbox(SHOWN[name], True)
-        box.on_update(lambda _: on_layer(name, box.value))
+
+def _show(layer: Any, event: Any) -> None:
+    layer.visible = event.target.value
