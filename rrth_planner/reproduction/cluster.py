@@ -89,25 +89,19 @@ def cluster_client(scheduler: str | None = None, n_workers: int | None = None) -
         Processes of the local cluster; None: as many as cores.
 
     """
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
-    if scheduler is not None:
-        with Client(scheduler) as client:
+    with tempfile.TemporaryDirectory(prefix='rrth-campaign-') as folder:
+        local = {
+            'n_workers': n_workers,
+            'threads_per_worker': 1,
+            'processes': True,
+            'dashboard_address': '127.0.0.1:0',
+            'local_directory': folder,
+            'silence_logs': logging.ERROR,
+        }
+        with Client(**local) if scheduler is None else Client(scheduler) as client:
             yield client
-        return
-    with (
-        tempfile.TemporaryDirectory(prefix='rrth-campaign-') as folder,
-        LocalCluster(
-            n_workers=n_workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address='127.0.0.1:0',
-            local_directory=folder,
-            silence_logs=logging.ERROR,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
 
 
 def run_batch(runs: Sequence[Run]) -> list[Row]:

@@ -201,15 +201,9 @@ def _version(package: str) -> str:
 
 
 def _commit() -> str | None:
+    command = ['git', 'rev-parse', '--short', 'HEAD']
+    options: dict[str, Any] = {'cwd': pathlib.Path(__file__).parent, 'stderr': subprocess.DEVNULL}
     try:
-        found = subprocess.run(
-            ['git', 'rev-parse', '--short', 'HEAD'],
-            cwd=pathlib.Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            timeout=10.0,
-            check=True,
-        )
+        return subprocess.check_output(command, text=True, timeout=10.0, **options).strip() or None
     except (OSError, subprocess.SubprocessError):
         return None
-    return found.stdout.strip() or None

@@ -52,8 +52,7 @@ class Rows:
     def median(self, column: str) -> float:
         """Return the median of a column over all rows; infinite where most found no path."""
         # A path that was not found is longer than any other.
-        values = np.sort(self.aligned(column))
-        return float(np.median(values)) if len(values) and np.isfinite(values[0]) else np.inf
+        return float(np.median(self.aligned(column))) if len(self) else np.inf
 
     def share(self, column: str) -> float:
         """Return the share of the rows with a path in which a column is true."""
@@ -70,15 +69,12 @@ class Rows:
 
 def histories_on(rows: Rows, axis: str, grid: Array) -> Array:
     """
-    Return the cost of the best path of each run at some draws or times.
+    Return the cost of the best path of each run at some draws or times [s], (m,) -> (n, m).
 
     Parameters
     ----------
-    rows : Rows
     axis : str
         `history_draws` or `history_time`.
-    grid : ndarray, shape (m,)
-        Draws, or seconds.
 
     Returns
     -------

@@ -61,7 +61,7 @@ def faces_of(box: Box) -> Iterator[tuple[Array, Array]]:
         yield side * box.rotation[:, axis], corners
 
 
-def best_view(scene: Scene, outlines: Array, ray: Array) -> Array:
+def _best_view(scene: Scene, outlines: Array, ray: Array) -> Array:
     """Return the direction to the camera that shows most of the arm and of the ray."""
     arm_points, ray_points = outlines.reshape(-1, 3), _cut(ray).mean(axis=1)
     best, score = np.array([0.0, -1.0, 0.0]), -np.inf
@@ -131,7 +131,7 @@ def draw_configurations(
     q_stops: Sequence[Array] = (),
     names: tuple[str, str] = ('start', 'goal'),
     shape: float = SHAPE,
-    towards: Array | None = None,
+    looked_at: Array | None = None,
 ) -> None:
     """
     Draw the same for any sequence of configurations.
@@ -152,8 +152,8 @@ def draw_configurations(
         Labels of the first and the last configuration.
     shape : float
         Width of the picture over its height.
-    towards : ndarray, shape (3,), optional
-        Direction to the camera; default: the one that shows most of the arm and of the last ray.
+    looked_at : ndarray, shape (k, 3), optional
+        A line of which the camera shows most, beside the arm; default: the last ray [m].
 
     """
     outlines = np.array([arm_points(arm, row) for row in q])
@@ -163,8 +163,7 @@ def draw_configurations(
         ray[1] = target
     targets = [] if target is None else [target[None]]
 
-    if towards is None:
-        towards = best_view(scene, outlines, ray)
+    towards = _best_view(scene, outlines, ray if looked_at is None else looked_at)
     _frame(axes, scene, np.concatenate([*outlines, ray, first_ray, *targets]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)

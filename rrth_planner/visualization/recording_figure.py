@@ -22,8 +22,6 @@ from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.visualization.arm_view import (
-    arm_points,
-    best_view,
     draw_configurations,
     N_DRAWN,
     ray_of,
@@ -126,7 +124,7 @@ def _draw_space(
     # The arm is at rest most of the time: drawn at equal steps of its path, not of time.
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
     scene = at(recording.bodies, end) or Scene(())
-    q_drawn, target = q[_equal_steps(path, N_DRAWN)], at(recording.targets, end)
+    target = at(recording.targets, end)
     first, last = tool_pose(arm, q[[0, -1]])
     begin, tip = ray_of(first, ray_guard_length)
     aim = ray_of(last, 1.0)
@@ -136,7 +134,7 @@ def _draw_space(
         axes,
         arm,
         scene,
-        q_drawn,
+        q[_equal_steps(path, N_DRAWN)],
         q[_equal_steps(path, N_DENSE)],
         target,
         ray_guard_length,
@@ -144,11 +142,7 @@ def _draw_space(
         names=('start', 'end'),
         shape=VIEW_SHAPE,
         # A motion may be short: the first ray counts too.
-        towards=best_view(
-            scene,
-            np.array([arm_points(arm, row) for row in q_drawn]),
-            np.array([tip, begin, *aim]),
-        ),
+        looked_at=np.array([tip, begin, *aim]),
     )
 
 

@@ -11,13 +11,29 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.reproduction.problems import RAY, TARGETS
+from rrth_planner.planning.planner import plan
+from rrth_planner.reproduction.experiments import ARM_ALGORITHMS, RRT, RRT_H
+from rrth_planner.reproduction.problems import CERTIFIED, load_problem, RAY, TARGETS
+from rrth_planner.reproduction.statistics import Rows
 from rrth_planner.visualization.arm_view import draw_motion
 from rrth_planner.visualization.motion_figure import joint_colour, plain
 from rrth_planner.visualization.viewer.examples import example_body
 
 Pair = tuple[Path, Path]
-NAMES = ('RRT', 'RRT-H')
+
+
+def paths_of_median(rows: Rows, target: str) -> Pair:
+    """Return the paths of RRT and RRT-H of the seed whose RRT path is of median length [rad]."""
+    name = f'arm/{target}'
+    some = rows.where(problem=name, algorithm=RRT, collision=CERTIFIED)
+    costs = some.aligned('cost_final')
+    seed = some.rows[int(np.argsort(costs)[(len(costs) - 1) // 2])]['seed']
+    rrt, rrt_h = (
+        plan(load_problem(name).problem, options, np.random.default_rng(seed)).path
+        for options in ARM_ALGORITHMS.values()
+    )
+    assert rrt is not None and rrt_h is not None
+    return rrt, rrt_h
 
 
 def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
@@ -30,15 +46,15 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
     for axes in grid.flat[len(pairs) :]:
         axes.set_visible(False)
     for k, (axes, (target, pair)) in enumerate(zip(grid.flat, pairs.items(), strict=False)):
-        for name, path in zip(NAMES, pair, strict=True):
+        for name, path in zip(ARM_ALGORITHMS, pair, strict=True):
             along = _distances(path.waypoints)
             for j, values in enumerate(path.waypoints.T):
                 (handle,) = axes.plot(
                     along,
                     values,
                     color=joint_colour(j),
-                    lw=2.4 if name == NAMES[1] else 0.9,
-                    ls='-' if name == NAMES[1] else (0, (4, 1.5)),
+                    lw=2.4 if name == RRT_H else 0.9,
+                    ls='-' if name == RRT_H else (0, (4, 1.5)),
                 )
                 handles[f'joint {j + 1}, {name}'] = handle
         lengths = [path.length for path in pair]
@@ -68,7 +84,7 @@ def motions_figure(pairs: Mapping[str, Pair]) -> Figure:
     arm, scene = load_arm(), example_body('body')
     figure = Figure(figsize=(12.0, 4.9 * len(pairs)), dpi=80)
     for row, (target, pair) in enumerate(pairs.items()):
-        for column, (name, path) in enumerate(zip(NAMES, pair, strict=True)):
+        for column, (name, path) in enumerate(zip(ARM_ALGORITHMS, pair, strict=True)):
             height = 1.0 / len(pairs)
             axes: Any = figure.add_axes(
                 (0.5 * column + 0.04, 1.0 - (row + 0.9) * height, 0.41, 0.78 * height),

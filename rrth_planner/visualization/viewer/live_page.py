@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of the running nodes: it shows their topics, and sends requests to the planner."""
 
-from collections.abc import Callable
 from html import escape
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from rrth_planner.ros.client.viewer_feed import ViewerFeed
@@ -34,9 +33,9 @@ class LivePage:
         self.panel.target_example.on_update(self._on_example)
         self.panel.plan.on_click(lambda _: feed.ask())
 
-    def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Draw the messages until `is_over`, or the thread is interrupted."""
-        while not is_over():
+    def run(self) -> NoReturn:
+        """Draw the messages until the thread is interrupted."""
+        while True:
             self.draw()
             time.sleep(FRAME)
 

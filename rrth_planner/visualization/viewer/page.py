@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from threading import Event, Lock
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from rrth_planner.model.trajectory import positions_at, Trajectory
@@ -24,15 +24,7 @@ FRAME, NAP = 1.0 / 30.0, 0.5
 
 
 class ViewerPage:
-    """
-    Show a request, let it be changed, and show and play the resulting motion.
-
-    Parameters
-    ----------
-    question : PlanQuestion
-        The first request.
-
-    """
+    """Show a first request, let it be changed, and show and play the resulting motion."""
 
     def __init__(self, server: viser.ViserServer, question: PlanQuestion) -> None:
         """Draw what is known, and request a plan."""
@@ -60,10 +52,10 @@ class ViewerPage:
         self._connect()
         self.model.ask()
 
-    def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Draw all changes until `is_over`, or the thread is interrupted."""
+    def run(self) -> NoReturn:
+        """Draw all changes until the thread is interrupted."""
         before = time.monotonic()
-        while not is_over():
+        while True:
             now = time.monotonic()
             with self._lock:
                 self._player = self._player.advanced(now - before)
@@ -96,10 +88,6 @@ class ViewerPage:
         """Show the end of the motion."""
         self._play(Player.at_end)
 
-    def close(self) -> None:
-        """End the planning thread."""
-        self.model.close()
-
     def _draw_response(self, response: Response) -> None:
         plan, question = response.plan, response.question
         trajectory = None if plan is None else plan.trajectory
@@ -127,7 +115,7 @@ class ViewerPage:
 
     def _connect(self) -> None:
         """Connect the controls to the request and the player."""
-        panel, view = self.panel, self.view
+        panel = self.panel
         for control, change in (
             (panel.target, self._on_numbers),
             (panel.target_example, self._on_target_example),
@@ -142,7 +130,7 @@ class ViewerPage:
             control.on_update(self._by_hand(change))
         panel.start_here.on_click(self._by_hand(self._on_start_here))
         panel.play.on_click(self._by_hand(lambda: self._play(Player.toggled)))
-        view.target.on_update(self._by_hand(self._on_drag))
+        self.view.target.on_update(self._by_hand(self._on_drag))
 
     def _by_hand(self, change: Callable[[], Any]) -> Callable[[Any], None]:
         """Return a callback for changes by the user only, not for those by this program."""

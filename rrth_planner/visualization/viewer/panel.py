@@ -38,22 +38,15 @@ def response_html(response: Response) -> str:
     if plan.trajectory is None or plan.path is None or plan.search is None:
         return _page(f'no motion, {took}', BAD, f'{plan.status.value}: {sentence}', [])
     raw, trees = plan.search.raw_path, plan.search.trees
+    first = 'one straight edge'
+    if raw is not None:
+        first = f'{len(raw.waypoints)} waypoints, {raw.length:.3f} rad'
+    short = f'{len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad'
+    timed = f'{len(plan.trajectory.times)} points, {plan.trajectory.duration:.2f} s'
     rows = [
-        (
-            FIRST,
-            'first path: one straight edge'
-            if raw is None
-            else f'first path: {len(raw.waypoints)} waypoints, {raw.length:.3f} rad',
-        ),
-        (
-            SHORT,
-            f'after shortcuts: {len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad',
-        ),
-        (
-            TIMED,
-            f'trajectory with corner blends: {len(plan.trajectory.times)} points, '
-            f'{plan.trajectory.duration:.2f} s',
-        ),
+        (FIRST, f'first path: {first}'),
+        (SHORT, f'after shortcuts: {short}'),
+        (TIMED, f'trajectory with corner blends: {timed}'),
     ]
     rows += [
         (colour, f'tree from the {end}: {len(tree.nodes)} nodes')
