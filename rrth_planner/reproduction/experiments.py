@@ -45,12 +45,6 @@ _RRT_H: dict[str, Any] = {
 }
 # Of the printed steps, sparse and dense.
 SPARSE, DENSE = 1.0, 0.2
-_PRINTED: dict[str, Any] = {
-    **_RRT_H,
-    'corner_spacing': SPARSE,
-    'target_spacing': SPARSE,
-    'check_spacing': SPARSE,
-}
 
 FIVE = ('RRT', 'RRT*', 'Informed RRT*', 'RRT*-Smart', 'RRT-H')
 RRT, RRT_STAR, INFORMED, SMART, RRT_H = FIVE
@@ -59,18 +53,24 @@ PRINTED_DENSE, PRINTED_SMALL = 'RRT-H as printed, dense P_C', 'RRT-H as printed,
 PRINTED_OTHERS = (PRINTED_FINE, PRINTED_DENSE, PRINTED_SMALL)
 LONG_STEP, BIASED = 'RRT, step 20', 'RRT, goal bias 5 %'
 CLUB, NO_CLUB = 'RRT-H, path club', 'RRT-H, no club'
+
+
+def _printed(corners: float, target: float, check: float) -> PrintedRRTHOptions:
+    """Return the options of the printed steps: k, spacings of P_T and of P_C [map units]."""
+    spacings = {'corner_spacing': corners, 'target_spacing': target, 'check_spacing': check}
+    return PrintedRRTHOptions(**{**_RRT_H, **spacings})
+
+
 ALGORITHMS: dict[str, TreeOptions] = {
     RRT: RRTOptions(**_GROWTH),
     RRT_STAR: RRTStarOptions(**_STAR),
     INFORMED: InformedRRTStarOptions(**_STAR),
     SMART: RRTStarSmartOptions(**_STAR),
     RRT_H: RRTHOptions(**_RRT_H),
-    PRINTED: PrintedRRTHOptions(**_PRINTED),
-    PRINTED_FINE: PrintedRRTHOptions(
-        **{**_PRINTED, 'corner_spacing': DENSE, 'target_spacing': DENSE, 'check_spacing': DENSE}
-    ),
-    PRINTED_DENSE: PrintedRRTHOptions(**{**_PRINTED, 'check_spacing': DENSE}),
-    PRINTED_SMALL: PrintedRRTHOptions(**{**_PRINTED, 'corner_spacing': DENSE}),
+    PRINTED: _printed(SPARSE, SPARSE, SPARSE),
+    PRINTED_FINE: _printed(DENSE, DENSE, DENSE),
+    PRINTED_DENSE: _printed(SPARSE, SPARSE, DENSE),
+    PRINTED_SMALL: _printed(DENSE, SPARSE, SPARSE),
     LONG_STEP: RRTOptions(**{**_GROWTH, 'step_size': 20.0}),
     BIASED: RRTOptions(**{**_GROWTH, 'goal_bias': 0.05}),
 }

@@ -47,8 +47,6 @@ class Run:
         A name that `load_problem` knows.
     algorithm : str
         What tables and pictures call these options.
-    options : TreeOptions
-    seed : int
     collision : str
         As for `load_problem`.
 

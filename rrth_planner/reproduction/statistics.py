@@ -15,15 +15,7 @@ NOTHING = '–'
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """
-    Some rows of a campaign.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        As `reproduction.run.execute` returns them.
-
-    """
+    """Some rows of a campaign, as `reproduction.run.execute` returns them."""
 
     rows: Sequence[dict[str, Any]]
 

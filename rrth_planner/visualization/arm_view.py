@@ -106,13 +106,7 @@ def draw_motion(
     """
     Draw the wearer, the arm along its motion, the pointing ray, the tool's path and the target.
 
-    Parameters
-    ----------
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    ray_guard_length : float
-        Drawn length of the ray where it does not meet the target yet [m].
-
+    The target, (3,), is in the base frame; a ray that does not meet it has `ray_guard_length` [m].
     """
     q, q_dense = (
         positions_at(trajectory, np.linspace(0.0, trajectory.duration, n)) for n in (N_DRAWN, 200)

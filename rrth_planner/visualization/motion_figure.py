@@ -25,19 +25,7 @@ LEGEND: dict[str, Any] = {'fontsize': 8, 'frameon': False, 'columnspacing': 1.2}
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Motion:
-    """
-    One motion to be drawn.
-
-    Parameters
-    ----------
-    label : str
-        What the target is called.
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    caption : str
-        A line of figures below the label; may be empty.
-
-    """
+    """One motion to a labelled target, (3,) in the base frame [m]; the caption may be empty."""
 
     label: str
     trajectory: Trajectory
@@ -53,12 +41,10 @@ def motion_figure(
     ray_guard_length: float,
 ) -> Figure:
     """
-    Return a figure of motions: left the arm on its wearer, right the curves of the joints.
+    Return a figure of motions, a row each: left the arm on its wearer, right the joints' curves.
 
     Parameters
     ----------
-    motions : sequence of Motion
-        At least one; each has a row.
     limits : MotionLimits
         Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float

@@ -63,15 +63,7 @@ def recording_figure(
 
     Left, the motion of the arm with the wearer as at the end; right, over time, joint positions
     and velocities as commanded and as measured, the arm's distance to the wearer, and the state of
-    the monitor.
-
-    Parameters
-    ----------
-    settings : PlanSettings
-        For the margin, the length of the ray that must stay clear, and the limits.
-    title : str
-        Title above the curves.
-
+    the monitor. Margin, limits and the length of the ray that must stay clear are of the settings.
     """
     figure = Figure(figsize=SIZE, facecolor='white')
     FigureCanvasAgg(figure)

@@ -7,11 +7,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 from rrth_planner.reproduction.experiments import Extent, NEAR, with_near
-from rrth_planner.reproduction.figures.arm import (
-    joint_paths_figure,
-    motions_figure,
-    paths_of_median,
-)
+from rrth_planner.reproduction.figures.arm import joint_paths_figure, median_paths, motions_figure
 from rrth_planner.reproduction.figures.costs import (
     convergence_figure,
     DRAWS,
@@ -50,7 +46,7 @@ def _pictures(rows: Rows, extent: Extent) -> Iterator[tuple[str, str, Figure]]:
     caption = f'Figure 12: histograms of cost and of time, {n} runs (triangles: medians)'
     yield '12', caption, histogram_figure(rows, maps, n)
     yield '14', 'Figure 14: the escape from local traps', escape_figure(rows, n)
-    pairs = {target: paths_of_median(rows, target) for target in extent.targets}
+    pairs = {target: median_paths(rows, target) for target in extent.targets}
     caption = 'Figure 20: joint paths to the targets, the run of median length'
     yield '20', caption, joint_paths_figure(pairs)
     shown = dict(list(pairs.items())[:: max(1, len(pairs) // N_MOTIONS)])

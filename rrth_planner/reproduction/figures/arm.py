@@ -22,7 +22,7 @@ from rrth_planner.visualization.viewer.examples import example_body
 Pair = tuple[Path, Path]
 
 
-def paths_of_median(rows: Rows, target: str) -> Pair:
+def median_paths(rows: Rows, target: str) -> Pair:
     """Return the paths of RRT and RRT-H of the seed whose RRT path is of median length [rad]."""
     name = f'arm/{target}'
     some = rows.where(problem=name, algorithm=RRT, collision=CERTIFIED)

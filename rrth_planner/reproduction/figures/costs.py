@@ -24,19 +24,9 @@ N_BINS = 36
 
 def convergence_figure(rows: Rows, maps: Sequence[str], axis: str, n: int) -> Figure:
     """
-    Return the cost of the best path against draws or time, medians and quartiles over runs.
+    Return the cost of the best path against DRAWS or TIME, medians and quartiles over n runs.
 
     RRT and RRT-H stop at their first path: a point each, joined to the result of shortening.
-
-    Parameters
-    ----------
-    maps : sequence of str
-        Each has its own axes.
-    axis : str
-        DRAWS or TIME.
-    n : int
-        Seeds below this.
-
     """
     figure = Figure(figsize=(4.9 * len(maps), 4.3), layout='constrained', dpi=100)
     for axes, problem in zip(figure.subplots(1, len(maps), squeeze=False)[0], maps, strict=True):

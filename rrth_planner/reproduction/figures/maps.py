@@ -53,7 +53,6 @@ def trees_figure(maps: Sequence[str]) -> Figure:
             if result.path is not None:
                 draw_path(axes, result.path.waypoints, FINAL, 2.2)
                 note = f'cost {result.path.length:.1f}'
-            draw_ends(axes, load_map(problem))
             axes.set_title(f'{name}\n{note}, {result.n_samples} P_random', fontsize=9)
         row[0].set_ylabel(problem.replace('_', ' '), fontsize=11, fontweight='bold')
     _legend(figure, ('tree', TREE), ("RRT-H's path before shortening", FIRST), ('path', FINAL))
@@ -80,7 +79,6 @@ def escape_figure(rows: Rows, n: int) -> Figure:
         for i, path in enumerate(paths):
             shade = i / max(1, len(paths) - 1)
             draw_path(axes, path, (0.76, 0.1 + 0.6 * shade, 0.36 - 0.26 * shade), 1.6)
-        draw_ends(axes, box_map)
         n_above = sum(goes_over_the_top(path) for path in paths)
         axes.set_title(
             f'{len(growths)} growths {title}:\n{len(paths)} paths, {n_above} over the top',
@@ -99,7 +97,7 @@ def escape_figure(rows: Rows, n: int) -> Figure:
 
 
 def draw_map(axes: Any, box_map: BoxMap) -> None:
-    """Draw the frame and the walls of a map in the plane."""
+    """Draw the frame, the walls, the start and the goal of a map in the plane."""
     (x0, y0), (x1, y1) = box_map.bounds
     for lower, upper in box_map.obstacles:
         axes.add_patch(Rectangle(lower, *(upper - lower), color=WALL, lw=0, zorder=2))
@@ -109,6 +107,8 @@ def draw_map(axes: Any, box_map: BoxMap) -> None:
     axes.set_yticks([])
     for spine in axes.spines.values():
         spine.set_color(FRAME)
+    for q, colour, mark, size in ((box_map.start, START, 'o', 7), (box_map.goal, GOAL, '*', 12)):
+        axes.plot(*q, ls='', marker=mark, ms=size, color=colour, mec='white', zorder=4)
 
 
 def draw_tree(axes: Any, tree: Tree) -> None:
@@ -121,13 +121,6 @@ def draw_tree(axes: Any, tree: Tree) -> None:
 def draw_path(axes: Any, waypoints: Array, colour: Any, width: float) -> None:
     """Draw a path, shape (n, 2)."""
     axes.plot(*waypoints.T, color=colour, lw=width, zorder=3, solid_joinstyle='round')
-
-
-def draw_ends(axes: Any, box_map: BoxMap) -> None:
-    """Draw start and goal."""
-    for q, colour, mark in ((box_map.start, START, 'o'), (box_map.goal, GOAL, '*')):
-        size = 7 if mark == 'o' else 12
-        axes.plot(*q, ls='', marker=mark, ms=size, color=colour, mec='white', zorder=4)
 
 
 def _legend(figure: Figure, *entries: tuple[str, str]) -> None:

@@ -5,7 +5,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from threading import Condition, Thread
-import time
 import traceback
 from typing import Any
 
@@ -16,21 +15,16 @@ from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_motion
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Waiting for a response checks the clock so often [s].
-LONGEST_NAP = 0.5
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Response:
     """
-    Response to one request.
+    Response to one request: the figures of a motion, or a sentence why there is none.
 
     Parameters
     ----------
     number : int
         Number of the request, from 1; 0: none yet.
-    sentence : str
-        The figures of a motion, or the reason why there is none.
     question : PlanQuestion or None
         None where the request was invalid.
     plan : MotionPlan or None
@@ -42,11 +36,6 @@ class Response:
     sentence: str = 'no request yet'
     question: PlanQuestion | None = None
     plan: MotionPlan | None = None
-
-    @property
-    def is_solved(self) -> bool:
-        """Whether there is a motion."""
-        return self.plan is not None and self.plan.trajectory is not None
 
 
 class ViewerModel:
@@ -109,10 +98,8 @@ class ViewerModel:
 
     def wait(self, number: int, timeout: float) -> Response:
         """Return the response to a request or to a newer one; the last one after a time [s]."""
-        end = time.monotonic() + timeout
         with self._condition:
-            while self.response.number < number and time.monotonic() < end:
-                self._condition.wait(LONGEST_NAP)
+            self._condition.wait_for(lambda: self.response.number >= number, timeout)
             return self.response
 
     def close(self) -> None:

@@ -18,7 +18,6 @@ class Player:
         Share of the last motion that was played, where there is none now [-].
     speed : float
         How much faster than the clock, > 0 [-].
-    is_playing, is_repeating : bool
 
     """
 

@@ -68,18 +68,10 @@ class ArmShape:
 
 
 class SceneView:
-    """
-    Draw into a server's scene, x forward, y left, z up [m].
-
-    Parameters
-    ----------
-    ray_guard_length : float
-        Drawn length of a ray that does not meet the target [m].
-
-    """
+    """Draw into a server's scene, x forward, y left, z up [m]."""
 
     def __init__(self, server: viser.ViserServer, arm: ArmModel, ray_guard_length: float) -> None:
-        """Set up light, camera, floor and the layers that can be hidden."""
+        """Set up camera, floor and layers; a ray that meets no target is drawn so long [m]."""
         self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
         server.scene.set_up_direction('+z')
         server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
@@ -130,19 +122,7 @@ class SceneView:
         self._replace('tree', handles)
 
     def show_path(self, layer: str, curve: Array, corners: Array) -> None:
-        """
-        Draw a path of the tool in a layer.
-
-        Parameters
-        ----------
-        layer : str
-            'first', 'short' or 'timed'.
-        curve : ndarray, shape (n, 3)
-            [m]; none: an empty one.
-        corners : ndarray, shape (m, 3)
-            Where its waypoints are [m].
-
-        """
+        """Draw a path of the tool, (n, 3), and its waypoints, (m, 3), in a layer of PATHS [m]."""
         colour, width = PATHS[layer]
         handles = self._lines(f'/{layer}/line', segments_of(curve), colour, width)
         if len(corners):
