@@ -77,19 +77,12 @@ def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
         close, np.concatenate([poses[:, :3, 3] + reach, poses[:, :3, 3] - reach]), VIEWS[1]
     )
     _draw_arm(close, arm, q, ray)
-    for pose, length, width in zip(poses, *_sizes(poses, reach), strict=True):
-        _draw_frame(close, pose, length, width)
+    for i, pose in enumerate(poses):
+        # A frame on an earlier one is shorter and thicker.
+        n = sum(np.allclose(pose[:3, 3], other[:3, 3], atol=1e-6) for other in poses[:i])
+        _draw_frame(close, pose, reach * 0.55**n, 1.6 + 2.0 * n)
     _label(close, [*poses[:, :3, 3], ray[1]], [*names, 'pointing ray'])
     return figure
-
-
-def _sizes(poses: Array, length: float) -> tuple[list[float], list[float]]:
-    """Return how long and how thick each frame is drawn: one on another is shorter, thicker."""
-    below = [
-        sum(np.allclose(pose[:3, 3], other[:3, 3], atol=1e-6) for other in poses[:i])
-        for i, pose in enumerate(poses)
-    ]
-    return [length * 0.55**n for n in below], [1.6 + 2.0 * n for n in below]
 
 
 def _draw_frame(axes: Any, pose: Array, length: float, width: float) -> None:

@@ -35,10 +35,8 @@ def escape_table(rows: Rows) -> str:
         cells = [str(attempts)]
         for name in (CLUB, NO_CLUB):
             some = rows.where(problem=TWO_WAYS, algorithm=club_label(name, attempts))
-            cells += [
-                percent(better_way_share(rows, name, attempts), 1),
-                number(some.median('draws_total'), 0),
-            ]
+            share, draws = better_way_share(rows, name, attempts), some.median('draws_total')
+            cells += [percent(share, 1), number(draws, 0)]
         lines.append(cells)
     header = ('`club_attempts`', 'better way, club', 'draws', 'better way, no club', 'draws')
     return markdown_table(header, lines)

@@ -67,15 +67,8 @@ def joint_paths_figure(pairs: Mapping[str, Pair]) -> Figure:
             axes.set_xlabel('length along the path [rad]')
         if k % n_columns == 0:
             axes.set_ylabel('position [rad]')
-    labels = sorted(handles)
-    figure.legend(
-        [handles[label] for label in labels],
-        labels,
-        loc='outside lower center',
-        ncols=4,
-        frameon=False,
-        fontsize=9,
-    )
+    labels, lines = zip(*sorted(handles.items()), strict=True)
+    figure.legend(lines, labels, loc='outside lower center', ncols=4, frameon=False, fontsize=9)
     return figure
 
 

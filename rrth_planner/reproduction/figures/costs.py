@@ -165,10 +165,6 @@ def _shared_legend(figure: Figure) -> None:
         handles, labels = axes.get_legend_handles_labels()
         found |= zip(labels, handles, strict=True)
     labels = [name for name in (*FIVE, 'exact shortest') if name in found]
-    figure.legend(
-        [found[label] for label in labels],
-        labels,
-        loc='outside lower center',
-        ncols=3 if len(figure.axes) == 1 else len(labels),
-        frameon=False,
-    )
+    lines = [found[label] for label in labels]
+    n_columns = 3 if len(figure.axes) == 1 else len(labels)
+    figure.legend(lines, labels, loc='outside lower center', ncols=n_columns, frameon=False)

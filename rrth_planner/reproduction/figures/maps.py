@@ -13,7 +13,6 @@ from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.box_map import BoxMap
 from rrth_planner.planning.planner import plan
-from rrth_planner.planning.result import Tree
 from rrth_planner.reproduction.claims.path_club import both_ways_shares
 from rrth_planner.reproduction.experiments import (
     ALGORITHMS,
@@ -44,14 +43,17 @@ def trees_figure(maps: Sequence[str]) -> Figure:
         for axes, name in zip(row, FIVE, strict=True):
             rng = np.random.default_rng(SEED)
             result = plan(load_problem(problem).problem, ALGORITHMS[name], rng)
-            draw_map(axes, load_map(problem))
+            _draw_map(axes, load_map(problem))
             for tree in result.trees:
-                draw_tree(axes, tree)
+                children = np.flatnonzero(tree.parents >= 0)
+                edges = tree.nodes[np.stack([tree.parents[children], children], axis=1)]
+                lines = LineCollection(list(edges), colors=TREE, linewidths=0.5, zorder=1)
+                axes.add_collection(lines)
             if result.raw_path is not None and name.startswith('RRT-H'):
-                draw_path(axes, result.raw_path.waypoints, FIRST, 1.4)
+                _draw_path(axes, result.raw_path.waypoints, FIRST, 1.4)
             note = 'no path'
             if result.path is not None:
-                draw_path(axes, result.path.waypoints, FINAL, 2.2)
+                _draw_path(axes, result.path.waypoints, FINAL, 2.2)
                 note = f'cost {result.path.length:.1f}'
             axes.set_title(f'{name}\n{note}, {result.n_samples} P_random', fontsize=9)
         row[0].set_ylabel(problem.replace('_', ' '), fontsize=11, fontweight='bold')
@@ -73,12 +75,12 @@ def escape_figure(rows: Rows, n: int) -> Figure:
         (left, SCATTERED_CLUB, 'that avoid the path club', 'with the path club', FINAL, 'o'),
         (middle, SCATTERED_PLAIN, 'without a club', 'without', GOAL, 's'),
     ):
-        draw_map(axes, box_map)
+        _draw_map(axes, box_map)
         growths = scattered_growths(problem, SCATTERED[name], SEED)
         paths = [growth.waypoints for growth in growths if growth.waypoints is not None]
         for i, path in enumerate(paths):
             shade = i / max(1, len(paths) - 1)
-            draw_path(axes, path, (0.76, 0.1 + 0.6 * shade, 0.36 - 0.26 * shade), 1.6)
+            _draw_path(axes, path, (0.76, 0.1 + 0.6 * shade, 0.36 - 0.26 * shade), 1.6)
         n_above = sum(goes_over_the_top(path) for path in paths)
         axes.set_title(
             f'{len(growths)} growths {title}:\n{len(paths)} paths, {n_above} over the top',
@@ -96,7 +98,7 @@ def escape_figure(rows: Rows, n: int) -> Figure:
     return figure
 
 
-def draw_map(axes: Any, box_map: BoxMap) -> None:
+def _draw_map(axes: Any, box_map: BoxMap) -> None:
     """Draw the frame, the walls, the start and the goal of a map in the plane."""
     (x0, y0), (x1, y1) = box_map.bounds
     for lower, upper in box_map.obstacles:
@@ -111,14 +113,7 @@ def draw_map(axes: Any, box_map: BoxMap) -> None:
         axes.plot(*q, ls='', marker=mark, ms=size, color=colour, mec='white', zorder=4)
 
 
-def draw_tree(axes: Any, tree: Tree) -> None:
-    """Draw the edges of a tree."""
-    children = np.flatnonzero(tree.parents >= 0)
-    edges = np.stack([tree.nodes[tree.parents[children]], tree.nodes[children]], axis=1)
-    axes.add_collection(LineCollection(list(edges), colors=TREE, linewidths=0.5, zorder=1))
-
-
-def draw_path(axes: Any, waypoints: Array, colour: Any, width: float) -> None:
+def _draw_path(axes: Any, waypoints: Array, colour: Any, width: float) -> None:
     """Draw a path, shape (n, 2)."""
     axes.plot(*waypoints.T, color=colour, lw=width, zorder=3, solid_joinstyle='round')
 

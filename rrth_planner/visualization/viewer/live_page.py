@@ -56,8 +56,9 @@ class LivePage:
             curve = trajectory_curve(feed.arm, trajectory)
             corners = tool_positions(feed.arm, trajectory.positions[[0, -1]])
             self.view.show_path('timed', curve, corners)
-        if self._drawn.get('said') != feed.said:
-            said = self._drawn['said'] = feed.said
+        said = feed.said
+        if self._drawn.get('said') != said:
+            self._drawn['said'] = said
             self.panel.said.content = (
                 f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em">{escape(said)}</div>'
             )

@@ -123,7 +123,7 @@ class ViewerPage:
             (panel.margin, lambda: self.model.ask(margin=panel.margin.value)),
             (panel.seed, lambda: self.model.ask(seed=panel.seed.value)),
             (panel.step_size, lambda: self.model.ask(step_size=panel.step_size.value)),
-            (panel.time, lambda: self._play(lambda player: player.moved(panel.time.value), False)),
+            (panel.time, lambda: self._play(lambda player: player.moved(panel.time.value))),
             (panel.speed, self._on_motion_settings),
             (panel.repeat, self._on_motion_settings),
         ):
@@ -181,7 +181,6 @@ class ViewerPage:
         speed, is_repeating = float(self.panel.speed.value), self.panel.repeat.value
         self._play(lambda player: replace(player, speed=speed, is_repeating=is_repeating))
 
-    def _play(self, change: Callable[[Player], Player], is_on: bool = True) -> None:
+    def _play(self, change: Callable[[Player], Player]) -> None:
         with self._lock:
-            player = change(self._player)
-            self._player = player if is_on else replace(player, is_playing=False)
+            self._player = change(self._player)

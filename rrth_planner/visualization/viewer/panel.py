@@ -70,15 +70,9 @@ def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -
 
 class Panel:
     """
-    The controls; their callbacks have no arguments and read the values from here.
+    The controls, among them a checkbox for each layer, which it shows and hides.
 
-    Parameters
-    ----------
-    layers : mapping
-        What the checkboxes show and hide, by name.
-    is_live : bool
-        The nodes plan: without the controls that need a plan of this process.
-
+    Live, where the nodes plan, there are none that need a plan of this process.
     """
 
     def __init__(
