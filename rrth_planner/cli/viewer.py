@@ -117,7 +117,7 @@ def _run_planning(options: argparse.Namespace) -> None:
                 page.draw()
                 save_picture(url, options.screenshot)
         finally:
-            page.close()
+            page.model.close()
 
 
 def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:

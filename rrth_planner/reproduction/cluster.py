@@ -9,7 +9,7 @@ seeds from the cluster.
 
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import logging
 from pathlib import Path
@@ -18,13 +18,7 @@ import tempfile
 import time
 from typing import Any
 
-from rrth_planner.reproduction.row_store import (
-    append_rows,
-    CLUSTER,
-    finished_keys,
-    SERIAL,
-    unite_parts,
-)
+from rrth_planner.reproduction.row_store import append_rows, CLUSTER, finished_keys, SERIAL
 from rrth_planner.reproduction.run import execute, Row, Run
 from tqdm import tqdm
 
@@ -47,7 +41,6 @@ def run_campaign(
 
     Parameters
     ----------
-    runs : sequence of Run
     path : Path
         The Parquet file of the campaign.
     client : distributed.Client
@@ -58,12 +51,12 @@ def run_campaign(
         What the progress bar calls them.
 
     """
-    unite_parts(path)
     done = finished_keys(path, timed=timed)
     pending = list({run.key(): run for run in runs if run.key() not in done}.values())
     if not pending:
         return 0
-    results = _serially(pending) if client is None else _on_cluster(pending, client)
+    one_by_one = ([execute(run, SERIAL)] for run in pending)
+    results = one_by_one if client is None else _on_cluster(pending, client)
     rows: list[Row] = []
     saved = time.monotonic()
     with tqdm(
@@ -80,7 +73,6 @@ def run_campaign(
             # Also when interrupted.
             if rows:
                 append_rows(path, rows)
-    unite_parts(path)
     return len(pending)
 
 
@@ -97,35 +89,24 @@ def cluster_client(scheduler: str | None = None, n_workers: int | None = None) -
         Processes of the local cluster; None: as many as cores.
 
     """
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
-    if scheduler is not None:
-        with Client(scheduler) as client:
+    with tempfile.TemporaryDirectory(prefix='rrth-campaign-') as folder:
+        local = {
+            'n_workers': n_workers,
+            'threads_per_worker': 1,
+            'processes': True,
+            'dashboard_address': '127.0.0.1:0',
+            'local_directory': folder,
+            'silence_logs': logging.ERROR,
+        }
+        with Client(**local) if scheduler is None else Client(scheduler) as client:
             yield client
-        return
-    with (
-        tempfile.TemporaryDirectory(prefix='rrth-campaign-') as folder,
-        LocalCluster(
-            n_workers=n_workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address='127.0.0.1:0',
-            local_directory=folder,
-            silence_logs=logging.ERROR,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
 
 
 def run_batch(runs: Sequence[Run]) -> list[Row]:
     """Return the rows of some runs; what a worker does."""
     return [execute(run, CLUSTER) for run in runs]
-
-
-def _serially(runs: Iterable[Run]) -> Iterator[list[Row]]:
-    for run in runs:
-        yield [execute(run, SERIAL)]
 
 
 def _on_cluster(runs: Sequence[Run], client: Any) -> Iterator[list[Row]]:

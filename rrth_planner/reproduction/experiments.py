@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The runs behind the paper's figures and numbers: which options, which problems, which seeds."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from rrth_planner.planning.options import (
     TreeOptions,
 )
 from rrth_planner.reproduction.path_club import ScatterOptions
-from rrth_planner.reproduction.problems import CERTIFIED, TARGETS
+from rrth_planner.reproduction.problems import TARGETS
 from rrth_planner.reproduction.run import Run
 
 MAPS = ('c_shape', 'spiral', 'fence')
@@ -45,58 +45,50 @@ _RRT_H: dict[str, Any] = {
 }
 # Of the printed steps, sparse and dense.
 SPARSE, DENSE = 1.0, 0.2
-_PRINTED: dict[str, Any] = {
-    **_RRT_H,
-    'corner_spacing': SPARSE,
-    'target_spacing': SPARSE,
-    'check_spacing': SPARSE,
-}
 
-RRT, RRT_STAR, INFORMED, SMART, RRT_H = (
-    'RRT',
-    'RRT*',
-    'Informed RRT*',
-    'RRT*-Smart',
-    'RRT-H',
-)
-FIVE = (RRT, RRT_STAR, INFORMED, SMART, RRT_H)
+FIVE = ('RRT', 'RRT*', 'Informed RRT*', 'RRT*-Smart', 'RRT-H')
+RRT, RRT_STAR, INFORMED, SMART, RRT_H = FIVE
 PRINTED, PRINTED_FINE = 'RRT-H as printed', 'RRT-H as printed, fine'
 PRINTED_DENSE, PRINTED_SMALL = 'RRT-H as printed, dense P_C', 'RRT-H as printed, small k'
 PRINTED_OTHERS = (PRINTED_FINE, PRINTED_DENSE, PRINTED_SMALL)
 LONG_STEP, BIASED = 'RRT, step 20', 'RRT, goal bias 5 %'
 CLUB, NO_CLUB = 'RRT-H, path club', 'RRT-H, no club'
+
+
+def _printed(corners: float, target: float, check: float) -> PrintedRRTHOptions:
+    """Return the options of the printed steps: k, spacings of P_T and of P_C [map units]."""
+    spacings = {'corner_spacing': corners, 'target_spacing': target, 'check_spacing': check}
+    return PrintedRRTHOptions(**{**_RRT_H, **spacings})
+
+
 ALGORITHMS: dict[str, TreeOptions] = {
     RRT: RRTOptions(**_GROWTH),
     RRT_STAR: RRTStarOptions(**_STAR),
     INFORMED: InformedRRTStarOptions(**_STAR),
     SMART: RRTStarSmartOptions(**_STAR),
     RRT_H: RRTHOptions(**_RRT_H),
-    PRINTED: PrintedRRTHOptions(**_PRINTED),
-    PRINTED_FINE: PrintedRRTHOptions(
-        **{**_PRINTED, 'corner_spacing': DENSE, 'target_spacing': DENSE, 'check_spacing': DENSE}
-    ),
-    PRINTED_DENSE: PrintedRRTHOptions(**{**_PRINTED, 'check_spacing': DENSE}),
-    PRINTED_SMALL: PrintedRRTHOptions(**{**_PRINTED, 'corner_spacing': DENSE}),
+    PRINTED: _printed(SPARSE, SPARSE, SPARSE),
+    PRINTED_FINE: _printed(DENSE, DENSE, DENSE),
+    PRINTED_DENSE: _printed(SPARSE, SPARSE, DENSE),
+    PRINTED_SMALL: _printed(DENSE, SPARSE, SPARSE),
     LONG_STEP: RRTOptions(**{**_GROWTH, 'step_size': 20.0}),
     BIASED: RRTOptions(**{**_GROWTH, 'goal_bias': 0.05}),
 }
-# Growths after the first one that the escape may make, and the draws of each at most.
+# Growths after the first one that the escape may make.
 ATTEMPTS = (0, 1, 2, 3, 4, 6)
-CLUB_BUDGET = 400
-# More club points than this, so near [map units], turn a new point away with this chance.
-CLUB_COUNT, CLUB_RADIUS, CLUB_PROBABILITY = 2, 10.0, 0.9
-# Growths alone, after each other, and the draws of each at most: with the path club and without.
-SCATTERED_CLUB, SCATTERED_PLAIN = 'growths, path club', 'growths, no club'
-N_GROWTHS, SCATTER_BUDGET = 8, 1000
-_SCATTER: dict[str, Any] = {
+# More club points than `club_count`, so near [map units], turn a new point away with this chance.
+_CLUB: dict[str, Any] = {
     **_RRT_H,
-    'club_attempts': N_GROWTHS - 1,
-    'club_budget': SCATTER_BUDGET,
-    'club_count': CLUB_COUNT,
-    'club_probability': CLUB_PROBABILITY,
+    'club_budget': 400,
+    'club_count': 2,
+    'club_radius': 10.0,
+    'club_probability': 0.9,
 }
+# Eight growths alone, after each other: with the path club and without.
+SCATTERED_CLUB, SCATTERED_PLAIN = 'growths, path club', 'growths, no club'
+_SCATTER: dict[str, Any] = {**_CLUB, 'club_attempts': 7, 'club_budget': 1000}
 SCATTERED = {
-    SCATTERED_CLUB: ScatterOptions(**{**_SCATTER, 'club_radius': CLUB_RADIUS}),
+    SCATTERED_CLUB: ScatterOptions(**_SCATTER),
     SCATTERED_PLAIN: ScatterOptions(**{**_SCATTER, 'club_radius': 0.0}),
 }
 # The arm's step [rad]: the paper gives none; with this one RRT's paths wind as much as its do.
@@ -145,25 +137,16 @@ QUICK = Extent(few=10, many=20, seeds=50, long=3, arm=4, arm_modes=4)
 
 def timed_runs(extent: Extent) -> list[Run]:
     """Return the runs whose times are reported, to be done one after another."""
-    wanted = [
-        *(
-            (problem, name, seed)
-            for problem in with_near(extent.maps)
-            for name in FIVE
-            for seed in range(extent.many)
-        ),
-        # Compared seed by seed: one right after the other, so that the machine is the same.
-        *(
-            (problem, name, seed)
-            for problem in with_near(extent.maps)
-            for seed in range(extent.many)
-            for name in (PRINTED, *(PRINTED_OTHERS if problem in extent.maps else ()))
-        ),
-    ]
-    return [
-        Run(problem=problem, algorithm=name, options=ALGORITHMS[name], seed=seed)
-        for problem, name, seed in wanted
-    ]
+    runs: list[Run] = []
+    for problem in with_near(extent.maps):
+        for name in FIVE:
+            runs += _runs(problem, name, range(extent.many))
+    # Compared seed by seed: one right after the other, so that the machine is the same.
+    for problem in with_near(extent.maps):
+        for seed in range(extent.many):
+            for name in (PRINTED, *(PRINTED_OTHERS if problem in extent.maps else ())):
+                runs += _runs(problem, name, [seed])
+    return runs
 
 
 def spread_runs(extent: Extent) -> list[Run]:
@@ -174,40 +157,14 @@ def spread_runs(extent: Extent) -> list[Run]:
     return [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
 
 
-def club_options(attempts: int, *, probability: float) -> RRTHOptions:
-    """Return RRT-H with the escape: so many further growths, club points avoided or not."""
-    options = ALGORITHMS[RRT_H]
-    assert isinstance(options, RRTHOptions)
-    return replace(
-        options,
-        club_attempts=attempts,
-        club_budget=CLUB_BUDGET,
-        club_count=CLUB_COUNT,
-        club_radius=CLUB_RADIUS,
-        club_probability=probability,
-    )
-
-
 def with_near(maps: Sequence[str]) -> tuple[str, ...]:
     """Return the maps and, beside the C, the one of Figure 10b."""
     return (*maps, NEAR) if 'c_shape' in maps else tuple(maps)
 
 
-def _map_runs(extent: Extent) -> Iterable[Run]:
-    for problem in extent.maps:
-        for name in (RRT, RRT_H, PRINTED, PRINTED_FINE, LONG_STEP, BIASED):
-            # Seeds that the timed runs have are not done twice.
-            first = 0 if name in (LONG_STEP, BIASED) else extent.many
-            for seed in range(first, extent.seeds):
-                yield Run(problem=problem, algorithm=name, options=ALGORITHMS[name], seed=seed)
-
-
-def _long_runs(extent: Extent) -> Iterable[Run]:
-    for problem in (name for name in extent.maps if name != 'fence'):
-        for name in (RRT_STAR, INFORMED):
-            options = replace(ALGORITHMS[name], max_samples=LONG)
-            for seed in range(extent.long):
-                yield Run(problem=problem, algorithm=long_label(name), options=options, seed=seed)
+def long_maps(extent: Extent) -> list[str]:
+    """Return the maps of the runs of 20,000 steps."""
+    return [name for name in extent.maps if name != 'fence']
 
 
 def long_label(name: str) -> str:
@@ -220,32 +177,45 @@ def club_label(name: str, attempts: int) -> str:
     return f'{name}, {attempts}'
 
 
-def _club_runs(extent: Extent) -> Iterable[Run]:
+def _runs(
+    problem: str, name: str, seeds: Iterable[int], options: TreeOptions | None = None
+) -> list[Run]:
+    """Return a run a seed, of a planner of ALGORITHMS or of other options."""
+    options = options or ALGORITHMS[name]
+    return [Run(problem=problem, algorithm=name, options=options, seed=seed) for seed in seeds]
+
+
+def _map_runs(extent: Extent) -> Iterator[Run]:
+    for problem in extent.maps:
+        # Seeds that the timed runs have are not done twice.
+        for name in (RRT, RRT_H, PRINTED, PRINTED_FINE):
+            yield from _runs(problem, name, range(extent.many, extent.seeds))
+        for name in (LONG_STEP, BIASED):
+            yield from _runs(problem, name, range(extent.seeds))
+
+
+def _long_runs(extent: Extent) -> Iterator[Run]:
+    for problem in long_maps(extent):
+        for name in (RRT_STAR, INFORMED):
+            options = replace(ALGORITHMS[name], max_samples=LONG)
+            yield from _runs(problem, long_label(name), range(extent.long), options)
+
+
+def _club_runs(extent: Extent) -> Iterator[Run]:
     for attempts in ATTEMPTS:
-        for name, probability in ((CLUB, CLUB_PROBABILITY), (NO_CLUB, 0.0)):
-            options = club_options(attempts, probability=probability)
-            for seed in range(extent.seeds):
-                yield Run(
-                    problem=TWO_WAYS,
-                    algorithm=club_label(name, attempts),
-                    options=options,
-                    seed=seed,
-                )
+        for name, changes in ((CLUB, {}), (NO_CLUB, {'club_probability': 0.0})):
+            options = RRTHOptions(**{**_CLUB, 'club_attempts': attempts, **changes})
+            yield from _runs(TWO_WAYS, club_label(name, attempts), range(extent.seeds), options)
     for name, scatter in SCATTERED.items():
-        for seed in range(extent.many):
-            yield Run(problem=TWO_WAYS, algorithm=name, options=scatter, seed=seed)
+        yield from _runs(TWO_WAYS, name, range(extent.many), scatter)
 
 
-def _arm_runs(extent: Extent) -> Iterable[Run]:
+def _arm_runs(extent: Extent) -> Iterator[Run]:
     for target in extent.targets:
-        for collision in (CERTIFIED, CHECK_POINTS, SAMPLED):
-            is_proof = collision == CERTIFIED
-            for name in ARM_ALGORITHMS if is_proof else (RRT_H,):
-                for seed in range(extent.arm if is_proof else extent.arm_modes):
-                    yield Run(
-                        problem=f'arm/{target}',
-                        algorithm=name,
-                        options=ARM_ALGORITHMS[name],
-                        seed=seed,
-                        collision=collision,
-                    )
+        for name, options in ARM_ALGORITHMS.items():
+            yield from _runs(f'arm/{target}', name, range(extent.arm), options)
+        for collision in (CHECK_POINTS, SAMPLED):
+            for run in _runs(
+                f'arm/{target}', RRT_H, range(extent.arm_modes), ARM_ALGORITHMS[RRT_H]
+            ):
+                yield replace(run, collision=collision)

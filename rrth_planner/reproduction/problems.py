@@ -11,19 +11,17 @@ from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.map_file import load_map
-from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.rotation import rotation_matrix
-from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.scene import Scene
 from rrth_planner.planning.box_map import map_problem
 from rrth_planner.planning.edge_checks import by_check_points, sampled
 from rrth_planner.planning.pointing_goals import check_pointing_arm, goal_configurations, MANY
 from rrth_planner.planning.problem import PlanningProblem
-from rrth_planner.planning.visibility_graph import enters, extended_obstacles
+from rrth_planner.planning.visibility_graph import enters, extended_obstacles, shortest_path
+from rrth_planner.visualization.viewer.examples import example_body
 
 CERTIFIED = 'certified'
 # Eight points round the wearer [m]; from the folded state none is reached by a straight edge.
@@ -52,8 +50,6 @@ class NamedProblem:
 
     Parameters
     ----------
-    name : str
-    problem : PlanningProblem
     is_path_valid : callable
         Waypoints (n, dof) -> does the path keep clear, by exact clipping on a map, by looking
         every 0.002 rad on the arm.
@@ -62,7 +58,6 @@ class NamedProblem:
 
     """
 
-    name: str
     problem: PlanningProblem
     is_path_valid: Callable[[Array], bool]
     is_body_clear: Callable[[Array], bool]
@@ -90,37 +85,19 @@ def load_problem(name: str, collision: str = CERTIFIED) -> NamedProblem:
     if name.startswith('arm/'):
         return _arm_problem(name, collision)
     box_map = load_map(name)
-    problem = map_problem(box_map)
-    problem = map_problem(box_map, _checked(problem.world, collision))
+    problem = map_problem(box_map, _checked(map_problem(box_map).world, collision))
     boxes = extended_obstacles(box_map)
 
     def is_path_valid(waypoints: Array) -> bool:
-        low, high = box_map.bounds
-        is_inside = bool(((waypoints >= low - 1e-9) & (waypoints <= high + 1e-9)).all())
+        is_inside = _are_within(waypoints, box_map.bounds)
         return is_inside and not bool(enters(waypoints[:-1], waypoints[1:], boxes).any())
 
-    return NamedProblem(
-        name=name, problem=problem, is_path_valid=is_path_valid, is_body_clear=is_path_valid
-    )
+    return NamedProblem(problem=problem, is_path_valid=is_path_valid, is_body_clear=is_path_valid)
 
 
-def load_wearer() -> Scene:
-    """Return the standing wearer, forearms forward."""
-    boxes = []
-    for marker in load_yaml(resource_path('msg_examples/body.yaml'))['markers']:
-        if marker['action'] != 0:
-            continue
-        pose, size = marker['pose'], marker['scale']
-        quaternion = np.array([pose['orientation'][k] for k in 'xyzw'], dtype=float)
-        boxes.append(
-            Box(
-                marker['text'],
-                np.array([pose['position'][k] for k in 'xyz'], dtype=float),
-                np.array([size[k] for k in 'xyz'], dtype=float),
-                rotation_matrix(quaternion),
-            )
-        )
-    return Scene(tuple(boxes))
+def exact_length(name: str) -> float:
+    """Return the length of the exact shortest path on a map [map units]."""
+    return shortest_path(load_map(name))[0]
 
 
 def _arm_problem(name: str, collision: str) -> NamedProblem:
@@ -128,7 +105,7 @@ def _arm_problem(name: str, collision: str) -> NamedProblem:
     target = TARGETS.get(name.removeprefix('arm/'))
     if target is None:
         raise SceneError(f'problem "{name}": expected arm/ and one of {", ".join(TARGETS)}')
-    arm, scene = load_arm(), load_wearer()
+    arm, scene = load_arm(), example_body('body')
     check_pointing_arm(arm)
     world = arm_world(arm, scene, MARGIN, RAY)
     goals = goal_configurations(arm, PointingGoal(np.array(target)), world, FOLDED, MANY)
@@ -137,21 +114,21 @@ def _arm_problem(name: str, collision: str) -> NamedProblem:
     problem = PlanningProblem(
         world=_checked(world, collision), q_start=FOLDED, q_goals=goals.q_goals[:1]
     )
-    low, high = world.bounds
-
-    def is_path_valid(waypoints: Array) -> bool:
-        is_inside = bool(((waypoints >= low - 1e-9) & (waypoints <= high + 1e-9)).all())
-        return is_inside and keeps_clear(arm, scene, waypoints, MARGIN)
-
-    def is_body_clear(waypoints: Array) -> bool:
-        return keeps_clear(arm, scene, waypoints, 0.0)
-
     return NamedProblem(
-        name=name, problem=problem, is_path_valid=is_path_valid, is_body_clear=is_body_clear
+        problem=problem,
+        is_path_valid=lambda waypoints: (
+            _are_within(waypoints, world.bounds) and _keeps_clear(arm, scene, waypoints, MARGIN)
+        ),
+        is_body_clear=lambda waypoints: _keeps_clear(arm, scene, waypoints, 0.0),
     )
 
 
-def keeps_clear(arm: ArmModel, scene: Scene, waypoints: Array, margin: float) -> bool:
+def _are_within(waypoints: Array, bounds: Array) -> bool:
+    """Return whether waypoints, (n, dof), are between lower and upper bounds, but for rounding."""
+    return bool(((waypoints >= bounds[0] - 1e-9) & (waypoints <= bounds[1] + 1e-9)).all())
+
+
+def _keeps_clear(arm: ArmModel, scene: Scene, waypoints: Array, margin: float) -> bool:
     """Return whether a path, (n, dof) [rad], is clear of the boxes grown by a margin [m]."""
     for q_from, q_to in zip(waypoints[:-1], waypoints[1:], strict=True):
         n = int(np.linalg.norm(q_to - q_from) / JUDGE_SPACING) + 2

@@ -2,33 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report of the reproduction: what the paper says, what we measure, why they differ."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.kernels.collision.arm_sampled import POINTS_PER_BAR
 from rrth_planner.reproduction.claims.arm import (
     arm_table,
-    long_table,
     mode_table,
+    table_1,
+    table_1_claim,
     target_table,
 )
 from rrth_planner.reproduction.claims.path_club import escape_claim, escape_table, ways_claim
-from rrth_planner.reproduction.claims.plane import goal_bias_table, plane_claims, plane_table
-from rrth_planner.reproduction.claims.table_1 import table_1, table_1_claim
-from rrth_planner.reproduction.experiments import (
-    ARM_STEP,
-    DENSE,
-    Extent,
-    SPARSE,
-    STEPS,
-    TWO_WAYS,
+from rrth_planner.reproduction.claims.plane import (
+    goal_bias_table,
+    long_table,
+    plane_claims,
+    plane_table,
 )
+from rrth_planner.reproduction.experiments import ARM_STEP, DENSE, Extent, SPARSE, STEPS, TWO_WAYS
 from rrth_planner.reproduction.problems import MARGIN, RAY
 from rrth_planner.reproduction.statistics import markdown_table, Rows
 
 
 def report(
-    rows: Rows, extent: Extent, command: str, machine: str, pictures: Mapping[str, Sequence[str]]
+    rows: Rows, extent: Extent, command: str, machine: str, pictures: Mapping[str, str]
 ) -> str:
     """
     Return the report in Markdown.
@@ -38,13 +36,10 @@ def report(
     rows : Rows
         Of one campaign.
     extent : Extent
-        How many runs stand behind each number.
-    command : str
-        The command that wrote it.
-    machine : str
-        On what.
+    command, machine : str
+        What wrote it, on what.
     pictures : mapping
-        By caption, where the pictures are, relative to the report.
+        By caption, where each picture is, relative to the report.
 
     """
     row, arm = rows.rows[0], load_arm()
@@ -60,8 +55,7 @@ def report(
         plane_claims(rows, extent),
     )
     gallery = '\n\n'.join(
-        f'### {caption}\n\n' + '\n'.join(f'![{caption}]({path})' for path in paths)
-        for caption, paths in pictures.items()
+        f'### {caption}\n\n![{caption}]({path})' for caption, path in pictures.items()
     )
     versions = (
         f'Python {row["python_version"]}, numpy {row["numpy_version"]}, '

@@ -3,8 +3,8 @@
 """
 The rows of a campaign in one Parquet file that pandas and polars read.
 
-A Parquet file cannot be continued. So new rows are written as parts into a folder beside it, each
-at once or not at all, and united with the file at the end or when a later campaign begins.
+A Parquet file cannot be continued, so it is written anew with each lot of rows: at once or not at
+all.
 """
 
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"
@@ -12,10 +12,10 @@ at once or not at all, and united with the file at the end or when a later campa
 from collections.abc import Callable, Sequence
 import os
 from pathlib import Path
-from typing import Any
 import uuid
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from rrth_planner.model.errors import RrthError
 from rrth_planner.reproduction.run import Row
@@ -50,31 +50,17 @@ SCHEMA = pa.schema(
 
 
 def append_rows(path: Path, rows: Sequence[Row]) -> None:
-    """Add rows to a campaign; they are on the disk, or nothing is, when this returns."""
-    folder = _parts_folder(path)
-    folder.mkdir(parents=True, exist_ok=True)
-    table = pa.Table.from_pylist(list(rows), schema=SCHEMA)
-    # Names in the order of writing; several campaigns may write at once.
-    number = 1 + max((int(part.stem.partition('-')[0]) for part in _parts(path)), default=0)
-    _write(table, folder / f'{number:06d}-{uuid.uuid4().hex[:8]}.parquet')
-
-
-def unite_parts(path: Path) -> None:
-    """Merge all rows of a campaign into its file."""
-    parts = _parts(path)
-    if not parts:
-        return
+    """Add rows to a campaign, in place of those of the same runs; all or nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    _write(read_rows(path), path)
-    for part in parts:
-        part.unlink(missing_ok=True)
-    if not any(_parts_folder(path).iterdir()):
-        _parts_folder(path).rmdir()
+    fresh, old = pa.Table.from_pylist(list(rows), schema=SCHEMA), read_rows(path)
+    kept = old.filter(pc.invert(pc.is_in(old['key'], fresh['key'])))
+    table = pa.concat_tables([kept, fresh])
+    replace_file(path, lambda target: pq.write_table(table, target, compression='zstd'))
 
 
 def read_rows(path: Path) -> pa.Table:
     """
-    Return all rows of a campaign, each once; none where there is no such file.
+    Return all rows of a campaign; none where there is no such file.
 
     Raises
     ------
@@ -82,66 +68,22 @@ def read_rows(path: Path) -> pa.Table:
         The file is no Parquet file of a campaign.
 
     """
-    tables = []
-    if path.exists():
-        try:
-            tables.append(pq.read_table(path).select(SCHEMA.names).cast(SCHEMA))
-        except (pa.ArrowException, KeyError, ValueError, OSError) as problem:
-            raise RrthError(
-                f'file {path}: {" ".join(str(problem).split())}; expected the rows of a campaign'
-            ) from problem
-    for part in _parts(path):
-        try:
-            tables.append(pq.read_table(part).cast(SCHEMA))
-        except (pa.ArrowException, ValueError, OSError):
-            # Truncated, e.g. by a full disk: its runs are repeated.
-            continue
-    table = pa.concat_tables([SCHEMA.empty_table(), *tables])
-    # An interruption while parts were united leaves rows twice.
-    first: dict[str, int] = {}
-    timings = table['timing'].to_pylist()
-    for i, key in enumerate(table['key'].to_pylist()):
-        # Done again one by one for its time's sake: that row counts.
-        is_better = timings[i] == SERIAL and timings[first.get(key, i)] != SERIAL
-        if key not in first or is_better:
-            first[key] = i
-    return table if len(first) == len(table) else table.take(list(first.values()))
+    if not path.exists():
+        return SCHEMA.empty_table()
+    try:
+        return pq.read_table(path).select(SCHEMA.names).cast(SCHEMA)
+    except (pa.ArrowException, KeyError, ValueError, OSError) as problem:
+        raise RrthError(
+            f'file {path}: {" ".join(str(problem).split())}; expected the rows of a campaign'
+        ) from problem
 
 
 def finished_keys(path: Path, *, timed: bool = False) -> set[str]:
     """Return the keys of the runs whose rows are there, or of those done one after another."""
     table = read_rows(path)
-    pairs = zip(table['key'].to_pylist(), table['timing'].to_pylist(), strict=True)
-    return {key for key, timing in pairs if timing == SERIAL or not timed}
-
-
-def histories(table: pa.Table) -> pa.Table:
-    """
-    Return the second table: how the cost of each run fell, a row an improvement.
-
-    Columns `key`, `history_cost`, `history_draws` and `history_time` [s]; `key` joins it with the
-    runs.
-    """
-    names = ('history_cost', 'history_draws', 'history_time')
-    whole = table.combine_chunks()
-    parents = pa.compute.list_parent_indices(whole['history_cost'])
-    columns: dict[str, Any] = {'key': whole['key'].take(parents)}
-    for name in names:
-        columns[name] = pa.compute.list_flatten(whole[name])
-    return pa.table(columns)
-
-
-def _parts_folder(path: Path) -> Path:
-    return path.with_name(f'{path.name}.parts')
-
-
-def _parts(path: Path) -> list[Path]:
-    return sorted(_parts_folder(path).glob('*.parquet'))
-
-
-def _write(table: pa.Table, path: Path) -> None:
-    """Write a file at once or not at all."""
-    replace_file(path, lambda target: pq.write_table(table, target, compression='zstd'))
+    if timed:
+        table = table.filter(pc.equal(table['timing'], SERIAL))
+    return set(table['key'].to_pylist())
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:

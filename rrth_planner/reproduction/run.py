@@ -3,6 +3,7 @@
 """One run of a planner, and its row of results."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 import hashlib
@@ -19,7 +20,6 @@ from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan
-from rrth_planner.planning.result import PlanResult
 from rrth_planner.reproduction.path_club import (
     goes_over_the_top,
     scattered_growths,
@@ -47,8 +47,6 @@ class Run:
         A name that `load_problem` knows.
     algorithm : str
         What tables and pictures call these options.
-    options : TreeOptions
-    seed : int
     collision : str
         As for `load_problem`.
 
@@ -96,12 +94,10 @@ def provenance() -> Mapping[str, str | None]:
 
 def processor_name() -> str:
     """Return the name of the processor, if the system provides it."""
-    try:
+    with suppress(OSError):
         for line in pathlib.Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
             if line.startswith('model name'):
                 return line.partition(':')[2].strip()
-    except OSError:
-        pass
     return platform.processor() or platform.machine()
 
 
@@ -109,16 +105,7 @@ _warm: set[tuple[str, str, bool]] = set()
 
 
 def execute(run: Run, timing: str) -> Row:
-    """
-    Return the row of a run.
-
-    Parameters
-    ----------
-    run : Run
-    timing : str
-        Where its time was taken: `serial`, alone on the machine, or `cluster`, beside others.
-
-    """
+    """Return the row of a run; timing: where it is timed, SERIAL or CLUSTER of `row_store`."""
     named = load_problem(run.problem, run.collision)
     if isinstance(run.options, ScatterOptions):
         found = _scattered(named, run.options, run.seed)
@@ -140,18 +127,42 @@ def execute(run: Run, timing: str) -> Row:
 
 
 def _planned(named: NamedProblem, run: Run) -> Row:
-    """Return the columns of a plan."""
+    """Return the columns of a plan; omitted ones are null."""
     kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
     if kind not in _warm:
         # Kernels are loaded by the first plan that uses them: that is not its planning time.
         plan(named.problem, run.options, np.random.default_rng(run.seed))
         _warm.add(kind)
     result = plan(named.problem, run.options, np.random.default_rng(run.seed))
-    waypoints = None if result.path is None else result.path.waypoints
-    is_valid = None if waypoints is None else named.is_path_valid(waypoints)
-    # A path clear of the grown boxes is clear of the body too.
-    is_body_clear = is_valid or (None if waypoints is None else named.is_body_clear(waypoints))
-    return {**_outcome(result), 'is_valid': is_valid, 'is_body_clear': is_body_clear}
+    row: Row = {
+        'status': result.status.value,
+        'time_total': result.planning_time,
+        'draws_total': result.n_samples,
+        'history_cost': list(result.cost_history),
+        'history_draws': list(result.sample_history),
+        'history_time': list(result.time_history),
+    }
+    if result.cost_history:
+        row |= {
+            'time_first': result.time_history[0],
+            'draws_first': result.sample_history[0],
+            # RRT*-Smart's first path as it shortened it at once, others' as they were grown.
+            'cost_first': result.cost_history[0],
+        }
+    if result.raw_path is not None:
+        row['cost_first'] = result.raw_path.length
+    if result.path is not None:
+        waypoints = result.path.waypoints
+        is_valid = named.is_path_valid(waypoints)
+        row |= {
+            'cost_final': result.path.length,
+            'n_waypoints': len(waypoints),
+            'joint_travel': np.abs(np.diff(waypoints, axis=0)).sum(axis=0).tolist(),
+            'is_valid': is_valid,
+            # A path clear of the grown boxes is clear of the body too.
+            'is_body_clear': is_valid or named.is_body_clear(waypoints),
+        }
+    return row
 
 
 def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
@@ -160,36 +171,19 @@ def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
     growths = scattered_growths(named.problem, options, seed)
     elapsed = perf_counter() - start
     paths = [Path(g.waypoints) for g in growths if g.waypoints is not None]
-    is_valid = all(named.is_path_valid(path.waypoints) for path in paths)
-    return {
+    row: Row = {
         'status': (PlanStatus.SOLVED if paths else PlanStatus.SAMPLE_LIMIT).value,
         'time_total': elapsed,
-        'cost_first': paths[0].length if paths else None,
-        'cost_final': min(path.length for path in paths) if paths else None,
         'draws_total': sum(g.n_samples for g in growths),
-        'is_valid': is_valid if paths else None,
         'ways': [None if g.waypoints is None else goes_over_the_top(g.waypoints) for g in growths],
     }
-
-
-def _outcome(result: PlanResult) -> Row:
-    """Return the columns of the result of a plan."""
-    path, is_improved = result.path, len(result.cost_history) > 0
-    travel = None if path is None else np.abs(np.diff(path.waypoints, axis=0)).sum(axis=0)
-    return {
-        'status': result.status.value,
-        'time_first': result.time_history[0] if is_improved else None,
-        'time_total': result.planning_time,
-        'cost_first': _first_cost(result),
-        'cost_final': None if path is None else path.length,
-        'draws_first': result.sample_history[0] if is_improved else None,
-        'draws_total': result.n_samples,
-        'n_waypoints': None if path is None else len(path.waypoints),
-        'joint_travel': None if travel is None else travel.tolist(),
-        'history_cost': list(result.cost_history),
-        'history_draws': list(result.sample_history),
-        'history_time': list(result.time_history),
-    }
+    if paths:
+        row |= {
+            'cost_first': paths[0].length,
+            'cost_final': min(path.length for path in paths),
+            'is_valid': all(named.is_path_valid(path.waypoints) for path in paths),
+        }
+    return row
 
 
 def _digest(text: str) -> str:
@@ -205,26 +199,9 @@ def _version(package: str) -> str:
 
 
 def _commit() -> str | None:
+    command = ['git', 'rev-parse', '--short', 'HEAD']
+    options: dict[str, Any] = {'cwd': pathlib.Path(__file__).parent, 'stderr': subprocess.DEVNULL}
     try:
-        found = subprocess.run(
-            ['git', 'rev-parse', '--short', 'HEAD'],
-            cwd=pathlib.Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            timeout=10.0,
-            check=True,
-        )
+        return subprocess.check_output(command, text=True, timeout=10.0, **options).strip() or None
     except (OSError, subprocess.SubprocessError):
         return None
-    return found.stdout.strip() or None
-
-
-def _first_cost(result: PlanResult) -> float | None:
-    """
-    Return the length of the first path, or None.
-
-    RRT-H's before any shortening; RRT*-Smart's after its own, with which its history begins.
-    """
-    if result.raw_path is not None:
-        return result.raw_path.length
-    return result.cost_history[0] if result.cost_history else None

@@ -15,15 +15,7 @@ NOTHING = '–'
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """
-    Some rows of a campaign.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        As `reproduction.run.execute` returns them.
-
-    """
+    """Some rows of a campaign, as `reproduction.run.execute` returns them."""
 
     rows: Sequence[dict[str, Any]]
 
@@ -52,8 +44,7 @@ class Rows:
     def median(self, column: str) -> float:
         """Return the median of a column over all rows; infinite where most found no path."""
         # A path that was not found is longer than any other.
-        values = np.sort(self.aligned(column))
-        return float(np.median(values)) if len(values) and np.isfinite(values[0]) else np.inf
+        return float(np.median(self.aligned(column))) if len(self) else np.inf
 
     def share(self, column: str) -> float:
         """Return the share of the rows with a path in which a column is true."""
@@ -63,18 +54,19 @@ class Rows:
         """Return how many found a path."""
         return len(self.values('cost_final'))
 
+    def found(self) -> str:
+        """Return for a table how many of all found a path."""
+        return f'{self.n_solved()} of {len(self)}'
+
 
 def histories_on(rows: Rows, axis: str, grid: Array) -> Array:
     """
-    Return the cost of the best path of each run at some draws or times.
+    Return the cost of the best path of each run at some draws or times [s], (m,) -> (n, m).
 
     Parameters
     ----------
-    rows : Rows
     axis : str
         `history_draws` or `history_time`.
-    grid : ndarray, shape (m,)
-        Draws, or seconds.
 
     Returns
     -------

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A 3-D view of the arm on its wearer, from the direction in which it is hidden least."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -10,11 +11,12 @@ from matplotlib.colors import to_rgb
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.model.arm import ArmModel, forward_kinematics, pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.visualization.occlusion import best_view, cut, is_hidden
+from rrth_planner.model.trajectory import positions_at, Trajectory
 
 START, GOAL, PATH, STOP = '#3b6fb6', '#d1495b', '#7b3fa0', '#d9820f'
 CLOTH, SKIN = '#8fa3bf', '#e3b898'
@@ -26,6 +28,12 @@ N_DRAWN = 16
 AIMED = 0.01
 # How large the space is drawn, and the width of the picture over its height.
 ZOOM, SHAPE = 0.93, 1.35
+# Segments that a line is cut into; each is hidden or visible as a whole.
+N_SEGMENTS = 40
+FAR = 50.0
+# A view along an axis would show no depth.
+ELEVATIONS = np.radians([18.0, 24.0, 30.0])
+AZIMUTHS = np.radians([q + a for q in (0.0, 90.0, 180.0, 270.0) for a in (25.0, 45.0, 65.0)])
 
 
 def arm_points(arm: ArmModel, q: Array) -> Array:
@@ -36,6 +44,55 @@ def arm_points(arm: ArmModel, q: Array) -> Array:
         points.append(poses[i - 1, :3, 3] + arm.dh[i - 1, 1] * poses[i - 1, :3, 0])
         points.append(poses[i, :3, 3])
     return np.array(points)
+
+
+def ray_of(pose: Array, length: float) -> Array:
+    """Return both ends of the pointing ray of a tool pose, (4, 4) -> (2, 3) [m]."""
+    return np.array([pose[:3, 3], pose[:3, 3] + length * pose[:3, 2]])
+
+
+def faces_of(box: Box) -> Iterator[tuple[Array, Array]]:
+    """Yield the outward normal, (3,), and the corners in turn, (4, 3) [m], of each face."""
+    halves = 0.5 * box.size * box.rotation
+    for axis, side in product(range(3), (-1.0, 1.0)):
+        u, v = np.delete(halves, axis, axis=1).T
+        middle = box.center + side * halves[:, axis]
+        corners = np.array([middle - u - v, middle + u - v, middle + u + v, middle - u + v])
+        yield side * box.rotation[:, axis], corners
+
+
+def _best_view(scene: Scene, outlines: Array, ray: Array) -> Array:
+    """Return the direction to the camera that shows most of the arm and of the ray."""
+    arm_points, ray_points = outlines.reshape(-1, 3), _cut(ray).mean(axis=1)
+    best, score = np.array([0.0, -1.0, 0.0]), -np.inf
+    for elevation, azimuth in product(ELEVATIONS, AZIMUTHS):
+        level = np.cos(elevation)
+        towards = np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+        shown = 0.0
+        for points, weight in ((arm_points, 1.2), (ray_points, 0.3)):
+            across = points - np.outer(points @ towards, towards)
+            spread = np.linalg.norm(across - across.mean(axis=0), axis=1).mean()
+            shown += weight * spread - _is_hidden(scene, points, towards).mean()
+        if shown > score:
+            best, score = towards, shown
+    return best
+
+
+def _is_hidden(scene: Scene, points: Array, towards: Array) -> NDArray[np.bool_]:
+    """Return which points, (n, 3), the wearer hides from a camera in some direction."""
+    line = np.stack([points, points + FAR * towards], axis=1)
+    hidden: NDArray[np.bool_] = np.zeros(len(points), dtype=bool)
+    for box in scene.boxes:
+        hidden |= bar_box_contact(line, box.center, box.rotation, 0.5 * box.size) > 0
+    return hidden
+
+
+def _cut(points: Array) -> Array:
+    """Return the short segments of a polyline, (n, 2, 3) [m]."""
+    n = max(1, N_SEGMENTS // (len(points) - 1))
+    t = np.linspace(0.0, 1.0, n + 1)[:, None]
+    lines = points[:-1, None] + t * (points[1:, None] - points[:-1, None])
+    return np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def draw_motion(
@@ -49,21 +106,11 @@ def draw_motion(
     """
     Draw the wearer, the arm along its motion, the pointing ray, the tool's path and the target.
 
-    Parameters
-    ----------
-    axes : Axes3D
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    trajectory : Trajectory
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    ray_guard_length : float
-        Drawn length of the ray where it does not meet the target yet [m].
-
+    The target, (3,), is in the base frame; a ray that does not meet it has `ray_guard_length` [m].
     """
-    q = sample(trajectory, np.linspace(0.0, trajectory.duration, N_DRAWN))[0]
-    q_dense = sample(trajectory, np.linspace(0.0, trajectory.duration, 200))[0]
+    q, q_dense = (
+        positions_at(trajectory, np.linspace(0.0, trajectory.duration, n)) for n in (N_DRAWN, 200)
+    )
     draw_configurations(axes, arm, scene, q, q_dense, target, ray_guard_length)
 
 
@@ -78,17 +125,13 @@ def draw_configurations(
     q_stops: Sequence[Array] = (),
     names: tuple[str, str] = ('start', 'goal'),
     shape: float = SHAPE,
-    towards: Array | None = None,
+    looked_at: Array | None = None,
 ) -> None:
     """
     Draw the same for any sequence of configurations.
 
     Parameters
     ----------
-    axes : Axes3D
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
     q : ndarray, shape (n, dof)
         Configurations in which the arm is drawn, from start to goal, n >= 2 [rad].
     q_dense : ndarray, shape (m, dof)
@@ -103,109 +146,78 @@ def draw_configurations(
         Labels of the first and the last configuration.
     shape : float
         Width of the picture over its height.
-    towards : ndarray, shape (3,), optional
-        Direction to the camera; default: the one that shows most of the arm and of the last ray.
+    looked_at : ndarray, shape (k, 3), optional
+        A line of which the camera shows most, beside the arm; default: the last ray [m].
 
     """
     outlines = np.array([arm_points(arm, row) for row in q])
     poses = np.array([forward_kinematics(arm, row)[-1] for row in q_dense])
-    tool_path, first, last = poses[:, :3, 3], poses[0], poses[-1]
-    first_ray = np.array([first[:3, 3], first[:3, 3] + ray_guard_length * first[:3, 2]])
-    ray = np.array([last[:3, 3], last[:3, 3] + ray_guard_length * last[:3, 2]])
+    first_ray, ray = (ray_of(pose, ray_guard_length) for pose in poses[[0, -1]])
     if target is not None and pointing_error(arm, q_dense[-1], target) <= AIMED:
         ray[1] = target
     targets = [] if target is None else [target[None]]
 
-    if towards is None:
-        towards = best_view(scene, outlines, ray)
+    towards = _best_view(scene, outlines, ray if looked_at is None else looked_at)
     _frame(axes, scene, np.concatenate([*outlines, ray, first_ray, *targets]), towards, shape)
     for box in scene.boxes:
         _draw_box(axes, box, towards)
+    draw_line = partial(_draw_line, axes, scene, towards)
     blend = np.linspace(0.0, 1.0, len(outlines))[:, None]
     colours = (1.0 - blend) * to_rgb(START) + blend * to_rgb(GOAL)
     for outline, colour in zip(outlines[1:-1], colours[1:-1], strict=True):
-        _draw_line(axes, scene, towards, outline, colour, 1.6, 0.30)
-    _draw_line(axes, scene, towards, tool_path, PATH, 1.8, 0.95)
-    _draw_line(axes, scene, towards, first_ray, START, 1.2, 0.7)
-    _draw_line(axes, scene, towards, ray, GOAL, 1.8, 0.95)
+        draw_line(outline, colour, 1.6, 0.30)
+    draw_line(poses[:, :3, 3], PATH, 1.8, 0.95)
+    draw_line(first_ray, START, 1.2, 0.7)
+    draw_line(ray, GOAL, 1.8, 0.95)
     ends = [(outlines[0], START, names[0], -0.14), (outlines[-1], GOAL, names[1], 0.07)]
     stops = [(arm_points(arm, row), STOP, '', 0.0) for row in q_stops]
     for outline, colour, name, offset in (*stops, *ends):
-        _draw_line(axes, scene, towards, outline, colour, 5.0, 1.0)
+        draw_line(outline, colour, 5.0, 1.0)
         axes.plot(*outline.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=VISIBLE)
         axes.text(*outline[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
     if target is None:
         return
-    axes.plot(
-        *target[:, None],
-        ls='',
-        marker='*',
-        ms=17,
-        color='#f2b705',
-        mec='#5c4600',
-        zorder=9,
-        clip_on=False,
-    )
+    star = {'marker': '*', 'ms': 17, 'color': '#f2b705', 'mec': '#5c4600'}
+    axes.plot(*target[:, None], ls='', **star, zorder=9, clip_on=False)
     axes.text(*target + [0.0, 0.0, 0.12], 'target', fontsize=9, ha='center', zorder=9)
 
 
 def _draw_line(
-    axes: Any,
-    scene: Scene,
-    towards: Array,
-    points: Array,
-    colour: Any,
-    width: float,
-    alpha: float,
+    axes: Any, scene: Scene, towards: Array, points: Array, colour: Any, width: float, alpha: float
 ) -> None:
-    pieces = cut(points)
-    hidden = is_hidden(scene, pieces.mean(axis=1), towards)
+    pieces = _cut(points)
+    hidden = _is_hidden(scene, pieces.mean(axis=1), towards)
+    style = {'colors': [colour], 'linewidths': width, 'alpha': alpha, 'capstyle': 'round'}
     for part, depth in ((pieces[hidden], HIDDEN), (pieces[~hidden], VISIBLE)):
         if len(part):
-            lines = Line3DCollection(
-                part, colors=[colour], linewidths=width, alpha=alpha, zorder=depth
-            )
-            lines.set_capstyle('round')
-            axes.add_collection3d(lines)
+            axes.add_collection3d(Line3DCollection(part, **style, zorder=depth))
 
 
 def _draw_box(axes: Any, box: Box, towards: Array) -> None:
-    colour = SKIN if any(part in box.name for part in ('head', 'forearm', 'hand')) else CLOTH
+    is_skin = any(part in box.name for part in ('head', 'forearm', 'hand'))
+    colour = np.array(to_rgb(SKIN if is_skin else CLOTH))
     faces, shades = [], []
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            normal = side * box.rotation[:, axis]
-            if normal @ towards <= 0.0:
-                continue
-            u, v = (0.5 * box.size[k] * box.rotation[:, k] for k in range(3) if k != axis)
-            middle = box.center + 0.5 * box.size[axis] * normal
-            faces.append([middle - u - v, middle + u - v, middle + u + v, middle - u + v])
-            shades.append(
-                np.array(to_rgb(colour)) * (0.72 + 0.28 * max(0.0, float(normal @ LIGHT)))
-            )
+    for normal, corners in faces_of(box):
+        if normal @ towards > 0.0:
+            faces.append(corners)
+            shades.append(colour * (0.72 + 0.28 * max(0.0, float(normal @ LIGHT))))
     # Nearer boxes are drawn later.
     depth = BODY + 0.9 * np.tanh(0.2 * float(box.center @ towards))
-    axes.add_collection3d(
-        Poly3DCollection(
-            faces,
-            facecolors=shades,
-            edgecolors='#5b6472',
-            linewidths=0.5,
-            alpha=0.82,
-            zorder=depth,
-        )
-    )
+    style = {'edgecolors': '#5b6472', 'linewidths': 0.5, 'alpha': 0.82}
+    axes.add_collection3d(Poly3DCollection(faces, facecolors=shades, **style, zorder=depth))
+
+
+def fit_axes(axes: Any, low: Array, high: Array, zoom: float) -> None:
+    """Show the space between two corners, (3,) [m], undistorted; what is drawn later is before."""
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=zoom)
+    axes.computed_zorder = False
 
 
 def _frame(axes: Any, scene: Scene, points: Array, towards: Array, shape: float) -> None:
-    corners = [
-        box.center + box.rotation @ (0.5 * box.size * np.array(signs))
-        for box in scene.boxes
-        for signs in product((-1.0, 1.0), repeat=3)
-    ]
-    everything = np.concatenate([points, np.array(corners).reshape(-1, 3)])
+    corners = [face for box in scene.boxes for _, face in faces_of(box)]
+    everything = np.concatenate([points, *corners])
     low, high = everything.min(axis=0) - 0.05, everything.max(axis=0) + 0.05
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     # Fill the picture: matplotlib keeps the diagonal of the space, whatever its shape, and fits it
     # to the shorter side of the picture.
     right = np.array([-towards[1], towards[0], 0.0]) / np.hypot(*towards[:2])
@@ -214,9 +226,8 @@ def _frame(axes: Any, scene: Scene, points: Array, towards: Array, shape: float)
     zoom = (
         ZOOM * np.linalg.norm(high - low) / max(height * min(1.0, shape), width / max(1.0, shape))
     )
-    axes.set_box_aspect(high - low, zoom=zoom)
+    fit_axes(axes, low, high, zoom)
     axes.set_proj_type('persp', focal_length=0.9)
-    axes.computed_zorder = False
     elevation = np.degrees(np.arcsin(towards[2]))
     azimuth = np.degrees(np.arctan2(towards[1], towards[0]))
     axes.view_init(elev=elevation, azim=azimuth)

@@ -4,7 +4,6 @@
 
 import argparse
 from collections.abc import Sequence
-from itertools import product
 from pathlib import Path
 import sys
 from typing import Any
@@ -20,7 +19,7 @@ from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError, SceneError
 from rrth_planner.model.scene import Scene
-from rrth_planner.visualization.arm_view import arm_points
+from rrth_planner.visualization.arm_view import arm_points, faces_of, fit_axes, ray_of
 
 DESCRIPTION = """\
 Draw the frames that docs/conventions.md names: left on the wearer, right along the arm.
@@ -40,23 +39,12 @@ DOTS_PER_INCH = 110
 
 
 def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
-    """
-    Return a figure of an arm's frames: left on the wearer, right along the arm.
-
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-
-    """
-    shares = np.resize(SHARE, arm.dof)
-    q = arm.bounds[0] + shares * (arm.bounds[1] - arm.bounds[0])
+    """Return a figure of an arm's frames: left on the wearer, right along the arm."""
+    q = arm.bounds[0] + np.resize(SHARE, arm.dof) * (arm.bounds[1] - arm.bounds[0])
     poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
     size = float(np.ptp(arm_points(arm, q), axis=0).max())
-    names = ['mount: frame 0']
-    names += [f'frame {i}: {name}' for i, name in enumerate(arm.joint_names, start=1)]
-    names += ['tool']
+    joints = [f'frame {i}: {name}' for i, name in enumerate(arm.joint_names, start=1)]
+    names = ['mount: frame 0', *joints, 'tool']
     figure = Figure(figsize=(12.5, 6.2), facecolor='white')
     FigureCanvasAgg(figure)
     key = 'red: x    green: y    blue: z, the axis of a joint and the pointing ray of the tool'
@@ -64,38 +52,37 @@ def frames_figure(arm: ArmModel, scene: Scene) -> Figure:
     key = 'of two frames with the same origin the later one is shorter and thicker'
     figure.text(0.5, 0.02, key, ha='center', color=TEXT)
 
+    mount, tool = poses[[0, -1]]
     body: Any = figure.add_axes((0.0, 0.09, 0.49, 0.9), projection='3d')
-    _aim_camera(body, _corners(scene, poses, RAY_SHARE * size), VIEWS[0])
-    for box in scene.boxes:
-        _draw_box(body, box.center, box.rotation * (0.5 * box.size))
-    _draw_arm(body, arm, q, poses, RAY_SHARE * size)
+    ray = ray_of(tool, RAY_SHARE * size)
+    boxes = [[corners for _, corners in faces_of(box)] for box in scene.boxes]
+    points = [*poses[:, :3, 3], *ray, np.full(3, 0.55), *np.reshape(boxes, (-1, 3))]
+    _aim_camera(body, np.array(points), VIEWS[0])
+    for faces in boxes:
+        style = {'facecolors': SKIN, 'edgecolors': EDGE, 'linewidths': 0.6, 'alpha': 0.22}
+        body.add_collection3d(Poly3DCollection(faces, **style, zorder=1))
+    _draw_arm(body, arm, q, ray)
     base = np.eye(4)
     _draw_frame(body, base, 0.45, 2.4)
     for axis, word in enumerate(('x forward', 'y left', 'z up')):
         body.text(*(0.53 * base[:3, axis]), word, color=AXIS_COLOURS[axis], ha='center', zorder=9)
-    for pose in (poses[0], poses[-1]):
+    for pose in (mount, tool):
         _draw_frame(body, pose, 0.35 * size, 2.0)
-    ray = poses[-1, :3, 3] + RAY_SHARE * size * poses[-1, :3, 2]
-    points = [base[:3, 3], poses[0, :3, 3], poses[-1, :3, 3], ray]
+    points = [base[:3, 3], mount[:3, 3], *ray]
     _label(body, points, ['base frame', 'mount: frame 0', 'tool', 'pointing ray'])
 
     close: Any = figure.add_axes((0.5, 0.09, 0.49, 0.9), projection='3d')
-    _aim_camera(close, _around(poses, 0.26 * size), VIEWS[1])
-    _draw_arm(close, arm, q, poses, 0.42 * size)
-    for pose, length, width in zip(poses, *_sizes(poses, 0.26 * size), strict=True):
-        _draw_frame(close, pose, length, width)
-    ray = poses[-1, :3, 3] + 0.42 * size * poses[-1, :3, 2]
-    _label(close, [*poses[:, :3, 3], ray], [*names, 'pointing ray'])
+    ray, reach = ray_of(tool, 0.42 * size), 0.26 * size
+    _aim_camera(
+        close, np.concatenate([poses[:, :3, 3] + reach, poses[:, :3, 3] - reach]), VIEWS[1]
+    )
+    _draw_arm(close, arm, q, ray)
+    for i, pose in enumerate(poses):
+        # A frame on an earlier one is shorter and thicker.
+        n = sum(np.allclose(pose[:3, 3], other[:3, 3], atol=1e-6) for other in poses[:i])
+        _draw_frame(close, pose, reach * 0.55**n, 1.6 + 2.0 * n)
+    _label(close, [*poses[:, :3, 3], ray[1]], [*names, 'pointing ray'])
     return figure
-
-
-def _sizes(poses: Array, length: float) -> tuple[list[float], list[float]]:
-    """Return how long and how thick each frame is drawn: one on another is shorter, thicker."""
-    below = [
-        sum(np.allclose(pose[:3, 3], other[:3, 3], atol=1e-6) for other in poses[:i])
-        for i, pose in enumerate(poses)
-    ]
-    return [length * 0.55**n for n in below], [1.6 + 2.0 * n for n in below]
 
 
 def _draw_frame(axes: Any, pose: Array, length: float, width: float) -> None:
@@ -106,49 +93,15 @@ def _draw_frame(axes: Any, pose: Array, length: float, width: float) -> None:
         )
 
 
-def _draw_arm(axes: Any, arm: ArmModel, q: Array, poses: Array, ray_length: float) -> None:
+def _draw_arm(axes: Any, arm: ArmModel, q: Array, ray: Array) -> None:
     axes.plot(*arm_points(arm, q).T, color=BAR, lw=6, solid_capstyle='round', alpha=0.55, zorder=3)
-    ray = np.array([poses[-1, :3, 3], poses[-1, :3, 3] + ray_length * poses[-1, :3, 2]])
     axes.plot(*ray.T, color=RAY, lw=2.0, ls=(0, (4, 2)), zorder=4)
 
 
-def _draw_box(axes: Any, center: Array, halves: Array) -> None:
-    """Draw a box; the columns of `halves` lead from its centre to its faces, (3, 3) [m]."""
-    faces = []
-    for axis, side in product(range(3), (-1.0, 1.0)):
-        u, v = (halves[:, k] for k in range(3) if k != axis)
-        middle = center + side * halves[:, axis]
-        faces.append([middle - u - v, middle + u - v, middle + u + v, middle - u + v])
-    axes.add_collection3d(
-        Poly3DCollection(
-            faces, facecolors=SKIN, edgecolors=EDGE, linewidths=0.6, alpha=0.22, zorder=1
-        )
-    )
-
-
-def _corners(scene: Scene, poses: Array, ray_length: float) -> Array:
-    """Return points that enclose the wearer, the arm and its ray, (n, 3) [m]."""
-    ray = poses[-1, :3, 3] + ray_length * poses[-1, :3, 2]
-    points = [*poses[:, :3, 3], ray, np.full(3, 0.55)]
-    for box in scene.boxes:
-        halves = box.rotation * (0.5 * box.size)
-        points += [box.center + halves @ signs for signs in product((-1.0, 1.0), repeat=3)]
-    return np.array(points)
-
-
-def _around(poses: Array, reach: float) -> Array:
-    """Return points that enclose the arm and its frames, (n, 3) [m]."""
-    points: Array = np.concatenate([poses[:, :3, 3] + reach, poses[:, :3, 3] - reach])
-    return points
-
-
 def _aim_camera(axes: Any, points: Array, view: tuple[float, float]) -> None:
-    """Fit the axes to points, seen from an elevation and an azimuth [deg]."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.07)
+    """Fit the axes to points, (n, 3) [m], seen from an elevation and an azimuth [deg]."""
+    fit_axes(axes, points.min(axis=0), points.max(axis=0), 1.07)
     axes.view_init(*view)
-    axes.computed_zorder = False
     axes.set_axis_off()
 
 
@@ -181,8 +134,7 @@ def _apart(heights: Array) -> Array:
     # The least rising sequence above, less the steps that it needs.
     apart = np.maximum.accumulate(np.clip(heights, LOWEST, HIGHEST) - steps) + steps
     highest = HIGHEST - steps[::-1]
-    moved: Array = np.minimum(apart, highest)
-    return moved
+    return np.minimum(apart, highest)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -197,21 +149,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         figure = frames_figure(load_arm(options.arm), load_body())
-        _save(figure, options.output)
+        try:
+            # Without the version of the library the same picture has the same bytes.
+            figure.savefig(options.output, dpi=DOTS_PER_INCH, metadata={'Software': None})
+        except (OSError, ValueError) as problem:
+            raise SceneError(
+                f'file {options.output}: {problem}, expected a picture file, e.g. .png'
+            ) from problem
     except RrthError as problem:
         print(f'frames_figure: {problem}', file=sys.stderr)
         return 2
     return 0
-
-
-def _save(figure: Figure, path: Path) -> None:
-    try:
-        # Without the version of the library the same picture has the same bytes.
-        figure.savefig(path, dpi=DOTS_PER_INCH, metadata={'Software': None})
-    except (OSError, ValueError) as problem:
-        raise SceneError(
-            f'file {path}: {problem}, expected a picture file, e.g. .png'
-        ) from problem
 
 
 if __name__ == '__main__':

@@ -17,27 +17,15 @@ from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
 from rrth_planner.visualization.arm_view import draw_motion
 
 JOINT_COLOURS = ('#1b6ca8', '#d1495b', '#2f9e6e', '#c98a1b', '#7a4fa3', '#4c5560')
-LIMIT, DASHES = '#30343b', (0, (5, 3))
+LIMIT, GRID, DASHES = '#30343b', '#e4e6ea', (0, (5, 3))
 ROW_SIZE = (13.0, 5.4)
 TIME_STEP = 0.005
+LEGEND: dict[str, Any] = {'fontsize': 8, 'frameon': False, 'columnspacing': 1.2}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Motion:
-    """
-    One motion to be drawn.
-
-    Parameters
-    ----------
-    label : str
-        What the target is called.
-    trajectory : Trajectory
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    caption : str
-        A line of figures below the label; may be empty.
-
-    """
+    """One motion to a labelled target, (3,) in the base frame [m]; the caption may be empty."""
 
     label: str
     trajectory: Trajectory
@@ -53,15 +41,10 @@ def motion_figure(
     ray_guard_length: float,
 ) -> Figure:
     """
-    Return a figure of motions: left the arm on its wearer, right the curves of the joints.
+    Return a figure of motions, a row each: left the arm on its wearer, right the joints' curves.
 
     Parameters
     ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    motions : sequence of Motion
-        At least one; each has a row.
     limits : MotionLimits
         Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float
@@ -89,56 +72,57 @@ def motion_figure(
         view = figure.add_subplot(rows[row, 0], projection='3d')
         draw_motion(view, arm, scene, motion.trajectory, motion.target, ray_guard_length)
         curves = rows[row, 1].subgridspec(2, 1, height_ratios=(1.15, 1.0), hspace=0.12)
-        position = figure.add_subplot(curves[0])
-        velocity = figure.add_subplot(curves[1], sharex=position)
+        panels: Any = curves.subplots(sharex=True)
+        position, velocity = panels
         _draw_curves(position, velocity, arm, motion.trajectory, limits)
-        position.tick_params(labelbottom=False)
-        title = f'Pointing at "{motion.label}"'
-        position.set_title(
-            f'{title}\n{motion.caption}' if motion.caption else title,
-            loc='left',
-            fontsize=11,
-            fontweight='bold',
-        )
+        title = f'Pointing at "{motion.label}"\n{motion.caption}'.rstrip()
+        position.set_title(title, loc='left', fontsize=11, fontweight='bold')
     return figure
 
 
 def _draw_curves(
     position: Axes, velocity: Axes, arm: ArmModel, trajectory: Trajectory, limits: MotionLimits
 ) -> None:
-    n_samples = max(2, int(trajectory.duration / TIME_STEP) + 1)
-    times = np.linspace(0.0, trajectory.duration, n_samples)
+    duration = trajectory.duration
+    times = np.linspace(0.0, duration, max(2, int(duration / TIME_STEP) + 1))
     q, v, _ = sample(trajectory, times)
     for i, name in enumerate(arm.joint_names):
-        colour = JOINT_COLOURS[i % len(JOINT_COLOURS)]
+        colour = joint_colour(i)
         position.plot(times, q[:, i], color=colour, lw=2.0, label=name.replace('_', ' '))
         velocity.plot(times, v[:, i], color=colour, lw=2.0)
-    unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
     position.plot([], [], color=LIMIT, lw=1.0, ls=DASHES, label='limits')
     draw_limits(position, arm.bounds)
     draw_limits(velocity, np.stack([-limits.velocity, limits.velocity]))
-    position.set_ylabel(f'position [{unit}]')
-    velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
     velocity.set_xlabel('time [s]')
-    position.legend(
-        loc='lower left',
-        bbox_to_anchor=(0.0, 0.0),
-        ncols=arm.dof + 1,
-        fontsize=8,
-        frameon=False,
-        handlelength=1.4,
-        columnspacing=1.2,
-    )
+    explain_joints(position, velocity, arm)
     low, high = float(arm.bounds[0].min()), float(arm.bounds[1].max())
     position.set_ylim(low - 0.22 * (high - low), high + 0.08 * (high - low))
     fastest = 1.15 * float(limits.velocity.max())
     velocity.set_ylim(-fastest, fastest)
     for axes in (position, velocity):
-        axes.set_xlim(0.0, max(trajectory.duration, TIME_STEP))
-        axes.grid(color='#e4e6ea', lw=0.8)
-        axes.set_axisbelow(True)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+        axes.set_xlim(0.0, max(duration, TIME_STEP))
+        plain(axes)
+
+
+def joint_colour(joint: int) -> str:
+    """Return the colour of a joint, from 0."""
+    return JOINT_COLOURS[joint % len(JOINT_COLOURS)]
+
+
+def plain(axes: Any) -> None:
+    """Give axes a pale grid behind their curves, and no frame at the top and the right."""
+    axes.grid(color=GRID, lw=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[['top', 'right']].set_visible(False)
+
+
+def explain_joints(position: Axes, velocity: Axes, arm: ArmModel) -> None:
+    """Write what the curves of the joints show: units, and a legend of the labelled ones."""
+    unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
+    position.set_ylabel(f'position [{unit}]')
+    velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
+    labels = position.get_legend_handles_labels()[1]
+    position.legend(loc='lower left', ncols=len(labels), handlelength=1.4, **LEGEND)
 
 
 def draw_limits(axes: Any, limits: Array) -> None:
@@ -147,7 +131,6 @@ def draw_limits(axes: Any, limits: Array) -> None:
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
     limits : ndarray, shape (n, dof)
         A row a limit, such as the lower and the upper ones.
 
@@ -161,6 +144,5 @@ def draw_limits(axes: Any, limits: Array) -> None:
             continue
         gap = (on + off) * len(joints) - on
         for turn, joint in enumerate(joints):
-            colour = JOINT_COLOURS[joint % len(JOINT_COLOURS)]
             style = (turn * (on + off), (on, gap))
-            axes.axhline(float(value), color=colour, lw=1.2, ls=style, alpha=0.9)
+            axes.axhline(float(value), color=joint_colour(int(joint)), lw=1.2, ls=style, alpha=0.9)

@@ -21,15 +21,22 @@ from rrth_planner.io.settings import PlanSettings
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
-from rrth_planner.visualization.arm_view import arm_points, draw_configurations, N_DRAWN, STOP
+from rrth_planner.visualization.arm_view import (
+    draw_configurations,
+    N_DRAWN,
+    ray_of,
+    STOP,
+)
 from rrth_planner.visualization.motion_figure import (
     DASHES,
     draw_limits,
-    JOINT_COLOURS,
+    explain_joints,
+    joint_colour,
+    LEGEND,
     LIMIT,
+    plain,
     TIME_STEP,
 )
-from rrth_planner.visualization.occlusion import best_view
 
 SIZE = (14.0, 8.6)
 # Of the view of the arm: its width over its height.
@@ -56,17 +63,7 @@ def recording_figure(
 
     Left, the motion of the arm with the wearer as at the end; right, over time, joint positions
     and velocities as commanded and as measured, the arm's distance to the wearer, and the state of
-    the monitor.
-
-    Parameters
-    ----------
-    recording : Recording
-    arm : ArmModel
-    settings : PlanSettings
-        For the margin, the length of the ray that must stay clear, and the limits.
-    title : str
-        Title above the curves.
-
+    the monitor. Margin, limits and the length of the ray that must stay clear are of the settings.
     """
     figure = Figure(figsize=SIZE, facecolor='white')
     FigureCanvasAgg(figure)
@@ -75,56 +72,32 @@ def recording_figure(
     )
     view = figure.add_subplot(grid[0], projection='3d')
     curves = grid[1].subgridspec(4, 1, height_ratios=(1.25, 1.0, 0.9, 0.16), hspace=0.13)
-    position = figure.add_subplot(curves[0])
-    others = [figure.add_subplot(curves[i], sharex=position) for i in (1, 2, 3)]
-    velocity, distance, monitor = others
+    panels: Any = curves.subplots(sharex=True)
+    position, velocity, distance, monitor = panels
+    begin, end = float(recording.times[0]), float(recording.times[-1])
+    end = max(end, begin + TIME_STEP)
+    position.set_xlim(begin, end)
     _draw_joints(position, velocity, recording, arm, settings)
     clearances = measured_clearances(recording, arm, settings.ray_guard_length)
     _draw_distance(distance, recording, clearances, settings.margin)
     _draw_monitor(monitor, recording)
-    begin, end = _span(recording)
+    is_drawn = [begin <= motion.begin <= end for motion in recording.commanded]
     stops = [stop for stop in commanded_stops(recording) if begin <= stop.begin <= end]
-    for axes in (position, velocity, distance):
-        axes.tick_params(labelbottom=False)
-        axes.grid(color='#e4e6ea', lw=0.8)
-        axes.set_axisbelow(True)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+    for axes in panels[:3]:
+        plain(axes)
         for stop in stops:
             rest = stop.begin + stop.trajectory.duration
             axes.axvspan(stop.begin, rest, color=STOP, alpha=0.18, lw=0)
-    position.set_xlim(begin, end)
-    position.set_title(
-        f'{title}\n{_caption(recording, clearances, len(stops))}',
-        loc='left',
-        fontsize=11,
-        fontweight='bold',
-    )
-    _draw_space(
-        view,
-        recording,
-        arm,
-        settings.ray_guard_length,
-        [stop.trajectory.positions[-1] for stop in stops],
-    )
+    caption = [_count(sum(is_drawn) - len(stops), 'motion'), _count(len(stops), 'stop')]
+    if np.isfinite(clearances).any():
+        caption.append(f'{1e3 * np.nanmin(clearances):.0f} mm least distance to the wearer')
+    title += f'\n{", ".join(caption)}'
+    position.set_title(title, loc='left', fontsize=11, fontweight='bold')
+    q_stops = [stop.trajectory.positions[-1] for stop in stops]
+    _draw_space(view, recording, arm, settings.ray_guard_length, q_stops, end)
     key = 'blue: start    red: end    violet: path of the tool    orange: stopped by the monitor'
     figure.text(0.03, 0.965, key, fontsize=9, color=LIMIT)
     return figure
-
-
-def _span(recording: Recording) -> tuple[float, float]:
-    begin, end = float(recording.times[0]), float(recording.times[-1])
-    return begin, max(end, begin + TIME_STEP)
-
-
-def _caption(recording: Recording, clearances: Array, n_stops: int) -> str:
-    begin, end = _span(recording)
-    n = sum(begin <= motion.begin <= end for motion in recording.commanded) - n_stops
-    parts = [_count(n, 'motion'), _count(n_stops, 'stop')]
-    known = clearances[np.isfinite(clearances)]
-    if len(known):
-        parts.append(f'{1e3 * float(known.min()):.0f} mm least distance to the wearer')
-    return ', '.join(parts)
 
 
 def _count(n: int, what: str) -> str:
@@ -137,20 +110,23 @@ def _draw_space(
     arm: ArmModel,
     ray_guard_length: float,
     q_stops: Sequence[Array],
+    end: float,
 ) -> None:
-    _, end = _span(recording)
     q = recording.positions
     # The arm is at rest most of the time: drawn at equal steps of its path, not of time.
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q, axis=0)).max(axis=1))])
     scene = at(recording.bodies, end) or Scene(())
-    q_drawn, target = q[_equal_steps(path, N_DRAWN)], at(recording.targets, end)
+    target = at(recording.targets, end)
     first, last = tool_pose(arm, q[[0, -1]])
-    rays = [first[:3, 3] + ray_guard_length * first[:3, 2], first[:3, 3], last[:3, 3]]
+    begin, tip = ray_of(first, ray_guard_length)
+    aim = ray_of(last, 1.0)
+    if target is not None:
+        aim[1] = target
     draw_configurations(
         axes,
         arm,
         scene,
-        q_drawn,
+        q[_equal_steps(path, N_DRAWN)],
         q[_equal_steps(path, N_DENSE)],
         target,
         ray_guard_length,
@@ -158,11 +134,7 @@ def _draw_space(
         names=('start', 'end'),
         shape=VIEW_SHAPE,
         # A motion may be short: the first ray counts too.
-        towards=best_view(
-            scene,
-            np.array([arm_points(arm, row) for row in q_drawn]),
-            np.array([*rays, rays[-1] + last[:3, 2] if target is None else target]),
-        ),
+        looked_at=np.array([tip, begin, *aim]),
     )
 
 
@@ -180,17 +152,13 @@ def _with_gaps(times: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _draw_joints(
-    position: Axes,
-    velocity: Axes,
-    recording: Recording,
-    arm: ArmModel,
-    settings: PlanSettings,
+    position: Axes, velocity: Axes, recording: Recording, arm: ArmModel, settings: PlanSettings
 ) -> None:
-    begin, end = _span(recording)
+    begin, end = position.get_xlim()
     times = np.linspace(begin, end, int(min(20_000, 2 + (end - begin) / TIME_STEP)))
     q, v = commanded_at(recording, times)
     for i, name in enumerate(arm.joint_names):
-        colour = JOINT_COLOURS[i % len(JOINT_COLOURS)]
+        colour = joint_colour(i)
         for axes, commanded, measured in (
             (position, q, recording.positions),
             (velocity, v, recording.velocities),
@@ -202,24 +170,14 @@ def _draw_joints(
             )
     position.plot([], [], color=LIMIT, lw=5.0, alpha=0.3, label='commanded')
     position.plot([], [], color=LIMIT, lw=1.3, label='measured')
-    unit = 'rad' if not any(arm.is_prismatic) else 'rad or m'
-    position.set_ylabel(f'position [{unit}]')
-    velocity.set_ylabel(f'velocity [{unit}/s]'.replace('rad or m/s', 'rad/s or m/s'))
     draw_limits(velocity, np.stack([-settings.limits.velocity, settings.limits.velocity]))
     low, high = position.get_ylim()
     position.set_ylim(low - 0.2 * (high - low), high)
-    position.legend(
-        loc='lower left',
-        ncols=arm.dof + 2,
-        fontsize=8,
-        frameon=False,
-        handlelength=1.4,
-        columnspacing=1.2,
-    )
+    explain_joints(position, velocity, arm)
 
 
 def _draw_distance(axes: Axes, recording: Recording, clearances: Array, margin: float) -> None:
-    begin, end = _span(recording)
+    begin, end = axes.get_xlim()
     axes.plot(*_with_gaps(recording.times, clearances), color=CLEARANCE, lw=1.6)
     axes.axhline(margin, color=LIMIT, lw=1.0, ls=DASHES)
     axes.annotate(
@@ -232,23 +190,17 @@ def _draw_distance(axes: Axes, recording: Recording, clearances: Array, margin: 
         color=LIMIT,
     )
     axes.set_ylabel('distance to\nthe wearer [m]')
-    least = clearances[np.isfinite(clearances)]
-    if len(least):
-        axes.set_ylim(min(0.0, 1.1 * float(least.min())), 1.2 * max(float(least.max()), 0.05))
+    if np.isfinite(clearances).any():
+        least, most = np.nanmin(clearances), np.nanmax(clearances)
+        axes.set_ylim(min(0.0, 1.1 * least), 1.2 * max(most, 0.05))
     changes = [time for time, _ in recording.bodies if begin <= time <= end]
     if 0 < len(changes) <= MOST_MARKS:
-        axes.plot(
-            changes,
-            np.full(len(changes), 0.96),
-            ls='',
-            marker='v',
-            color=CLEARANCE,
-            transform=axes.get_xaxis_transform(),
-        )
+        above: Any = {'color': CLEARANCE, 'transform': axes.get_xaxis_transform()}
+        axes.plot(changes, np.full(len(changes), 0.96), ls='', marker='v', **above)
 
 
 def _draw_monitor(axes: Axes, recording: Recording) -> None:
-    begin, end = _span(recording)
+    begin, end = axes.get_xlim()
     steps = [*recording.monitor_states, (end, '')]
     shown: dict[str, str] = {}
     for (since, state), (until, _) in pairwise(steps):
@@ -268,9 +220,7 @@ def _draw_monitor(axes: Axes, recording: Recording) -> None:
         loc='upper right',
         bbox_to_anchor=(1.0, -0.95),
         ncols=len(handles),
-        fontsize=8,
-        frameon=False,
         handlelength=1.0,
-        columnspacing=1.2,
         borderpad=0.0,
+        **LEGEND,
     )

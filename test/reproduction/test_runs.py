@@ -16,8 +16,8 @@ from rrth_planner.io.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.visibility_graph import shortest_path
 from rrth_planner.reproduction import cluster
+from rrth_planner.reproduction.claims.arm import is_the_papers
 from rrth_planner.reproduction.claims.path_club import both_ways_shares
-from rrth_planner.reproduction.claims.table_1 import is_the_papers
 from rrth_planner.reproduction.cluster import cluster_client, run_campaign
 from rrth_planner.reproduction.experiments import (
     ALGORITHMS,
@@ -31,7 +31,7 @@ from rrth_planner.reproduction.experiments import (
     TWO_WAYS,
 )
 from rrth_planner.reproduction.problems import load_problem
-from rrth_planner.reproduction.row_store import append_rows, finished_keys, histories, read_rows
+from rrth_planner.reproduction.row_store import append_rows, finished_keys, read_rows
 from rrth_planner.reproduction.run import execute, Run
 from rrth_planner.reproduction.statistics import histories_on, Rows
 
@@ -182,19 +182,32 @@ def test_an_interruption_loses_no_row_that_was_made(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert run_campaign(runs(3), path) == 3
     assert len(read_rows(path)) == 6
-    assert not path.with_name('rows.parquet.parts').exists()
 
 
-def test_a_part_that_was_cut_short_is_done_again_and_one_left_behind_counts_once(tmp_path):
+def test_a_row_that_is_there_already_counts_once(tmp_path):
     path = tmp_path / 'rows.parquet'
     rows = [execute(run, 'serial') for run in runs(1)]
     pq.write_table(pa.Table.from_pylist(rows[:1], schema=read_rows(path).schema), path)
     append_rows(path, rows)
-    part = next(path.with_name('rows.parquet.parts').iterdir())
-    part.with_name('000009-cut.parquet').write_bytes(part.read_bytes()[:100])
     assert len(read_rows(path)) == 2
     assert run_campaign(runs(1), path) == 0
     assert len(pq.read_table(path)) == 2
+
+
+def test_a_write_that_fails_leaves_the_rows_as_they_were(tmp_path, monkeypatch):
+    path = tmp_path / 'rows.parquet'
+    run_campaign(runs(1), path)
+    before = path.read_bytes()
+
+    def full(table, target, **_):
+        target.write_bytes(before[:100])
+        raise OSError('no space left')
+
+    monkeypatch.setattr(pq, 'write_table', full)
+    with pytest.raises(OSError, match='no space left'):
+        run_campaign(runs(2), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_file_of_something_else_is_rejected_and_kept(tmp_path):
@@ -215,14 +228,10 @@ def test_pandas_and_polars_read_the_file(tmp_path):
     assert polars.read_parquet(path).shape == frame.shape
 
 
-def test_the_second_table_has_a_row_an_improvement(tmp_path):
+def test_the_cost_of_a_run_falls_from_nothing_to_its_last(tmp_path):
     path = tmp_path / 'rows.parquet'
     run_campaign(runs(2, (RRT_STAR,)), path)
     table = read_rows(path)
-    lengths = [len(row['history_cost']) for row in table.to_pylist()]
-    second = histories(table)
-    assert len(second) == sum(lengths)
-    assert second.column_names == ['key', 'history_cost', 'history_draws', 'history_time']
     costs = histories_on(Rows(table.to_pylist()), 'history_draws', np.array([0.0, 2000.0]))
     assert np.isinf(costs[:, 0]).all()
     np.testing.assert_allclose(costs[:, 1], table['cost_final'].to_numpy())

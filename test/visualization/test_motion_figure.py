@@ -107,7 +107,7 @@ def test_the_picture_is_not_blank():
 def test_a_motion_is_drawn_by_as_many_configurations_as_are_given(n):
     axes = Figure().add_subplot(projection='3d')
     q = np.linspace(FOLDED, FOLDED - 0.4, n)
-    draw_configurations(axes, ARM, Scene(()), q, q, None, 1.0, towards=np.array([0.6, -0.6, 0.5]))
+    draw_configurations(axes, ARM, Scene(()), q, q, None, 1.0)
     # Nothing hides a piece of a line; the path of the tool, and two rays, are lines too.
     assert len(axes.collections) == n + 3
     colours = [lines.get_edgecolor()[0, :3] for lines in axes.collections[: n - 2]]

@@ -3,8 +3,6 @@
 """The claims of the paper's section 4 about the escape from local traps, and their evaluation."""
 
 import numpy as np
-from rrth_planner.io.map_file import load_map
-from rrth_planner.planning.visibility_graph import shortest_path
 from rrth_planner.reproduction.claims.plane import verdict
 from rrth_planner.reproduction.experiments import (
     ATTEMPTS,
@@ -16,6 +14,7 @@ from rrth_planner.reproduction.experiments import (
     SCATTERED_PLAIN,
     TWO_WAYS,
 )
+from rrth_planner.reproduction.problems import exact_length
 from rrth_planner.reproduction.statistics import markdown_table, number, percent, Rows
 
 # A path this much over the shortest one goes round the better side.
@@ -24,9 +23,9 @@ BETTER = 1.05
 
 def better_way_share(rows: Rows, name: str, attempts: int) -> float:
     """Return the share of the runs that end on the shorter way round."""
-    exact = shortest_path(load_map(TWO_WAYS))[0]
     some = rows.where(problem=TWO_WAYS, algorithm=club_label(name, attempts))
-    return float((some.aligned('cost_final') < BETTER * exact).mean()) if len(some) else np.nan
+    is_better = some.aligned('cost_final') < BETTER * exact_length(TWO_WAYS)
+    return float(is_better.mean()) if len(some) else np.nan
 
 
 def escape_table(rows: Rows) -> str:
@@ -36,10 +35,8 @@ def escape_table(rows: Rows) -> str:
         cells = [str(attempts)]
         for name in (CLUB, NO_CLUB):
             some = rows.where(problem=TWO_WAYS, algorithm=club_label(name, attempts))
-            cells += [
-                percent(better_way_share(rows, name, attempts), 1),
-                number(some.median('draws_total'), 0),
-            ]
+            share, draws = better_way_share(rows, name, attempts), some.median('draws_total')
+            cells += [percent(share, 1), number(draws, 0)]
         lines.append(cells)
     header = ('`club_attempts`', 'better way, club', 'draws', 'better way, no club', 'draws')
     return markdown_table(header, lines)
@@ -59,14 +56,10 @@ def escape_claim(rows: Rows) -> str:
 def both_ways_shares(rows: Rows, name: str, n: int) -> list[float]:
     """Return the share of the first n seeds in which 1, 2, ... growths have found both ways."""
     some = rows.where(problem=TWO_WAYS, algorithm=name, below=n)
-    found = [
-        [_has_both(row['ways'][: j + 1]) for j in range(len(row['ways']))] for row in some.rows
-    ]
-    return [float(share) for share in np.mean(found, axis=0)]
-
-
-def _has_both(ways: list[bool | None]) -> bool:
-    return True in ways and False in ways
+    # A row a seed, a column a growth; null where it found no path.
+    ways = np.array([row['ways'] for row in some.rows], dtype=object)
+    found = [np.logical_or.accumulate(ways == way, axis=1) for way in (True, False)]
+    return [float(share) for share in (found[0] & found[1]).mean(axis=0)]
 
 
 def ways_claim(rows: Rows, extent: Extent) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from threading import Event, Lock
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from rrth_planner.model.trajectory import positions_at, Trajectory
@@ -21,21 +21,10 @@ import viser
 
 # Frame period of a playing motion, and longest sleep of an idle page [s].
 FRAME, NAP = 1.0 / 30.0, 0.5
-# Widths of the paths of the tool [m].
-FIRST_WIDTH, SHORT_WIDTH, TIMED_WIDTH = 0.007, 0.007, 0.010
 
 
 class ViewerPage:
-    """
-    Show a request, let it be changed, and show and play the resulting motion.
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    question : PlanQuestion
-        The first request.
-
-    """
+    """Show a first request, let it be changed, and show and play the resulting motion."""
 
     def __init__(self, server: viser.ViserServer, question: PlanQuestion) -> None:
         """Draw what is known, and request a plan."""
@@ -48,24 +37,25 @@ class ViewerPage:
         self._drawn: Response | None = None
         self._body: Any = None
         self.view = SceneView(server, question.arm, question.ray_guard_length)
-        self.panel = Panel(server, is_live=False, on_layer=self._on_layer)
+        self.panel = Panel(server, self.view.layers, is_live=False)
         panel = self.panel
         panel.target.value = tuple(question.goal.target.tolist())
-        panel.margin.max = max(panel.margin.max, question.margin)
-        panel.margin.value = question.margin
-        panel.seed.max = max(panel.seed.max, question.seed)
-        panel.seed.value = question.seed
-        panel.step_size.max = max(panel.step_size.max, question.options.step_size)
-        panel.step_size.value = question.options.step_size
+        for slider, value in (
+            (panel.margin, question.margin),
+            (panel.seed, question.seed),
+            (panel.step_size, question.options.step_size),
+        ):
+            slider.max = max(slider.max, value)
+            slider.value = value
         self.view.target.position = question.goal.target
         self.model = ViewerModel(question, lambda response: self._wake.set())
         self._connect()
         self.model.ask()
 
-    def run(self, is_over: Callable[[], bool] = lambda: False) -> None:
-        """Draw all changes until `is_over`, or the thread is interrupted."""
+    def run(self) -> NoReturn:
+        """Draw all changes until the thread is interrupted."""
         before = time.monotonic()
-        while not is_over():
+        while True:
             now = time.monotonic()
             with self._lock:
                 self._player = self._player.advanced(now - before)
@@ -98,10 +88,6 @@ class ViewerPage:
         """Show the end of the motion."""
         self._play(Player.at_end)
 
-    def close(self) -> None:
-        """End the planning thread."""
-        self.model.close()
-
     def _draw_response(self, response: Response) -> None:
         plan, question = response.plan, response.question
         trajectory = None if plan is None else plan.trajectory
@@ -111,19 +97,15 @@ class ViewerPage:
         nothing = np.empty((0, 3))
         search = None if plan is None else plan.search
         self.view.show_trees(() if search is None else search.trees)
-        for layer, path, width in (
-            ('first', None if search is None else search.raw_path, FIRST_WIDTH),
-            ('short', None if plan is None else plan.path, SHORT_WIDTH),
+        for layer, path in (
+            ('first', None if search is None else search.raw_path),
+            ('short', None if plan is None else plan.path),
         ):
             curve = nothing if path is None else path_curve(self._arm, path.waypoints)
             corners = nothing if path is None else tool_positions(self._arm, path.waypoints)
-            self.view.show_path(layer, curve, corners, width)
+            self.view.show_path(layer, curve, corners)
         curve = nothing if trajectory is None else trajectory_curve(self._arm, trajectory)
-        self.view.show_path('timed', curve, nothing, TIMED_WIDTH)
-        self._load(trajectory)
-
-    def _load(self, trajectory: Trajectory | None) -> None:
-        """Load another motion; with none the arm stays at the start."""
+        self.view.show_path('timed', curve, nothing)
         duration = 0.0 if trajectory is None else trajectory.duration
         with self._lock:
             self._trajectory = trajectory
@@ -133,7 +115,7 @@ class ViewerPage:
 
     def _connect(self) -> None:
         """Connect the controls to the request and the player."""
-        panel, view = self.panel, self.view
+        panel = self.panel
         for control, change in (
             (panel.target, self._on_numbers),
             (panel.target_example, self._on_target_example),
@@ -141,14 +123,14 @@ class ViewerPage:
             (panel.margin, lambda: self.model.ask(margin=panel.margin.value)),
             (panel.seed, lambda: self.model.ask(seed=panel.seed.value)),
             (panel.step_size, lambda: self.model.ask(step_size=panel.step_size.value)),
-            (panel.time, lambda: self._play(lambda player: player.moved(panel.time.value), False)),
+            (panel.time, lambda: self._play(lambda player: player.moved(panel.time.value))),
             (panel.speed, self._on_motion_settings),
             (panel.repeat, self._on_motion_settings),
         ):
             control.on_update(self._by_hand(change))
         panel.start_here.on_click(self._by_hand(self._on_start_here))
         panel.play.on_click(self._by_hand(lambda: self._play(Player.toggled)))
-        view.target.on_update(self._by_hand(self._on_drag))
+        self.view.target.on_update(self._by_hand(self._on_drag))
 
     def _by_hand(self, change: Callable[[], Any]) -> Callable[[Any], None]:
         """Return a callback for changes by the user only, not for those by this program."""
@@ -199,10 +181,6 @@ class ViewerPage:
         speed, is_repeating = float(self.panel.speed.value), self.panel.repeat.value
         self._play(lambda player: replace(player, speed=speed, is_repeating=is_repeating))
 
-    def _play(self, change: Callable[[Player], Player], is_on: bool = True) -> None:
+    def _play(self, change: Callable[[Player], Player]) -> None:
         with self._lock:
-            player = change(self._player)
-            self._player = player if is_on else replace(player, is_playing=False)
-
-    def _on_layer(self, name: str, is_shown: bool) -> None:
-        self.view.layers[name].visible = is_shown
+            self._player = change(self._player)

@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The controls of the page, and its description of a response."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from functools import partial
 from html import escape
 from typing import Any
 
 from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
 from rrth_planner.visualization.viewer.planning_worker import Response
-from rrth_planner.visualization.viewer.scene_view import FIRST, LAYERS, SHORT, TIMED, TREES
+from rrth_planner.visualization.viewer.scene_view import FIRST, SHORT, TIMED, TREES
 import viser
 
 OWN = 'own'
@@ -37,22 +38,15 @@ def response_html(response: Response) -> str:
     if plan.trajectory is None or plan.path is None or plan.search is None:
         return _page(f'no motion, {took}', BAD, f'{plan.status.value}: {sentence}', [])
     raw, trees = plan.search.raw_path, plan.search.trees
+    first = 'one straight edge'
+    if raw is not None:
+        first = f'{len(raw.waypoints)} waypoints, {raw.length:.3f} rad'
+    short = f'{len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad'
+    timed = f'{len(plan.trajectory.times)} points, {plan.trajectory.duration:.2f} s'
     rows = [
-        (
-            FIRST,
-            'first path: one straight edge'
-            if raw is None
-            else f'first path: {len(raw.waypoints)} waypoints, {raw.length:.3f} rad',
-        ),
-        (
-            SHORT,
-            f'after shortcuts: {len(plan.path.waypoints)} waypoints, {plan.path.length:.3f} rad',
-        ),
-        (
-            TIMED,
-            f'trajectory with corner blends: {len(plan.trajectory.times)} points, '
-            f'{plan.trajectory.duration:.2f} s',
-        ),
+        (FIRST, f'first path: {first}'),
+        (SHORT, f'after shortcuts: {short}'),
+        (TIMED, f'trajectory with corner blends: {timed}'),
     ]
     rows += [
         (colour, f'tree from the {end}: {len(tree.nodes)} nodes')
@@ -76,20 +70,13 @@ def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -
 
 class Panel:
     """
-    The controls; their callbacks have no arguments and read the values from here.
+    The controls, among them a checkbox for each layer, which it shows and hides.
 
-    Parameters
-    ----------
-    server : viser.ViserServer
-    is_live : bool
-        The nodes plan: without the controls that need a plan of this process.
-    on_layer : callable
-        Called with a layer's name and whether it is shown.
-
+    Live, where the nodes plan, there are none that need a plan of this process.
     """
 
     def __init__(
-        self, server: viser.ViserServer, *, is_live: bool, on_layer: Callable[[str, bool], None]
+        self, server: viser.ViserServer, layers: Mapping[str, Any], *, is_live: bool
     ) -> None:
         """Create the controls."""
         gui = server.gui
@@ -127,11 +114,11 @@ class Panel:
             self.speed = gui.add_dropdown('speed', SPEEDS, initial_value='1')
             self.repeat = gui.add_checkbox('repeat', False)
         with gui.add_folder('Show'):
-            for name in LAYERS:
-                if is_live and name in ('start', 'tree', 'first', 'short'):
-                    continue
-                self._layer(gui, name, on_layer)
+            for name, layer in layers.items():
+                if not is_live or name in ('margin', 'timed'):
+                    box = gui.add_checkbox(SHOWN[name], True)
+                    box.on_update(partial(_show, layer))
 
-    def _layer(self, gui: Any, name: str, on_layer: Callable[[str, bool], None]) -> None:
-        box = gui.add_checkbox(SHOWN[name], True)
-        box.on_update(lambda _: on_layer(name, box.value))
+
+def _show(layer: Any, event: Any) -> None:
+    layer.visible = event.target.value

@@ -5,34 +5,26 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from threading import Condition, Thread
-import time
 import traceback
 from typing import Any
 
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_question
 from rrth_planner.pipeline.request import PlanQuestion
 
-# Waiting for a response checks the clock so often [s].
-LONGEST_NAP = 0.5
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Response:
     """
-    Response to one request.
+    Response to one request: the figures of a motion, or a sentence why there is none.
 
     Parameters
     ----------
     number : int
         Number of the request, from 1; 0: none yet.
-    sentence : str
-        The figures of a motion, or the reason why there is none.
     question : PlanQuestion or None
         None where the request was invalid.
     plan : MotionPlan or None
@@ -44,11 +36,6 @@ class Response:
     sentence: str = 'no request yet'
     question: PlanQuestion | None = None
     plan: MotionPlan | None = None
-
-    @property
-    def is_solved(self) -> bool:
-        """Whether there is a motion."""
-        return self.plan is not None and self.plan.trajectory is not None
 
 
 class ViewerModel:
@@ -77,70 +64,42 @@ class ViewerModel:
         self._thread = Thread(target=self._work, name='viewer plans', daemon=True)
         self._thread.start()
 
-    def ask(
-        self,
-        *,
-        target: Array | None = None,
-        scene: Scene | None = None,
-        q_start: Array | None = None,
-        margin: float | None = None,
-        seed: int | None = None,
-        step_size: float | None = None,
-    ) -> int:
+    def ask(self, **changes: Any) -> int:
         """
         Request a plan with some changes and return the number of the request; does not wait.
 
         Parameters
         ----------
-        target : ndarray, shape (3,), optional
-            In the base frame [m].
-        scene : Scene, optional
-        q_start : ndarray, shape (dof,), optional
-            [rad].
-        margin : float, optional
-            [m].
-        seed : int, optional
-        step_size : float, optional
-            Longest extension of a tree [rad].
+        **changes
+            Fields of the question; `target`, shape (3,) in the base frame [m]; `step_size`, the
+            longest extension of a tree [rad].
 
         """
-        changes: dict[str, Any] = {
-            name: value
-            for name, value in (
-                ('scene', scene),
-                ('q_start', q_start),
-                ('margin', margin),
-                ('seed', seed),
-            )
-            if value is not None
-        }
+        rejection: Response | None = None
         with self._condition:
-            response: Response | None = None
             self._n_asked += 1
+            number = self._n_asked
             try:
-                if target is not None:
-                    changes['goal'] = PointingGoal(target)
-                if step_size is not None:
-                    changes['options'] = replace(self.question.options, step_size=step_size)
+                if 'target' in changes:
+                    changes['goal'] = PointingGoal(changes.pop('target'))
+                if 'step_size' in changes:
+                    options = replace(self.question.options, step_size=changes.pop('step_size'))
+                    changes['options'] = options
                 self.question = replace(self.question, **changes)
+                self._wanted = True
+                self._condition.notify_all()
             except RrthError as problem:
                 # The page keeps its last valid request.
                 self._wanted = False
-                response = Response(number=self._n_asked, sentence=str(problem))
-            else:
-                self._wanted = True
-                self._condition.notify_all()
-            number = self._n_asked
-        if response is not None:
-            self._respond(response)
+                rejection = Response(number=number, sentence=str(problem))
+        if rejection is not None:
+            self._respond(rejection)
         return number
 
     def wait(self, number: int, timeout: float) -> Response:
         """Return the response to a request or to a newer one; the last one after a time [s]."""
-        end = time.monotonic() + timeout
         with self._condition:
-            while self.response.number < number and time.monotonic() < end:
-                self._condition.wait(LONGEST_NAP)
+            self._condition.wait_for(lambda: self.response.number >= number, timeout)
             return self.response
 
     def close(self) -> None:
@@ -158,28 +117,27 @@ class ViewerModel:
                 if self._is_closed:
                     return
                 question, number, self._wanted = self.question, self._n_asked, False
-            response = self._response(question, number)
-            if response is not None:
-                self._respond(response)
+            self._plan(question, number)
 
-    def _response(self, question: PlanQuestion, number: int) -> Response | None:
-        """Return the response to a request; None where a newer one was made meanwhile."""
+    def _plan(self, question: PlanQuestion, number: int) -> None:
+        """Respond to a request, unless a newer one is made meanwhile."""
 
         def is_outdated() -> bool:
             return self._is_closed or self._n_asked != number
 
+        plan = None
         try:
             plan = plan_question(question, is_outdated)
+            if plan.status is PlanStatus.CANCELLED and is_outdated():
+                return
+            sentence = plan.sentence
         except RrthError as problem:
-            return Response(number=number, sentence=str(problem), question=question)
+            sentence = str(problem)
         except Exception as problem:
             # The page shows it and continues; the traceback is printed.
             traceback.print_exc()
             sentence = f'unexpected error: {type(problem).__name__}: {problem}'
-            return Response(number=number, sentence=sentence, question=question)
-        if plan.status is PlanStatus.CANCELLED and is_outdated():
-            return None
-        return Response(number=number, sentence=plan.sentence, question=question, plan=plan)
+        self._respond(Response(number=number, sentence=sentence, question=question, plan=plan))
 
     def _respond(self, response: Response) -> None:
         with self._condition:

@@ -18,7 +18,6 @@ class Player:
         Share of the last motion that was played, where there is none now [-].
     speed : float
         How much faster than the clock, > 0 [-].
-    is_playing, is_repeating : bool
 
     """
 
@@ -40,16 +39,12 @@ class Player:
 
     def toggled(self) -> 'Player':
         """Return it with playing toggled; at the end it restarts from the beginning."""
-        at_end = self.time >= self.duration
-        return replace(
-            self,
-            time=0.0 if at_end and not self.is_playing else self.time,
-            is_playing=not self.is_playing,
-        )
+        is_anew = self.time >= self.duration and not self.is_playing
+        return replace(self, time=0.0 if is_anew else self.time, is_playing=not self.is_playing)
 
     def moved(self, time: float) -> 'Player':
-        """Return it at another time of the motion [s]."""
-        return replace(self, time=min(max(0.0, time), self.duration))
+        """Return it paused at another time of the motion [s]."""
+        return replace(self, time=min(max(0.0, time), self.duration), is_playing=False)
 
     def at_end(self) -> 'Player':
         """Return it at the end of the motion, or of the next one where there is none."""

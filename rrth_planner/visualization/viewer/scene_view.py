@@ -10,8 +10,14 @@ from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.result import Tree
-from rrth_planner.visualization.arm_view import arm_points
-from rrth_planner.visualization.viewer.curves import along_z, segments_of, tree_segments, wxyz
+from rrth_planner.visualization.arm_view import arm_points, ray_of
+from rrth_planner.visualization.viewer.curves import (
+    along_z,
+    segments_of,
+    tool_positions,
+    tree_segments,
+    wxyz,
+)
 import viser
 
 Color = tuple[int, int, int]
@@ -28,6 +34,8 @@ AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
 CAMERA, LOOK_AT = (-1.45, -1.3, 1.15), (0.25, 0.05, 0.24)
 LAYERS = ('margin', 'start', 'tree', 'first', 'short', 'timed')
+# Colours and widths of the paths of the tool [m].
+PATHS = {'first': (FIRST, 0.007), 'short': (SHORT, 0.007), 'timed': (TIMED, 0.010)}
 
 
 class ArmShape:
@@ -60,20 +68,10 @@ class ArmShape:
 
 
 class SceneView:
-    """
-    Draw into a server's scene, x forward, y left, z up [m].
-
-    Parameters
-    ----------
-    server : viser.ViserServer
-    arm : ArmModel
-    ray_guard_length : float
-        Drawn length of a ray that does not meet the target [m].
-
-    """
+    """Draw into a server's scene, x forward, y left, z up [m]."""
 
     def __init__(self, server: viser.ViserServer, arm: ArmModel, ray_guard_length: float) -> None:
-        """Set up light, camera, floor and the layers that can be hidden."""
+        """Set up camera, floor and layers; a ray that meets no target is drawn so long [m]."""
         self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
         server.scene.set_up_direction('+z')
         server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
@@ -94,84 +92,51 @@ class SceneView:
 
     def show_body(self, scene: Scene, margin: float) -> None:
         """Draw the wearer's boxes, each in a shell of the margin [m]."""
+        add = self._scene.add_box
+        unlit = {'opacity': 0.16, 'cast_shadow': False, 'receive_shadow': False}
         boxes: list[Any] = []
         shells: list[Any] = []
         for k, box in enumerate(scene.boxes):
             place = {'position': box.center, 'wxyz': wxyz(box.rotation)}
             is_skin = any(part in box.name for part in ('head', 'forearm', 'hand'))
-            boxes.append(
-                self._scene.add_box(f'/body/{k}', SKIN if is_skin else CLOTH, box.size, **place)
-            )
-            shells.append(
-                self._scene.add_box(
-                    f'/margin/{k}',
-                    SHELL,
-                    box.size + 2.0 * margin,
-                    opacity=0.16,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                    **place,
-                )
-            )
+            boxes.append(add(f'/body/{k}', SKIN if is_skin else CLOTH, box.size, **place))
+            shells.append(add(f'/margin/{k}', SHELL, box.size + 2.0 * margin, **unlit, **place))
         self._replace('body', boxes)
         self._replace('margin', shells)
 
     def show_configuration(self, q: Array, target: Array | None) -> None:
         """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""
         self.arm.move(q)
-        T = tool_pose(self._arm, q)
-        length = self._ray_length
+        pose, length = tool_pose(self._arm, q), self._ray_length
         if target is not None and pointing_error(self._arm, q, target) < AIMED:
-            length = float(np.linalg.norm(target - T[:3, 3]))
-        place_bar(self._ray, T[:3, 3], T[:3, 3] + length * T[:3, 2])
+            length = float(np.linalg.norm(target - pose[:3, 3]))
+        place_bar(self._ray, *ray_of(pose, length))
 
     def show_trees(self, trees: Sequence[Tree]) -> None:
         """Draw the paths of the tool along the edges of the trees."""
         handles: list[Any] = []
         for k, (tree, colour) in enumerate(zip(trees, TREES, strict=False)):
             handles += self._lines(f'/tree/{k}', tree_segments(self._arm, tree), colour, 0.0035)
-            nodes = tool_pose(self._arm, tree.nodes)[:, :3, 3]
-            handles.append(
-                self._scene.add_point_cloud(
-                    f'/tree/nodes_{k}', nodes, colour, point_size=0.011, point_shape='circle'
-                )
-            )
+            nodes = tool_positions(self._arm, tree.nodes)
+            handles.append(self._dots(f'/tree/nodes_{k}', nodes, colour, 0.011))
         self._replace('tree', handles)
 
-    def show_path(self, layer: str, curve: Array, corners: Array, width: float) -> None:
-        """
-        Draw a path of the tool in a layer.
-
-        Parameters
-        ----------
-        layer : str
-            'first', 'short' or 'timed'.
-        curve : ndarray, shape (n, 3)
-            [m]; none: an empty one.
-        corners : ndarray, shape (m, 3)
-            Where its waypoints are [m].
-        width : float
-            [m].
-
-        """
-        colour = {'first': FIRST, 'short': SHORT, 'timed': TIMED}[layer]
+    def show_path(self, layer: str, curve: Array, corners: Array) -> None:
+        """Draw a path of the tool, (n, 3), and its waypoints, (m, 3), in a layer of PATHS [m]."""
+        colour, width = PATHS[layer]
         handles = self._lines(f'/{layer}/line', segments_of(curve), colour, width)
         if len(corners):
-            handles.append(
-                self._scene.add_point_cloud(
-                    f'/{layer}/corners',
-                    corners,
-                    colour,
-                    point_size=2.6 * width,
-                    point_shape='circle',
-                )
-            )
+            handles.append(self._dots(f'/{layer}/corners', corners, colour, 2.6 * width))
         self._replace(layer, handles)
 
     def _lines(self, name: str, segments: Array, colour: Color, width: float) -> list[Any]:
         if not len(segments):
             return []
         return [self._scene.add_line_segments(name, segments, colour, thickness=width)]
+
+    def _dots(self, name: str, points: Array, colour: Color, size: float) -> Any:
+        style: Any = {'point_size': size, 'point_shape': 'circle'}
+        return self._scene.add_point_cloud(name, points, colour, **style)
 
     def _replace(self, what: str, handles: list[Any]) -> None:
         """Remove what was drawn before and not redrawn under its name."""

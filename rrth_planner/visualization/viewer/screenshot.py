@@ -35,7 +35,7 @@ def find_browser() -> str | None:
 
 
 @contextmanager
-def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
+def opened(url: str) -> Iterator[Any]:
     """
     Open a page in a browser without a window, and give playwright's Page once it has a canvas.
 
@@ -62,7 +62,7 @@ def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
             browser = playwright.chromium.launch(
                 executable_path=browser_path, args=list(ARGUMENTS), timeout=1e3 * PATIENCE
             )
-            page = browser.new_page(viewport={'width': width, 'height': height})
+            page = browser.new_page(viewport={'width': WIDTH, 'height': HEIGHT})
             page.set_default_timeout(1e3 * PATIENCE)
             page.goto(url)
             page.wait_for_selector('canvas')
@@ -70,16 +70,6 @@ def opened(url: str, width: int = WIDTH, height: int = HEIGHT) -> Iterator[Any]:
             browser.close()
         except Error as problem:
             raise RrthError(f'the browser {browser_path}: {problem}') from problem
-
-
-def settled(page: Any) -> bytes:
-    """Return a picture of a page as PNG, once two in a row are the same."""
-    end = time.monotonic() + PATIENCE
-    before, now = b'', bytes(page.screenshot())
-    while now != before and time.monotonic() < end:
-        page.wait_for_timeout(1e3 * PAUSE)
-        before, now = now, bytes(page.screenshot())
-    return now
 
 
 def save_picture(url: str, file: Path) -> None:
@@ -91,5 +81,11 @@ def save_picture(url: str, file: Path) -> None:
         page.wait_for_timeout(1e3 * PAUSE)
         if page.get_by_text(REMARK).count():
             page.locator('.mantine-Notification-closeButton').first.click()
-        file.write_bytes(settled(page))
+        # Drawn, once two pictures in a row are the same.
+        end = time.monotonic() + PATIENCE
+        before, now = b'', bytes(page.screenshot())
+        while now != before and time.monotonic() < end:
+            page.wait_for_timeout(1e3 * PAUSE)
+            before, now = now, bytes(page.screenshot())
+        file.write_bytes(now)
     print(f'Picture: {file}')
