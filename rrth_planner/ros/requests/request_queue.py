@@ -16,11 +16,10 @@ from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.diagnostics import PlanReport
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
-from rrth_planner.ros.interface.reporter import Reporter
+from rrth_planner.ros.interface.reporter import PlanReport, Reporter
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
