@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from rrth_planner.model.errors import MessageError
+from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.fields import Stamp
 
 DEPTH = 50
@@ -136,18 +136,16 @@ class OpenSubscription:
 
     Parameters
     ----------
-    node : Node
-    msg_type : type
-    topic : str
     on_message : callable
         Takes each message and its Arrival.
-    on_late : callable, optional
-        Takes each late message and its Arrival; without, these are dropped, since the last one
-        wins.
     on_rejection : callable, optional
         Takes the MessageError of each message that is too long, or not of this type.
+    on_error : callable, optional
+        Takes the name and message of an unexpected error in one of the two above.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
+    takes_late : bool, optional
+        Without, late messages are dropped, since the last one wins.
 
     """
 
@@ -157,15 +155,15 @@ class OpenSubscription:
         msg_type: type,
         topic: str,
         on_message: Callable[[Any, Arrival], None],
-        on_late: Callable[[Any, Arrival], None] | None = None,
         on_rejection: Callable[[MessageError], None] = lambda problem: None,
+        on_error: Callable[[str], None] = lambda what: None,
         decode: Callable[[bytes], Any] | None = None,
+        takes_late: bool = False,
     ) -> None:
         """Subscribe."""
-        self._on_rejection, self._decode = on_rejection, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
-        self._on_message, self._on_late = on_message, on_late
-        self._copies = Copies(on_late is not None)
+        self._on_message, self._on_rejection, self._on_error = on_message, on_rejection, on_error
+        self._decode, self._copies = decode, Copies(takes_late)
         self._n_read = self._live_came = 0
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -230,22 +228,19 @@ class OpenSubscription:
         received = info.get('received_timestamp') or time.time_ns()
         arrival = self._copies.take(sent, received, reader)
         if arrival is not None:
-            callback = self._on_message if arrival.is_newer is None else self._on_late
-            assert callback is not None
-            self._deliver(data, callback, arrival)
+            self._deliver(data, arrival)
 
-    def _deliver(
-        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
-    ) -> None:
+    def _deliver(self, data: bytes, arrival: Arrival) -> None:
         """Decode a message and call the callback; an error in either does not end the node."""
         try:
-            msg = decoded(data, self._msg_type, decode=self._decode)
-        except MessageError as problem:
-            self._on_rejection(problem)
-            return
-        try:
-            callback(msg, arrival)
-        except Exception:
+            try:
+                msg = decoded(data, self._msg_type, decode=self._decode)
+            except MessageError as problem:
+                self._on_rejection(problem)
+            else:
+                self._on_message(msg, arrival)
+        except Exception as problem:
+            self._on_error(one_line(f'{self._topic}: {type(problem).__name__}: {problem}'))
             self._node.get_logger().error(
                 f'{self.topic_name}: the callback failed on a message\n{traceback.format_exc()}'
             )
