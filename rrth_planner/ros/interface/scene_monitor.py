@@ -14,7 +14,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.fast_decoding import fast_decoder
+from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading

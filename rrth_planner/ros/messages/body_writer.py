@@ -8,9 +8,9 @@ from pathlib import Path
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.io.wearer_file import scene_from_mapping
 from rrth_planner.model.errors import MessageError, SceneError
-from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Scene
 from rrth_planner.ros.messages.message_file import message_from_mapping
+from rrth_planner.ros.messages.plan_markers import box_marker
 from visualization_msgs.msg import Marker, MarkerArray
 
 COLOR = (0.85, 0.65, 0.55, 0.8)
@@ -18,18 +18,10 @@ COLOR = (0.85, 0.65, 0.55, 0.8)
 
 def body_to_msg(scene: Scene, frame: str) -> MarkerArray:
     """Return boxes, given in a frame, as markers that replace every box before."""
-    markers = [Marker(action=Marker.DELETEALL)]
-    for k, box in enumerate(scene.boxes):
-        marker = Marker(ns=box.name, id=k, type=Marker.CUBE, action=Marker.ADD)
-        p, o, s, c = marker.pose.position, marker.pose.orientation, marker.scale, marker.color
-        p.x, p.y, p.z = box.center.tolist()
-        o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
-        s.x, s.y, s.z = box.size.tolist()
-        c.r, c.g, c.b, c.a = COLOR
-        markers.append(marker)
-    for marker in markers:
-        marker.header.frame_id = frame
-    return MarkerArray(markers=markers)
+    clear = Marker(action=Marker.DELETEALL)
+    clear.header.frame_id = frame
+    boxes = (box_marker(frame, box.name, k, box, COLOR) for k, box in enumerate(scene.boxes))
+    return MarkerArray(markers=[clear, *boxes])
 
 
 def body_from_file(path: str | Path, frame: str) -> MarkerArray:

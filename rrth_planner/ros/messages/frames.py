@@ -16,6 +16,7 @@ try:
 except ImportError:  # not among the wheels: only the base frame is known then
     tf2_ros = None
 
+# The pose of a frame in the base frame, shape (4, 4) [m], or FrameError.
 Lookup = Callable[[str], Array]
 
 
@@ -27,14 +28,7 @@ def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
     """
     Return the pose of a message's frame in the base frame, shape (4, 4) [m].
 
-    Parameters
-    ----------
-    frame : str
-        Of the header; empty stands for the base frame.
-    base_frame : str
-        The planner's frame.
-    lookup : callable or None
-        frame -> pose in the base frame; None: no other frame is known.
+    An empty frame stands for the base frame; without `lookup` no other one is known.
 
     Raises
     ------

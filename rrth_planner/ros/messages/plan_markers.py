@@ -37,8 +37,6 @@ def plan_markers(
 
     Parameters
     ----------
-    arm : ArmModel
-    scene : Scene
     margin : float
         Boxes are shown grown by it on every side [m].
     trajectory : Trajectory
@@ -55,7 +53,7 @@ def plan_markers(
     return MarkerArray(
         markers=[
             Marker(action=Marker.DELETEALL),
-            *(_cube(frame, k, box, margin) for k, box in enumerate(scene.boxes)),
+            *(box_marker(frame, 'body', k, b, BODY, margin) for k, b in enumerate(scene.boxes)),
             _line(frame, 'arm_start', _points(_bars(arm, q_start)), BAR_WIDTH, START),
             _line(frame, 'arm_goal', _points(_bars(arm, q_goal)), BAR_WIDTH, GOAL),
             _line(frame, 'ray', _points((tool, target)), LINE_WIDTH, RAY),
@@ -93,8 +91,11 @@ def _line(frame: str, ns: str, points: list[Point], width: float, color: Color) 
     return marker
 
 
-def _cube(frame: str, index: int, box: Box, margin: float) -> Marker:
-    marker = _marker(frame, 'body', index, Marker.CUBE, BODY)
+def box_marker(
+    frame: str, ns: str, index: int, box: Box, color: Color, margin: float = 0.0
+) -> Marker:
+    """Return a box, grown by a margin on every side [m], as a marker."""
+    marker = _marker(frame, ns, index, Marker.CUBE, color)
     p, o, s = marker.pose.position, marker.pose.orientation, marker.scale
     p.x, p.y, p.z = box.center.tolist()
     o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
