@@ -40,20 +40,10 @@ class ArmHasMoved(RequestError):
 
 
 class Input(Generic[T]):
-    """
-    The last good value of one topic; a rejected message changes nothing but the counts.
-
-    Parameters
-    ----------
-    topic : str
-        Its resolved name, for messages.
-    empty : object
-        The value before the first message.
-
-    """
+    """The last good value of one topic; a rejected message changes nothing but the counts."""
 
     def __init__(self, topic: str, empty: T) -> None:
-        """Begin without a message."""
+        """Begin with an empty value; the resolved name of the topic is for messages."""
         self.topic = topic
         self.value = empty
         self.received: float | None = None
@@ -126,10 +116,7 @@ class InputSnapshot:
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise ArmHasMoved(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
-            )
+            raise self._refusal(arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved)
 
     def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
@@ -148,10 +135,7 @@ class InputSnapshot:
         """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
-            raise RequestError(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a velocity for every joint',
-            )
+            raise self._refusal(arm, 'a velocity for every joint')
         known = None
         if running is not None and joints.taken < running.start_time <= time:
             # The arm was not on it yet: a stop, say, may just have been published.
@@ -168,11 +152,7 @@ class InputSnapshot:
                 known,
             )
         if not np.isfinite(found.state.positions).all():
-            raise RequestError(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a finite position '
-                f'{time - joints.taken:.3f} s later',
-            )
+            raise self._refusal(arm, f'a finite position {time - joints.taken:.3f} s later')
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
@@ -187,11 +167,14 @@ class InputSnapshot:
             found = joints.taken - running.start_time, 1.0
         return found
 
-    def _fastest(self, arm: ArmModel) -> str:
+    def _refusal(
+        self, arm: ArmModel, expected: str, kind: type[RequestError] = RequestError
+    ) -> RequestError:
         speeds = np.abs(self.joints.velocities)
         k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
-        return f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}'
+        speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
+        sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
+        return kind(ErrorCode.START_STATE_INVALID, sentence)
 
 
 class Inputs:

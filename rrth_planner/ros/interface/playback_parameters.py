@@ -70,7 +70,6 @@ def declare_playback_parameters(node: Node) -> ArmModel:
     declare(node, SETTINGS)
     arm = load_arm(node.get_parameter(ARM.name).value)
     playback_rules(node, arm)
-    initial_positions(node, arm)
     return arm
 
 

@@ -96,18 +96,10 @@ class Figures:
 
 
 class Reporter:
-    """
-    Publish `/diagnostics` every second and on change, and log each request once.
-
-    Parameters
-    ----------
-    parameters : PlannerParameters
-        Those of the start; `parameters` is to be kept up to date.
-
-    """
+    """Publish `/diagnostics` every second and on change, and log each request once."""
 
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
-        """Advertise `/diagnostics`."""
+        """Advertise `/diagnostics`; `parameters` is to be kept up to date."""
         self.parameters = parameters
         self.report = PlanReport()
         self._node, self._inputs = node, inputs

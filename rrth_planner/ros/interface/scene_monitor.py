@@ -36,8 +36,6 @@ class SceneMonitor:
     ----------
     parameters : PlannerParameters
         For the constant ones: the arm and the base frame.
-    inputs : Inputs
-        Kept up to date.
     on_change : callable, optional
         Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional

@@ -18,10 +18,11 @@ COLOR = (0.85, 0.65, 0.55, 0.8)
 
 def body_to_msg(scene: Scene, frame: str) -> MarkerArray:
     """Return boxes, given in a frame, as markers that replace every box before."""
-    clear = Marker(action=Marker.DELETEALL)
-    clear.header.frame_id = frame
-    boxes = (box_marker(frame, box.name, k, box, COLOR) for k, box in enumerate(scene.boxes))
-    return MarkerArray(markers=[clear, *boxes])
+    boxes = (box_marker(box.name, k, box, COLOR) for k, box in enumerate(scene.boxes))
+    markers = [Marker(action=Marker.DELETEALL), *boxes]
+    for marker in markers:
+        marker.header.frame_id = frame
+    return MarkerArray(markers=markers)
 
 
 def body_from_file(path: str | Path, frame: str) -> MarkerArray:

@@ -84,14 +84,8 @@ def joint_reading(
     """
     Return the positions and velocities of these joints, by name; others are ignored.
 
-    Parameters
-    ----------
-    msg : JointState
-        Without velocities, these are the change since the reading before.
-    joint_names : sequence of str
-    received : float
-        When it came [s].
-    before : JointReading or None
+    Of a message without velocities, received at a time [s], these are the change since the reading
+    before.
 
     Raises
     ------
