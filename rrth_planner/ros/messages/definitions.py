@@ -25,15 +25,7 @@ def type_name(msg_type: Any) -> str:
 
 
 def type_of_name(name: str) -> Any:
-    """
-    Return the type of a name.
-
-    Raises
-    ------
-    MessageError
-        It is not installed.
-
-    """
+    """Return the type of a name, or raise MessageError where it is not installed."""
     package, _, kind = name.partition('/msg/')
     try:
         return getattr(import_module(f'{package}.msg'), kind)

@@ -52,18 +52,10 @@ class Frames:
         self._buffer = None
         if tf2_ros is not None:
             self._buffer = tf2_ros.Buffer(node=node)
-            self._scene_monitor = tf2_ros.TransformListener(self._buffer, node)
+            self._listener = tf2_ros.TransformListener(self._buffer, node)
 
     def lookup(self, frame: str) -> Array:
-        """
-        Return the latest pose of a frame in the base frame, shape (4, 4) [m].
-
-        Raises
-        ------
-        FrameError
-            No transform is known.
-
-        """
+        """Return the latest pose of a frame in the base frame (`Lookup`), or raise FrameError."""
         if self._buffer is None:
             raise FrameError(
                 f'frame "{frame}", expected "{self._base_frame}" or an empty frame: '

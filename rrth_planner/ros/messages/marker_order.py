@@ -37,20 +37,9 @@ class MarkerOrder:
         is_newer: Callable[[Stamp], bool] | None = None,
     ) -> WearerBody:
         """
-        Return the body after an array, and remember it.
+        Return the body after an array that came at a time [s], and remember when it was sent.
 
-        Parameters
-        ----------
-        body : WearerBody
-            As it is.
-        edits : sequence of Edit
-            Of the array.
-        sent : (int, int)
-            When it was sent.
-        received : float
-            When it came [s].
-        is_newer : callable, optional
-            Of a late array: whether another one was sent after it.
+        is_newer: of a late array, whether another one was sent after it.
 
         Raises
         ------

@@ -48,14 +48,10 @@ def decoded(
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """
-    When a message was sent and received, and whether it is late.
+    When a message was sent and received [ns], and whether it is late.
 
     Parameters
     ----------
-    sent : (int, int)
-        Source timestamp [ns] and sequence number.
-    received : int
-        [ns].
     is_newer : callable or None
         Of a late message, which came after one that was sent later: whether another message was
         sent after it. None: the message is not late, as far as is known.
@@ -77,16 +73,10 @@ class Copies:
     order in which they were sent, though it may lose some: what this reader delivered before was
     not sent later by the same publisher, whatever the stamps are. For all other messages the
     stamps decide: those of one publisher are of one clock.
-
-    Parameters
-    ----------
-    takes_late : bool
-        Whether a late copy counts; without, the next copy may.
-
     """
 
     def __init__(self, takes_late: bool) -> None:
-        """Start without messages."""
+        """Start without messages; a late copy counts, or the next copy may."""
         self._takes_late = takes_late
         # By which readers each message has come, and whether it has counted.
         self._readers: dict[Stamp, set[Any]] = {}
@@ -168,13 +158,10 @@ class OpenSubscription:
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
-            self._live = self._subscribe(
-                profile,
-                self._on_live,
-                SubscriptionEventCallbacks(
-                    matched=lambda _: self.match_publishers(), use_default_callbacks=False
-                ),
+            on_match = SubscriptionEventCallbacks(
+                matched=lambda _: self.match_publishers(), use_default_callbacks=False
             )
+            self._live = self._subscribe(profile, self._on_live, on_match)
         except UnsupportedEventTypeError:
             self._live = self._subscribe(profile, self._on_live, None)
             self._timer = node.create_timer(
@@ -193,18 +180,17 @@ class OpenSubscription:
     def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
         for info in self._node.get_publishers_info_by_topic(self.topic_name):
-            durability = info.qos_profile.durability
+            qos = info.qos_profile
             if (
-                info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-                and durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
-                and durability not in self._reliable
+                qos.reliability == ReliabilityPolicy.RELIABLE
+                and qos.durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
+                and qos.durability not in self._reliable
             ):
-                profile = QoSProfile(
-                    depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability
-                )
-                self._reliable[durability] = self._subscribe(
-                    profile,
-                    partial(self._on_copy, reader=durability),
+                self._reliable[qos.durability] = self._subscribe(
+                    QoSProfile(
+                        depth=DEPTH, reliability=qos.reliability, durability=qos.durability
+                    ),
+                    partial(self._on_copy, reader=qos.durability),
                     SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
 
