@@ -18,12 +18,10 @@ MOST_EXPIRED = 100
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerBody:
     """
-    The wearer's boxes by namespace and id, as RViz would show them; a value, never changed.
+    The wearer's boxes by (ns, id), each once, as RViz would show them; a value, never changed.
 
     Parameters
     ----------
-    parts : tuple of ((str, int), BodyPart)
-        Keys (ns, id), each once.
     expired : tuple of ((str, int), BodyPart)
         Those whose lifetime has passed, and that were neither deleted nor added again since: their
         place is unknown. At most 100.
@@ -47,16 +45,13 @@ class WearerBody:
         """Return the body at a time [s]: parts whose lifetime has passed are expired."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        # Their first box suffices for the name.
-        gone = dict(self.expired) | {
-            k: BodyPart(part.boxes[:1], part.expires)
-            for k, part in self.parts
-            if part.expires <= now
-        }
-        return WearerBody(
-            tuple(item for item in self.parts if item[1].expires > now),
-            tuple(gone.items())[-MOST_EXPIRED:],
-        )
+        gone = dict(self.expired)
+        for key, part in self.parts:
+            if part.expires <= now:
+                # Its first box suffices for the name.
+                gone[key] = BodyPart(part.boxes[:1], part.expires)
+        present = tuple(item for item in self.parts if item[1].expires > now)
+        return WearerBody(present, tuple(gone.items())[-MOST_EXPIRED:])
 
     def apply(
         self, msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None

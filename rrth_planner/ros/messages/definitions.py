@@ -43,13 +43,11 @@ def definition_of(msg_type: Any) -> str:
         A definition is not where the packages of ROS keep them.
 
     """
-    inner: dict[str, Any] = {}
-    _collect(msg_type, inner)
-    inner.pop(type_name(msg_type), None)
-    parts = [_text_of(msg_type)]
-    parts += [
-        f'MSG: {_package(kind)}/{kind.__name__}\n{_text_of(kind)}' for kind in inner.values()
-    ]
+    found: dict[str, Any] = {}
+    _collect(msg_type, found)
+    parts = [f'MSG: {_package(kind)}/{kind.__name__}\n{_text_of(kind)}' for kind in found.values()]
+    # The first one is the type itself.
+    parts[0] = _text_of(msg_type)
     return f'{SEPARATOR}\n'.join(f'{part.rstrip()}\n' for part in parts)
 
 
@@ -62,11 +60,32 @@ def fast_decoder(msg_type: type) -> Callable[[bytes], Any]:
     it fails, rclpy decodes the message, or raises; it decodes all where rosbags or the definition
     is not installed.
     """
+
+    def decode_by_rclpy(data: bytes) -> Any:
+        return deserialize_message(data, msg_type)
+
     try:
-        return _decoder_of(msg_type)
+        from rosbags.typesys import get_types_from_msg, get_typestore, Stores
+
+        store, name = get_typestore(Stores.EMPTY), type_name(msg_type)
+        types = get_types_from_msg(definition_of(msg_type), name)
+        # Constants would be set again in each message.
+        store.register({kind: ([], fields) for kind, (_, fields) in types.items()})
+        for kind in types:
+            # Generated now, not when the first message comes.
+            _ = store.get_msgdef(kind).deserialize_cdr_le
     except Exception:
         # It is only faster: a node works without.
-        return lambda data: deserialize_message(data, msg_type)
+        return decode_by_rclpy
+
+    def decode(data: bytes) -> Any:
+        try:
+            return store.deserialize_cdr(data, name)
+        except Exception:
+            # Unterminated strings, say, or trailing bytes: rclpy is less strict.
+            return decode_by_rclpy(data)
+
+    return decode
 
 
 def _package(msg_type: Any) -> str:
@@ -96,24 +115,3 @@ def _text_of(msg_type: Any) -> str:
         f'{file}: not found above {sys.modules[package].__file__}, expected the definition of '
         f'{type_name(msg_type)}'
     )
-
-
-def _decoder_of(msg_type: type) -> Callable[[bytes], Any]:
-    from rosbags.typesys import get_types_from_msg, get_typestore, Stores
-
-    store, name = get_typestore(Stores.EMPTY), type_name(msg_type)
-    types = get_types_from_msg(definition_of(msg_type), name)
-    # Constants would be set again in each message.
-    store.register({kind: ([], fields) for kind, (_, fields) in types.items()})
-    for kind in types:
-        # Generated now, not when the first message comes.
-        _ = store.get_msgdef(kind).deserialize_cdr_le
-
-    def decode(data: bytes) -> Any:
-        try:
-            return store.deserialize_cdr(data, name)
-        except Exception:
-            # Unterminated strings, say, or trailing bytes: rclpy is less strict.
-            return deserialize_message(data, msg_type)
-
-    return decode

@@ -35,16 +35,8 @@ def plan_markers(
     """
     Return all markers of a plan; the first one clears those of the plan before.
 
-    Parameters
-    ----------
-    margin : float
-        Boxes are shown grown by it on every side [m].
-    trajectory : Trajectory
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    tool_path : Path
-        Its frame is that of the markers.
-
+    Boxes are shown grown by the margin [m]; the target, shape (3,) [m], is in the base frame, that
+    of the tool's path and of all markers.
     """
     q_start, q_goal = trajectory.positions[0], trajectory.positions[-1]
     tool = forward_kinematics(arm, q_goal)[-1, :3, 3]
