@@ -64,9 +64,8 @@ class Input(Generic[T]):
             self._reject(problem)
             return False
         except Exception as problem:
-            self._reject(
-                MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
-            )
+            what = f'{type(problem).__name__}: {problem}'
+            self._reject(MessageError(f'it could not be read: {what}'))
             raise
         self.n_good += 1
         if is_news or self.received is None:

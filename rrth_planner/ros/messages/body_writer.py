@@ -27,14 +27,7 @@ def body_to_msg(scene: Scene, frame: str) -> MarkerArray:
 
 def body_from_file(path: str | Path, frame: str) -> MarkerArray:
     """
-    Return the body that a YAML file holds.
-
-    Parameters
-    ----------
-    path : str or Path
-        Boxes as in `config/body.yaml`, or a MarkerArray as in `msg_examples/body.yaml`.
-    frame : str
-        Of boxes; markers have their own.
+    Return the body that a YAML file holds: markers, or boxes in a frame.
 
     Raises
     ------
@@ -43,15 +36,15 @@ def body_from_file(path: str | Path, frame: str) -> MarkerArray:
 
     """
     data = load_yaml(path)
-    is_message = isinstance(data, Mapping) and 'markers' in data
-    if not is_message and not (isinstance(data, Mapping) and 'boxes' in data):
-        raise MessageError(
-            f'file {path}: no body, expected a list of boxes (as config/body.yaml) or of markers '
-            '(as msg_examples/body.yaml)'
-        )
+    fields = data if isinstance(data, Mapping) else {}
     try:
-        if is_message:
+        if 'markers' in fields:
             return message_from_mapping(data, MarkerArray)
-        return body_to_msg(scene_from_mapping(data), frame)
+        if 'boxes' in fields:
+            return body_to_msg(scene_from_mapping(data), frame)
     except (MessageError, SceneError) as problem:
         raise type(problem)(f'file {path}: {problem}') from problem
+    raise MessageError(
+        f'file {path}: no body, expected a list of boxes (as config/body.yaml) or of markers '
+        '(as msg_examples/body.yaml)'
+    )
