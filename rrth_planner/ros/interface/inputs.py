@@ -84,12 +84,10 @@ class Input(Generic[T]):
             return float('inf')
         return max(0.0, now - self.received)
 
-    def overdue(self, now: float, timeout: float, name: str) -> str:
-        """Return how old the last good message is, beyond a timeout [s] so named; or nothing."""
+    def overdue(self, now: float, timeout: float) -> str:
+        """Return how old the last good message is, beyond a timeout [s]; empty: it is not."""
         age = self.age(now)
-        if 0.0 < timeout < age:
-            return f'{age:.3f} s old, expected at most {timeout:g} s ({name})'
-        return ''
+        return f'{age:.3f} s old, expected at most {timeout:g}' if 0.0 < timeout < age else ''
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +113,9 @@ class InputSnapshot:
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise self._refusal(arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved)
+            raise self._rejection(
+                arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved
+            )
 
     def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
@@ -134,7 +134,7 @@ class InputSnapshot:
         """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
-            raise self._refusal(arm, 'a velocity for every joint')
+            raise self._rejection(arm, 'a velocity for every joint')
         known = None
         if running is not None and joints.taken < running.start_time <= time:
             # The arm was not on it yet: a stop, say, may just have been published.
@@ -151,7 +151,7 @@ class InputSnapshot:
                 known,
             )
         if not np.isfinite(found.state.positions).all():
-            raise self._refusal(arm, f'a finite position {time - joints.taken:.3f} s later')
+            raise self._rejection(arm, f'a finite position {time - joints.taken:.3f} s later')
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
@@ -166,7 +166,7 @@ class InputSnapshot:
             found = joints.taken - running.start_time, 1.0
         return found
 
-    def _refusal(
+    def _rejection(
         self, arm: ArmModel, expected: str, kind: type[RequestError] = RequestError
     ) -> RequestError:
         speeds = np.abs(self.joints.velocities)
@@ -213,9 +213,9 @@ class Inputs:
         joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
         )
-        late = self.joints.overdue(now, parameters.joint_timeout, 'joint_timeout')
+        late = self.joints.overdue(now, parameters.joint_timeout)
         if late:
-            raise _late(self.joints, late, ErrorCode.ROBOT_STATE_STALE)
+            raise _late(self.joints, f'{late} s (joint_timeout)', ErrorCode.ROBOT_STATE_STALE)
         return InputSnapshot(scene, goal, joints)
 
     def _scene(self, now: float, timeout: float) -> Scene:
@@ -237,9 +237,9 @@ class Inputs:
                 f'the body on {source.topic} is empty: every box was deleted; expected at '
                 'least one box of the wearer',
             )
-        late = source.overdue(now, timeout, 'body_timeout')
+        late = source.overdue(now, timeout)
         if late:
-            raise _late(source, late, code)
+            raise _late(source, f'{late} s (body_timeout)', code)
         return scene_of(body)
 
     def _goal(self) -> PointingGoal:
@@ -285,8 +285,8 @@ def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> st
         return f'the body has expired parts: {body.expired_names}'
     if not body.n_boxes:
         return 'the body is empty'
-    late = source.body.overdue(now, parameters.body_timeout, 'body_timeout')
+    late = source.body.overdue(now, parameters.body_timeout)
     if late:
-        return f'the body is {late}'
-    late = source.joints.overdue(now, parameters.joint_timeout, 'joint_timeout')
-    return f'the last joint positions are {late}' if late else ''
+        return f'the body is {late} s (body_timeout)'
+    late = source.joints.overdue(now, parameters.joint_timeout)
+    return f'the last joint positions are {late} s (joint_timeout)' if late else ''

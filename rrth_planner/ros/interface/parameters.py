@@ -91,13 +91,10 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     settings = settings_from_values(values, arm.dof)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
+    own = ('base_frame', 'body_timeout', 'joint_timeout', 'replan', 'incident_folder')
     return PlannerParameters(
         arm=arm,
-        base_frame=values['base_frame'],
-        body_timeout=values['body_timeout'],
-        joint_timeout=values['joint_timeout'],
-        replan=values['replan'],
-        incident_folder=values['incident_folder'],
+        **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
 
@@ -118,9 +115,8 @@ def declare_parameters(node: Node) -> PlannerParameters:
     declare(node, declared(arm.dof))
 
     def reject_bad(changes: Sequence[Parameter]) -> SetParametersResult:
-        values = _values(node, arm) | {change.name: change.value for change in changes}
         try:
-            parameters_from_values(values, arm)
+            current_parameters(node, arm, changes)
         except RrthError as problem:
             return SetParametersResult(successful=False, reason=str(problem))
         return SetParametersResult(successful=True)
@@ -129,10 +125,9 @@ def declare_parameters(node: Node) -> PlannerParameters:
     return current_parameters(node, arm)
 
 
-def current_parameters(node: Node, arm: ArmModel) -> PlannerParameters:
-    """Return what the parameters of a node are now."""
-    return parameters_from_values(_values(node, arm), arm)
-
-
-def _values(node: Node, arm: ArmModel) -> dict[str, Any]:
-    return {setting.name: node.get_parameter(setting.name).value for setting in declared(arm.dof)}
+def current_parameters(
+    node: Node, arm: ArmModel, changes: Sequence[Parameter] = ()
+) -> PlannerParameters:
+    """Return what the parameters of a node are now, or would be after changes."""
+    values = {s.name: node.get_parameter(s.name).value for s in declared(arm.dof)}
+    return parameters_from_values(values | {change.name: change.value for change in changes}, arm)

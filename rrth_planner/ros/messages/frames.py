@@ -28,13 +28,7 @@ def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
     """
     Return the pose of a message's frame in the base frame, shape (4, 4) [m].
 
-    An empty frame stands for the base frame; without `lookup` no other one is known.
-
-    Raises
-    ------
-    FrameError
-        The frame is another one, and unknown.
-
+    An empty frame stands for the base frame; without `lookup` any other one is a FrameError.
     """
     if frame in ('', base_frame):
         return np.eye(4)

@@ -48,19 +48,7 @@ class BodyPart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """
-    The edit by one marker.
-
-    Parameters
-    ----------
-    action : int
-        Marker.ADD, DELETE or DELETEALL.
-    key : (str, int)
-        Its ns and id.
-    part : BodyPart or None
-        What is added; None unless it adds.
-
-    """
+    """The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds."""
 
     action: int
     key: Key
@@ -75,7 +63,6 @@ def read_edits(
 
     Parameters
     ----------
-    msg : MarkerArray
     now : float
         Time of reception, from which lifetimes count [s].
     base_frame : str
@@ -193,11 +180,7 @@ def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:
     """
     Return boxes from their names and numbers, shape (n, 15), which are frozen by this.
 
-    Raises
-    ------
-    SceneError
-        Of the first that is no box.
-
+    Raises the SceneError of the first that is no box.
     """
     numbers.setflags(write=False)
     bad = first_bad(numbers, FARTHEST)
