@@ -5,12 +5,13 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels.collision.boxes import place, rows_of
+from rrth_planner.kernels.collision.boxes import first_bad, place, rows_of
 from rrth_planner.kernels.layout import NUMBERS
+from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.ros.messages.marker_edits import boxes_of, first_bad
+from rrth_planner.ros.messages.marker_edits import boxes_of
 from worlds import examples, random_boxes, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -50,12 +51,12 @@ def test_markers_are_placed_as_by_matrices(seed, n):
 def test_of_many_boxes_the_first_that_is_none_is_rejected(field, index, value, words):
     scene = random_boxes(np.random.default_rng(3), 5)
     names, numbers = [box.name for box in scene.boxes], scene.numbers.copy()
-    assert first_bad(numbers) == -1
+    assert first_bad(numbers, FARTHEST) == -1
     row = numbers[3]
     part = {'center': row[:3], 'size': row[3:6], 'rotation': row[6:].reshape(3, 3)}[field]
     part[index] = value
     numbers[4, 3] = -1.0
-    assert first_bad(numbers) == 3
+    assert first_bad(numbers, FARTHEST) == 3
     with pytest.raises(SceneError, match=words) as together:
         boxes_of(names, numbers)
     with pytest.raises(SceneError) as alone:

@@ -54,7 +54,7 @@ OWN = {
     'rrth_planner.reproduction.run': {'numba'},
     'rrth_planner.ros.client.recorder': {'mcap'},
     'rrth_planner.ros.client.recording_reader': {'mcap', 'mcap_ros2'},
-    'rrth_planner.ros.messages.fast_decoding': {'rosbags'},
+    'rrth_planner.ros.messages.definitions': {'rosbags'},
     'rrth_planner.visualization.viewer.screenshot': {'playwright'},
 }
 # The live viewer shows what a node of its own hears.

@@ -14,7 +14,6 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from builtin_interfaces.msg import Time  # noqa: E402
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
@@ -25,7 +24,6 @@ from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
 from rrth_planner.planning.options import RRTStarOptions  # noqa: E402
 from rrth_planner.ros.interface import reporter  # noqa: E402
-from rrth_planner.ros.interface.diagnostics import diagnostics_msg, PlanReport  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode  # noqa: E402
@@ -291,10 +289,9 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     inputs = Inputs('body', 'target', 'joints')
 
     def summary(now=10.0, code=None, sentence=''):
-        report = PlanReport(code=code, sentence=sentence)
+        report = reporter.PlanReport(code=code, sentence=sentence)
         parameters = planner._reporter.parameters
-        (status,) = diagnostics_msg('', Time(), now, inputs, parameters, report).status
-        return status.level, status.message
+        return reporter.summary(now, inputs, parameters, report)
 
     def reject():
         raise MessageError('no point')

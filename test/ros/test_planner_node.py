@@ -35,7 +35,7 @@ from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
-from rrth_planner.ros.interface.diagnostics import PlanReport  # noqa: E402
+from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402

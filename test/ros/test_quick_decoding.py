@@ -12,8 +12,8 @@ pytest.importorskip('rosbags')
 
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
-from rrth_planner.ros.messages import fast_decoding  # noqa: E402
-from rrth_planner.ros.messages.fast_decoding import fast_decoder  # noqa: E402
+from rrth_planner.ros.messages import definitions  # noqa: E402
+from rrth_planner.ros.messages.definitions import fast_decoder  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import read_edits  # noqa: E402
 from rrth_planner.ros.middleware.open_subscription import decoded  # noqa: E402
 from samples import array, box, wearer  # noqa: E402
@@ -123,7 +123,7 @@ def test_without_rosbags_or_the_definition_rclpy_decodes(monkeypatch, missing):
     if missing == 'rosbags':
         monkeypatch.setitem(sys.modules, 'rosbags.typesys', None)
     else:
-        monkeypatch.setattr(fast_decoding, 'definition_of', not_found)
+        monkeypatch.setattr(definitions, 'definition_of', not_found)
     found = fast_decoder(MarkerArray)(serialize_message(wearer()))
     assert found == wearer()
     assert isinstance(found.markers[0], Marker)

@@ -160,8 +160,12 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
             node,
             PointStamped,
             'target',
-            lambda msg, _: received.append(msg),
-            lambda msg, arrival: late.append((msg.point.x, arrival.sent[0])),
+            lambda msg, arrival: (
+                received.append(msg)
+                if arrival.is_newer is None
+                else late.append((msg.point.x, arrival.sent[0]))
+            ),
+            takes_late=True,
         ),
     ]
     new, old = (serialize_message(target(x)) for x in (2.0, 1.0))

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write the messages of topics to an MCAP file, byte for byte."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -94,10 +94,8 @@ class RecordingFile:
 class RawSubscription(OpenSubscription):
     """An OpenSubscription whose callback takes the bytes."""
 
-    def _deliver(
-        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
-    ) -> None:
-        callback(data, arrival)
+    def _deliver(self, data: bytes, arrival: Arrival) -> None:
+        self._on_message(data, arrival)
 
 
 class Recorder(Node):
@@ -143,7 +141,7 @@ class Recorder(Node):
                     self._problem = problem
 
         # Late latched messages are part of the recording, too.
-        RawSubscription(self, msg_type, topic, write, on_late=write)
+        RawSubscription(self, msg_type, topic, write, takes_late=True)
 
     def _find_missing(self) -> None:
         offered = dict(self.get_topic_names_and_types()) if self._missing else {}

@@ -61,7 +61,7 @@ class ViewerFeed(Node):
         )
         self._scene_monitor = SceneMonitor(self, parameters, self._inputs)
         self._motions = OpenSubscription(
-            self, JointTrajectory, 'joint_trajectory', self._on_motion, None, self._reject
+            self, JointTrajectory, 'joint_trajectory', self._on_motion, self._reject
         )
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)

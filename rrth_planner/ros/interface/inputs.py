@@ -42,20 +42,10 @@ class ArmHasMoved(RequestError):
 
 
 class Input(Generic[T]):
-    """
-    The last good value of one topic; a rejected message changes nothing but the counts.
-
-    Parameters
-    ----------
-    topic : str
-        Its resolved name, for messages.
-    empty : object
-        The value before the first message.
-
-    """
+    """The last good value of one topic; a rejected message changes nothing but the counts."""
 
     def __init__(self, topic: str, empty: T) -> None:
-        """Begin without a message."""
+        """Begin with an empty value; the resolved name of the topic is for messages."""
         self.topic = topic
         self.value = empty
         self.received: float | None = None
@@ -76,9 +66,8 @@ class Input(Generic[T]):
             self._reject(problem)
             return False
         except Exception as problem:
-            self._reject(
-                MessageError(f'it could not be read: {type(problem).__name__}: {problem}')
-            )
+            what = f'{type(problem).__name__}: {problem}'
+            self._reject(MessageError(f'it could not be read: {what}'))
             raise
         self.n_good += 1
         if is_news or self.received is None:
@@ -96,6 +85,11 @@ class Input(Generic[T]):
         if self.received is None or now < self.received - CLOCK_STEP:
             return float('inf')
         return max(0.0, now - self.received)
+
+    def overdue(self, now: float, timeout: float) -> str:
+        """Return how old the last good message is, beyond a timeout [s]; empty: it is not."""
+        age = self.age(now)
+        return f'{age:.3f} s old, expected at most {timeout:g}' if 0.0 < timeout < age else ''
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,9 +115,8 @@ class InputSnapshot:
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise ArmHasMoved(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected an arm at rest (at most {REST_SPEED:g} rad/s)',
+            raise self._rejection(
+                arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved
             )
 
     def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
@@ -143,10 +136,7 @@ class InputSnapshot:
         """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
-            raise RequestError(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a velocity for every joint',
-            )
+            raise self._rejection(arm, 'a velocity for every joint')
         known = None
         if running is not None and joints.taken < running.start_time <= time:
             # The arm was not on it yet: a stop, say, may just have been published.
@@ -163,11 +153,7 @@ class InputSnapshot:
                 known,
             )
         if not np.isfinite(found.state.positions).all():
-            raise RequestError(
-                ErrorCode.START_STATE_INVALID,
-                f'{self._fastest(arm)}, expected a finite position '
-                f'{time - joints.taken:.3f} s later',
-            )
+            raise self._rejection(arm, f'a finite position {time - joints.taken:.3f} s later')
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
@@ -182,11 +168,14 @@ class InputSnapshot:
             found = joints.taken - running.start_time, 1.0
         return found
 
-    def _fastest(self, arm: ArmModel) -> str:
+    def _rejection(
+        self, arm: ArmModel, expected: str, kind: type[RequestError] = RequestError
+    ) -> RequestError:
         speeds = np.abs(self.joints.velocities)
         k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-        unit = 'm/s' if arm.is_prismatic[k] else 'rad/s'
-        return f'{arm.joint_names[k]} moves at {speeds[k]:.3f} {unit}'
+        speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
+        sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
+        return kind(ErrorCode.START_STATE_INVALID, sentence)
 
 
 class Inputs:
@@ -209,79 +198,58 @@ class Inputs:
         self, now: float, parameters: PlannerParameters, goal: PointingGoal | None = None
     ) -> InputSnapshot:
         """
-        Return the inputs of a plan that begins now.
-
-        Parameters
-        ----------
-        now : float
-            [s].
-        parameters : PlannerParameters
-            For their timeouts.
-        goal : PointingGoal, optional
-            Of the request; without, the last target.
+        Return the inputs of a plan that begins now [s]; without a goal, the last target.
 
         Raises
         ------
         RequestError
-            Something is missing, too old or, as the last target or joint positions, rejected.
+            Something is missing, too old (`parameters` have the timeouts) or rejected.
 
         """
-        scene = self._scene(now, parameters)
-        if goal is None:
-            goal = self._goal()
+        scene = self._scene(now, parameters.body_timeout)
+        goal = self._goal() if goal is None else goal
         rejection = self.joint_rejection
         if rejection is not None:
             # Earlier positions say nothing about the present ones.
-            raise RequestError(
-                ErrorCode.ROBOT_STATE_STALE,
-                f'the last message on {self.joints.topic} was rejected: {rejection}',
-            )
+            raise _rejected(self.joints, rejection, ErrorCode.ROBOT_STATE_STALE)
         joints = _require(
             self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
         )
-        _require_fresh(
-            self.joints,
-            now,
-            parameters.joint_timeout,
-            'joint_timeout',
-            ErrorCode.ROBOT_STATE_STALE,
-        )
+        late = self.joints.overdue(now, parameters.joint_timeout)
+        if late:
+            raise _late(self.joints, f'{late} s (joint_timeout)', ErrorCode.ROBOT_STATE_STALE)
         return InputSnapshot(scene, goal, joints)
 
-    def _scene(self, now: float, parameters: PlannerParameters) -> Scene:
-        _require(self.body, 'body', 'a visualization_msgs/MarkerArray with the wearer')
-        if self.body.is_last_rejected:
+    def _scene(self, now: float, timeout: float) -> Scene:
+        source, code = self.body, ErrorCode.SENSOR_INFO_STALE
+        _require(source, 'body', 'a visualization_msgs/MarkerArray with the wearer')
+        if source.is_last_rejected:
             # An earlier body says nothing about the present one.
-            raise RequestError(
-                ErrorCode.SENSOR_INFO_STALE,
-                f'the last message on {self.body.topic} was rejected: {self.body.rejection}',
-            )
-        body = self.body.value.at(now)
+            raise _rejected(source, source.rejection, code)
+        body = source.value.at(now)
         if body.expired:
             raise RequestError(
-                ErrorCode.SENSOR_INFO_STALE,
-                f'the body on {self.body.topic} has expired parts: {body.expired_names}; expected '
+                code,
+                f'the body on {source.topic} has expired parts: {body.expired_names}; expected '
                 'each of them again, or its DELETE',
             )
         if body.n_boxes == 0:
             raise RequestError(
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
-                f'the body on {self.body.topic} is empty: every box was deleted; expected at '
+                f'the body on {source.topic} is empty: every box was deleted; expected at '
                 'least one box of the wearer',
             )
-        _require_fresh(
-            self.body, now, parameters.body_timeout, 'body_timeout', ErrorCode.SENSOR_INFO_STALE
-        )
+        late = source.overdue(now, timeout)
+        if late:
+            raise _late(source, f'{late} s (body_timeout)', code)
         return scene_of(body)
 
     def _goal(self) -> PointingGoal:
         rejection = self.target.rejection
         if self.target.is_last_rejected and rejection is not None:
             # The target before it is not the requested one.
-            raise RequestError(
-                code_of_rejection(rejection, ErrorCode.INVALID_GOAL_CONSTRAINTS),
-                f'the last message on {self.target.topic} was rejected: {rejection}',
-            )
+            code = code_of_rejection(rejection, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+            raise _rejected(self.target, rejection, code)
         return _require(self.target, 'target', 'a geometry_msgs/PointStamped')
 
 
@@ -300,16 +268,12 @@ def _require(source: Input[Any], what: str, expected: str) -> Any:
     )
 
 
-def _require_fresh(
-    source: Input[Any], now: float, timeout: float, name: str, code: ErrorCode
-) -> None:
-    age = source.age(now)
-    if timeout > 0.0 and age > timeout:
-        raise RequestError(
-            code,
-            f'the last good message on {source.topic} is {age:.3f} s old, expected at most '
-            f'{timeout:g} s ({name})',
-        )
+def _rejected(source: Input[Any], why: MessageError | None, code: ErrorCode) -> RequestError:
+    return RequestError(code, f'the last message on {source.topic} was rejected: {why}')
+
+
+def _late(source: Input[Any], age: str, code: ErrorCode) -> RequestError:
+    return RequestError(code, f'the last good message on {source.topic} is {age}')
 
 
 def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
@@ -323,13 +287,8 @@ def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> st
         return f'the body has expired parts: {body.expired_names}'
     if not body.n_boxes:
         return 'the body is empty'
-    age, most = source.body.age(now), parameters.body_timeout
-    if 0.0 < most < age:
-        return f'the body is {age:.3f} s old, expected at most {most:g} s (body_timeout)'
-    age, most = source.joints.age(now), parameters.joint_timeout
-    if 0.0 < most < age:
-        return (
-            f'the last joint positions are {age:.3f} s old, expected at most {most:g} s '
-            '(joint_timeout)'
-        )
-    return ''
+    late = source.body.overdue(now, parameters.body_timeout)
+    if late:
+        return f'the body is {late} s (body_timeout)'
+    late = source.joints.overdue(now, parameters.joint_timeout)
+    return f'the last joint positions are {late} s (joint_timeout)' if late else ''

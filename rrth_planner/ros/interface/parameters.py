@@ -10,11 +10,15 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rrth_planner.io.arm_file import load_arm
-from rrth_planner.io.settings import HIGHEST_LIMIT, LOWEST_LIMIT, settings_from_values
+from rrth_planner.io.settings import (
+    HIGHEST_LIMIT,
+    LOWEST_LIMIT,
+    PlanSettings,
+    settings_from_values,
+)
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
-from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.planning.options import ALGORITHMS, TreeOptions
+from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 # The options of all algorithms by name; the same name means the same in each.
@@ -26,94 +30,52 @@ def declared(dof: int) -> tuple[Setting, ...]:
     """Return all parameters but `arm`, for an arm of so many joints."""
     each = f'of each of the {dof} joints, or one value for all'
     limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
-    timeout = (0.0, LONGEST_TIMEOUT, 's')
+    timeout = (0.0, LONGEST_TIMEOUT)
+    ray = 'length of the pointing ray kept clear in motion'
+    escape = 'greatest penetration depth, margin included, to escape from; 0: none'
+    folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
-        Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the wearer', True),
-        Setting('algorithm', 'rrt_h', None, None, ' or '.join(ALGORITHMS), 'planning algorithm'),
-        Setting('seed', -1, -1, 2**31 - 1, '-', 'random seed; -1: a new one each time'),
-        Setting('margin', 0.02, 0.0, 1.0, 'm', 'clearance kept from every box'),
+        Setting('base_frame', 'torso', 'frame id', 'frame of the wearer', is_read_only=True),
+        Setting('algorithm', 'rrt_h', ' or '.join(ALGORITHMS), 'planning algorithm'),
+        Setting('seed', -1, '-', 'random seed; -1: a new one each time', -1, 2**31 - 1),
+        Setting('margin', 0.02, 'm', 'clearance kept from every box', 0.0, 1.0),
+        Setting('ray_guard_length', 1.0, 'm', ray, 0.0, 100.0),
+        Setting('escape_depth', 0.05, 'm', escape, 0.0, 1.0),
+        Setting('max_velocity', [1.5] * dof, 'rad/s', f'greatest velocity {each}', *limit),
         Setting(
-            'ray_guard_length',
-            1.0,
-            0.0,
-            100.0,
-            'm',
-            'length of the pointing ray kept clear in motion',
+            'max_acceleration', [4.0] * dof, 'rad/s^2', f'greatest acceleration {each}', *limit
         ),
+        Setting('max_jerk', [40.0] * dof, 'rad/s^3', f'greatest jerk {each}', *limit),
+        Setting('body_timeout', 0.0, 's', 'an older body is rejected; 0: never', *timeout),
+        Setting('incident_folder', '', 'path', folder),
+        Setting('replan', True, '-', 'plan again after a fail-safe stop'),
         Setting(
-            'escape_depth',
-            0.05,
-            0.0,
-            1.0,
-            'm',
-            'greatest penetration depth, margin included, to escape from; 0: none',
+            'joint_timeout', 0.0, 's', 'older joint positions are rejected; 0: never', *timeout
         ),
-        Setting('max_velocity', [1.5] * dof, *limit, 'rad/s', f'greatest velocity {each}'),
-        Setting(
-            'max_acceleration', [4.0] * dof, *limit, 'rad/s^2', f'greatest acceleration {each}'
-        ),
-        Setting('max_jerk', [40.0] * dof, *limit, 'rad/s^3', f'greatest jerk {each}'),
-        Setting('body_timeout', 0.0, *timeout, 'an older body is rejected; 0: never'),
-        Setting(
-            'incident_folder',
-            '',
-            None,
-            None,
-            'path',
-            'folder of incident files; empty: rrth_planner/ of the ROS logs',
-        ),
-        Setting('replan', True, None, None, '-', 'plan again after a fail-safe stop'),
-        Setting('joint_timeout', 0.0, *timeout, 'older joint positions are rejected; 0: never'),
-        *(
-            Setting(
-                f.name,
-                f.default,
-                f.metadata['low'],
-                f.metadata['high'],
-                f.metadata['unit'],
-                f.metadata['description'],
-            )
-            for f in OPTIONS.values()
-        ),
+        *(Setting(f.name, f.default, **f.metadata) for f in OPTIONS.values()),
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlannerParameters:
+class PlannerParameters(PlanSettings):
     """
     All parameters as the core wants them, checked; a plan keeps the ones that it began with.
 
     Parameters
     ----------
-    arm : ArmModel
-    base_frame : str
-    seed : int
-        -1: fresh each time.
-    margin, ray_guard_length, escape_depth : float
-        [m].
     body_timeout, joint_timeout : float
         [s]; 0: never.
-    replan : bool
     incident_folder : str
         Empty: a folder of the ROS logs.
-    limits : MotionLimits
-    options : TreeOptions
-        Their class is the algorithm.
 
     """
 
     arm: ArmModel
     base_frame: str
-    seed: int
-    margin: float
-    ray_guard_length: float
-    escape_depth: float
     body_timeout: float
     joint_timeout: float
     replan: bool
     incident_folder: str
-    limits: MotionLimits
-    options: TreeOptions
 
 
 def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
@@ -129,13 +91,10 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     settings = settings_from_values(values, arm.dof)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
+    own = ('base_frame', 'body_timeout', 'joint_timeout', 'replan', 'incident_folder')
     return PlannerParameters(
         arm=arm,
-        base_frame=values['base_frame'],
-        body_timeout=values['body_timeout'],
-        joint_timeout=values['joint_timeout'],
-        replan=values['replan'],
-        incident_folder=values['incident_folder'],
+        **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
 
@@ -156,9 +115,8 @@ def declare_parameters(node: Node) -> PlannerParameters:
     declare(node, declared(arm.dof))
 
     def reject_bad(changes: Sequence[Parameter]) -> SetParametersResult:
-        values = _values(node, arm) | {change.name: change.value for change in changes}
         try:
-            parameters_from_values(values, arm)
+            current_parameters(node, arm, changes)
         except RrthError as problem:
             return SetParametersResult(successful=False, reason=str(problem))
         return SetParametersResult(successful=True)
@@ -167,10 +125,9 @@ def declare_parameters(node: Node) -> PlannerParameters:
     return current_parameters(node, arm)
 
 
-def current_parameters(node: Node, arm: ArmModel) -> PlannerParameters:
-    """Return what the parameters of a node are now."""
-    return parameters_from_values(_values(node, arm), arm)
-
-
-def _values(node: Node, arm: ArmModel) -> dict[str, Any]:
-    return {setting.name: node.get_parameter(setting.name).value for setting in declared(arm.dof)}
+def current_parameters(
+    node: Node, arm: ArmModel, changes: Sequence[Parameter] = ()
+) -> PlannerParameters:
+    """Return what the parameters of a node are now, or would be after changes."""
+    values = {s.name: node.get_parameter(s.name).value for s in declared(arm.dof)}
+    return parameters_from_values(values | {change.name: change.value for change in changes}, arm)

@@ -19,39 +19,39 @@ EACH = 'a value for each joint, or one for all'
 
 SETTINGS = (
     ARM,
-    Setting('base_frame', 'torso', None, None, 'frame id', 'frame of the tool pose', True),
-    Setting('rate', 100.0, 1.0, 1000.0, 'Hz', 'joint states per second', True),
+    Setting('base_frame', 'torso', 'frame id', 'frame of the tool pose', is_read_only=True),
+    Setting('rate', 100.0, 'Hz', 'joint states per second', 1.0, 1000.0, True),
     Setting(
-        'initial_positions', FOLDED, -1e4, 1e4, 'rad', 'where each joint is at the start', True
+        'initial_positions', FOLDED, 'rad', 'where each joint is at the start', -1e4, 1e4, True
     ),
     Setting(
-        'max_velocity', [1.5], 1e-3, 1e6, 'rad/s', f'a faster motion is rejected; {EACH}', True
+        'max_velocity', [1.5], 'rad/s', f'a faster motion is rejected; {EACH}', 1e-3, 1e6, True
     ),
     Setting(
         'max_acceleration',
         [4.0],
-        1e-3,
-        1e6,
         'rad/s^2',
         f'a motion with more is rejected, stops keep to it; {EACH}',
+        1e-3,
+        1e6,
         True,
     ),
-    Setting('max_jerk', [40.0], 1e-2, 1e8, 'rad/s^3', f'stops keep to it; {EACH}', True),
+    Setting('max_jerk', [40.0], 'rad/s^3', f'stops keep to it; {EACH}', 1e-2, 1e8, True),
     Setting(
         'time_scale',
         1.0,
-        0.01,
-        1.0,
         '-',
         'seconds of a motion per second, from the next motion on; 0.1: slow motion',
+        0.01,
+        1.0,
     ),
     Setting(
         'start_tolerance',
         0.01,
-        1e-6,
-        0.1,
         'rad and rad/s',
         'greatest distance of a new motion from the present state',
+        1e-6,
+        0.1,
     ),
 )
 
@@ -70,7 +70,6 @@ def declare_playback_parameters(node: Node) -> ArmModel:
     declare(node, SETTINGS)
     arm = load_arm(node.get_parameter(ARM.name).value)
     playback_rules(node, arm)
-    initial_positions(node, arm)
     return arm
 
 
@@ -80,9 +79,7 @@ def playback_rules(node: Node, arm: ArmModel) -> PlaybackRules:
         start_tolerance=node.get_parameter('start_tolerance').value,
         time_scale=node.get_parameter('time_scale').value,
         limits=MotionLimits(
-            velocity=_per_joint(node, arm, 'max_velocity'),
-            acceleration=_per_joint(node, arm, 'max_acceleration'),
-            jerk=_per_joint(node, arm, 'max_jerk'),
+            **{name: _per_joint(node, arm, name) for name in ('velocity', 'acceleration', 'jerk')}
         ),
     )
 
@@ -104,10 +101,10 @@ def initial_positions(node: Node, arm: ArmModel) -> Sequence[float]:
 
 
 def _per_joint(node: Node, arm: ArmModel, name: str) -> Array:
-    values = node.get_parameter(name).value
+    values = node.get_parameter(f'max_{name}').value
     if len(values) not in (1, arm.dof):
         raise OptionsError(
-            f'{name}: {len(values)} values, expected {arm.dof}, one for each of '
+            f'max_{name}: {len(values)} values, expected {arm.dof}, one for each of '
             f'{list(arm.joint_names)}, or one for all'
         )
     return np.broadcast_to(np.asarray(values, dtype=np.float64), (arm.dof,))

@@ -60,15 +60,10 @@ class PlanPublishers:
 
     def is_view_subscribed(self) -> bool:
         """Return whether `publish_view` has any subscriber."""
-        views = self._tool_path, self._markers
-        return any(publisher.get_subscription_count() > 0 for publisher in views)
+        return any(p.get_subscription_count() > 0 for p in (self._tool_path, self._markers))
 
     def publish_view(
-        self,
-        trajectory: Trajectory,
-        parameters: PlannerParameters,
-        scene: Scene,
-        target: Array,
+        self, trajectory: Trajectory, parameters: PlannerParameters, scene: Scene, target: Array
     ) -> None:
         """Publish what shows a motion."""
         path = self.tool_path(trajectory, parameters)

@@ -2,16 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Report the outcomes of requests and the state of the monitor: log and diagnostics."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+import math
 from pathlib import Path
 from threading import Lock
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.errors import one_line
-from rrth_planner.ros.interface.diagnostics import diagnostics_msg, Figures, PlanReport
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
@@ -22,23 +22,84 @@ PERIOD = 1.0
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
+# Durations are counted in bins, so many a decade from the shortest on [s].
+BINS, DECADES, SHORTEST = 48, 8, 1e-6
 
 
-class Reporter:
+@dataclass(frozen=True, slots=True)
+class PlanReport:
     """
-    Publish `/diagnostics` every second and on change, and log each request once.
+    The figures of the requests so far, and of the last one.
 
     Parameters
     ----------
-    node : Node
-    inputs : Inputs
-    parameters : PlannerParameters
-        Those of the start; `parameters` is to be kept up to date.
+    code : ErrorCode or None
+        Of the last request; None before the first.
+    planning_time : float
+        Of the plan itself [s].
+    response_time : float
+        From the request, its turn included, to the published trajectory [s].
+    duration : float
+        Of the motion [s].
+    length : float
+        Of the path [rad].
+    clearance : float
+        Least one [m].
 
     """
 
+    n_requests: int = 0
+    n_solved: int = 0
+    code: ErrorCode | None = None
+    sentence: str = ''
+    seed: int = -1
+    planning_time: float = float('nan')
+    response_time: float = float('nan')
+    duration: float = float('nan')
+    length: float = float('nan')
+    clearance: float = float('nan')
+
+
+class Figures:
+    """A count, and statistics of a duration: the last, quantiles, the greatest [s]."""
+
+    def __init__(self) -> None:
+        """Begin with nothing done."""
+        self.n, self.last, self.most = 0, 0.0, 0.0
+        # Of constant size, however long the node runs.
+        self._counts = [0] * (BINS * DECADES)
+
+    def add(self, elapsed: float) -> None:
+        """Count once more."""
+        self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
+        at = math.ceil(BINS * math.log10(max(elapsed, SHORTEST) / SHORTEST))
+        self._counts[min(at, len(self._counts) - 1)] += 1
+
+    def quantile(self, share: float) -> float:
+        """Return what a share of all took at most, rounded up by no more than 5 % [s]."""
+        wanted, seen = share * self.n, 0
+        for k, count in enumerate(self._counts):
+            seen += count
+            if count and seen >= wanted:
+                return min(self.most, SHORTEST * 10.0 ** (k / BINS))
+        return self.most
+
+    def __str__(self) -> str:
+        """Return the figures in a line."""
+        shown = {
+            'last': self.last,
+            'p50': self.quantile(0.5),
+            'p99': self.quantile(0.99),
+            'at most': self.most,
+        }
+        return ', '.join([str(self.n), *(f'{k} {1e3 * v:.3f} ms' for k, v in shown.items())])
+
+
+class Reporter:
+    """Publish `/diagnostics` every second and on change, and log each request once."""
+
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
-        """Advertise `/diagnostics`."""
+        """Advertise `/diagnostics`; `parameters` is to be kept up to date."""
         self.parameters = parameters
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
@@ -92,25 +153,49 @@ class Reporter:
         with self._lock:
             self._published, self._is_changed = time.monotonic(), False
             now = self._node.get_clock().now()
-            seconds = now.nanoseconds * 1e-9
-            self._warn_of_expired(seconds)
-            self._publisher.publish(
-                diagnostics_msg(
-                    self._node.get_fully_qualified_name(),
-                    now.to_msg(),
-                    seconds,
-                    self._inputs,
-                    self.parameters,
-                    self.report,
-                    self.monitor_state,
-                    {
-                        'remaining motion checks': self._remaining_motion_checks,
-                        'fail-safe stops': self._stops_published,
-                        'incidents': self._n_incidents,
-                        'last incident': self._last_incident,
-                    },
-                )
-            )
+            self._warn_of_expired(now.nanoseconds * 1e-9)
+            msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
+            msg.header.stamp = now.to_msg()
+            self._publisher.publish(msg)
+
+    def _status(self, now: float) -> DiagnosticStatus:
+        report, body = self.report, self._inputs.body.value.at(now)
+        monitor, reason = self.monitor_state
+        code = '' if report.code is None else f'{report.code.name} ({report.code.value})'
+        values: dict[str, object] = {
+            'last code': code,
+            'last sentence': report.sentence,
+            'requests': report.n_requests,
+            'solved': report.n_solved,
+            'seed': report.seed,
+            'planning time [ms]': f'{report.planning_time * 1e3:.3f}',
+            'request to trajectory [ms]': f'{report.response_time * 1e3:.3f}',
+            'duration [s]': f'{report.duration:.3f}',
+            'path length [rad]': f'{report.length:.4f}',
+            'least clearance [m]': f'{report.clearance:.4f}',
+            'boxes': body.n_boxes,
+            'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
+            'monitor': monitor,
+            'last stop': reason,
+            'remaining motion checks': self._remaining_motion_checks,
+            'fail-safe stops': self._stops_published,
+            'incidents': self._n_incidents,
+            'last incident': self._last_incident,
+        }
+        for name, topic in self._inputs.all.items():
+            values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
+            values[f'good messages, {name}'] = topic.n_good
+            values[f'rejected messages, {name}'] = topic.n_rejected
+            values[f'last rejection, {name}'] = topic.rejection or ''
+        level, message = summary(now, self._inputs, self.parameters, report)
+        status = DiagnosticStatus(
+            level=level,
+            name=f'{self._node.get_fully_qualified_name().lstrip("/")}: planning',
+            hardware_id='rrth_planner',
+            message=message,
+        )
+        status.values = [KeyValue(key=k, value=one_line(str(v))) for k, v in values.items()]
+        return status
 
     def _warn_of_expired(self, now: float) -> None:
         """Log each expired box once."""
@@ -151,3 +236,24 @@ class Reporter:
             logger.warning(text)
         self.publish()
         return text
+
+
+def summary(
+    now: float, inputs: Inputs, parameters: PlannerParameters, report: PlanReport
+) -> tuple[bytes, str]:
+    """Return level and message of the planner's diagnostics at a time [s]."""
+    if report.code is ErrorCode.FAILURE:
+        return DiagnosticStatus.ERROR, answer(report.code, report.sentence)
+    timeouts = ((inputs.body, parameters.body_timeout), (inputs.joints, parameters.joint_timeout))
+    for topic, timeout in timeouts:
+        if timeout > 0.0 and topic.received is not None and topic.age(now) > timeout:
+            return DiagnosticStatus.STALE, f'{topic.topic} is {topic.age(now):.3f} s old'
+    rejected = [topic for topic in inputs.all.values() if topic.is_last_rejected]
+    if rejected:
+        return DiagnosticStatus.WARN, f'{rejected[0].topic} rejected: {rejected[0].rejection}'
+    missing = [topic.topic for topic in inputs.all.values() if topic.received is None]
+    if missing:
+        return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
+    if report.code not in (None, ErrorCode.SUCCESS):
+        return DiagnosticStatus.WARN, answer(report.code, report.sentence)
+    return DiagnosticStatus.OK, report.sentence or 'ready'

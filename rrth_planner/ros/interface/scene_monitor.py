@@ -3,17 +3,18 @@
 """Subscriptions that keep the inputs of the planner up to date."""
 
 from collections.abc import Callable
+from functools import partial
 import time
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
-from rrth_planner.model.errors import MessageError, one_line
+from rrth_planner.model.errors import MessageError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.fast_decoding import fast_decoder
+from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
@@ -33,11 +34,8 @@ class SceneMonitor:
 
     Parameters
     ----------
-    node : Node
     parameters : PlannerParameters
         For the constant ones: the arm and the base frame.
-    inputs : Inputs
-        Kept up to date.
     on_change : callable, optional
         Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
@@ -60,62 +58,31 @@ class SceneMonitor:
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame = parameters.base_frame
-        self._on_change, self._notify_body, self._on_error = on_change, on_body, on_error
+        self._on_change, self._notify_body = on_change, on_body
         self._frames = Frames(node, parameters.base_frame)
-        self._warned: dict[str, float] = {}
-        self._has_warned_of_empty_frame: set[str] = set()
+        self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
         self._order = MarkerOrder()
+        # The monitor waits for bodies.
+        fast: dict[str, Any] = {'decode': fast_decoder(MarkerArray), 'takes_late': True}
         self._subscriptions = [
-            self._subscribe(
-                MarkerArray,
-                'body_boxes',
-                inputs.body,
-                self._on_body,
-                on_late=self._on_body,
-                # The monitor waits for it.
-                decode=fast_decoder(MarkerArray),
-            ),
-            self._subscribe(PointStamped, 'target', inputs.target, self._on_target),
-            self._subscribe(JointState, 'joint_states', inputs.joints, self._on_joints),
+            OpenSubscription(
+                node, kind, topic, take, partial(self._reject, source), on_error, **options
+            )
+            for kind, topic, source, take, options in (
+                (MarkerArray, 'body_boxes', inputs.body, self._on_body, fast),
+                (PointStamped, 'target', inputs.target, self._on_target, {}),
+                (JointState, 'joint_states', inputs.joints, self._on_joints, {}),
+            )
         ]
 
-    def _subscribe(
-        self,
-        kind: type,
-        topic: str,
-        source: Input[Any],
-        on_message: Callable[[Any, Arrival], None],
-        on_late: Callable[[Any, Arrival], None] | None = None,
-        decode: Callable[[bytes], Any] | None = None,
-    ) -> OpenSubscription:
-        def supervised(take: Callable[..., None]) -> Callable[..., None]:
-            def supervise(*arguments: Any) -> None:
-                try:
-                    take(*arguments)
-                except Exception as problem:
-                    self._on_error(one_line(f'{topic}: {type(problem).__name__}: {problem}'))
-                    raise
+    def _reject(self, source: Input[Any], problem: MessageError) -> None:
+        def read() -> Any:
+            raise problem
 
-            return supervise
-
-        def reject(problem: MessageError) -> None:
-            def read() -> Any:
-                raise problem
-
-            self._take(source, read, self._now())
-            if source is self._inputs.body:
-                self._notify_body(source.value, time.time_ns())
-
-        return OpenSubscription(
-            self._node,
-            kind,
-            topic,
-            supervised(on_message),
-            None if on_late is None else supervised(on_late),
-            supervised(reject),
-            decode,
-        )
+        self._take(source, read, self._now())
+        if source is self._inputs.body:
+            self._notify_body(source.value, time.time_ns())
 
     def body_progress(self) -> tuple[int, int]:
         """Return `OpenSubscription.progress` of the bodies."""
@@ -153,27 +120,24 @@ class SceneMonitor:
 
     def _take(
         self, source: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
-    ) -> bool:
+    ) -> None:
         was_good = source.received is not None and not source.is_last_rejected
         is_good = source.accept(read, now, is_news)
         if not is_good:
-            self._warn(source)
+            self._warn(source, 'rejected', f' rejected: {source.rejection}', WARNING_PERIOD)
         if is_good != was_good:
             self._on_change()
-        return is_good
-
-    def _warn(self, source: Input[Any]) -> None:
-        present = time.monotonic()
-        if present - self._warned.get(source.topic, -WARNING_PERIOD) >= WARNING_PERIOD:
-            self._warned[source.topic] = present
-            self._node.get_logger().warning(f'{source.topic} rejected: {source.rejection}')
 
     def _warn_of_empty_frame(self, source: Input[Any]) -> None:
-        if source.topic not in self._has_warned_of_empty_frame:
-            self._has_warned_of_empty_frame.add(source.topic)
-            self._node.get_logger().warning(
-                f'{source.topic}: empty frame, taken as "{self._base_frame}"'
-            )
+        words = f': empty frame, taken as "{self._base_frame}"'
+        self._warn(source, 'empty frame', words, float('inf'))
+
+    def _warn(self, source: Input[Any], kind: str, words: str, period: float) -> None:
+        """Warn of a topic, at most once in a period [s] of each kind."""
+        present, last = time.monotonic(), self._warned.get((source.topic, kind))
+        if last is None or present - last >= period:
+            self._warned[source.topic, kind] = present
+            self._node.get_logger().warning(f'{source.topic}{words}')
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9

@@ -18,12 +18,10 @@ MOST_EXPIRED = 100
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerBody:
     """
-    The wearer's boxes by namespace and id, as RViz would show them; a value, never changed.
+    The wearer's boxes by (ns, id), each once, as RViz would show them; a value, never changed.
 
     Parameters
     ----------
-    parts : tuple of ((str, int), BodyPart)
-        Keys (ns, id), each once.
     expired : tuple of ((str, int), BodyPart)
         Those whose lifetime has passed, and that were neither deleted nor added again since: their
         place is unknown. At most 100.
@@ -47,16 +45,13 @@ class WearerBody:
         """Return the body at a time [s]: parts whose lifetime has passed are expired."""
         if all(part.expires > now for _, part in self.parts):
             return self
-        # Their first box suffices for the name.
-        gone = dict(self.expired) | {
-            k: BodyPart(part.boxes[:1], part.expires)
-            for k, part in self.parts
-            if part.expires <= now
-        }
-        return WearerBody(
-            tuple(item for item in self.parts if item[1].expires > now),
-            tuple(gone.items())[-MOST_EXPIRED:],
-        )
+        gone = dict(self.expired)
+        for key, part in self.parts:
+            if part.expires <= now:
+                # Its first box suffices for the name.
+                gone[key] = BodyPart(part.boxes[:1], part.expires)
+        present = tuple(item for item in self.parts if item[1].expires > now)
+        return WearerBody(present, tuple(gone.items())[-MOST_EXPIRED:])
 
     def apply(
         self, msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
@@ -65,24 +60,8 @@ class WearerBody:
         Return the body after an array: all of its markers in their order, or none of them.
 
         CUBE and CUBE_LIST markers are added or replace the one of the same ns and id; DELETE
-        removes one, DELETEALL all of its ns, or all when its ns is empty. A lifetime counts from
-        `now`. Colours are ignored: an invisible box is still an obstacle.
-
-        Parameters
-        ----------
-        msg : MarkerArray
-        now : float
-            Time of reception [s].
-        base_frame : str
-            Frame of the boxes of this body; an empty frame of a marker is taken as it.
-        lookup : callable, optional
-            frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
-
-        Raises
-        ------
-        MessageError
-            A bad marker; a FrameError when its frame is the reason.
-
+        removes one, DELETEALL all of its ns, or all when its ns is empty. Colours are ignored: an
+        invisible box is still an obstacle. Parameters and errors are those of `read_edits`.
         """
         return self.edited(read_edits(msg, now, base_frame, lookup), now)
 
@@ -105,17 +84,6 @@ class WearerBody:
         if body.n_boxes > MOST_BOXES:
             raise MessageError(f'{body.n_boxes} boxes, expected at most {MOST_BOXES} in all')
         return body
-
-    def with_older(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
-        """
-        Return the body with the missing parts that an array adds, received at a time [s].
-
-        For an array that is older than the body: it deletes and changes nothing.
-        """
-        older = {e.key: e.part for e in edits if e.part is not None and e.part.expires > now}
-        present = dict(self.parts)
-        missing = [Edit(Marker.ADD, k, part) for k, part in older.items() if k not in present]
-        return self.edited(missing, now)
 
 
 def scene_of(body: WearerBody) -> Scene:

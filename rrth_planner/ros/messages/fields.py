@@ -25,11 +25,6 @@ def numbers(values: Sequence[float], name: str, unit: str) -> Array:
     return np.array(values, dtype=np.float64)
 
 
-def position_of(point: Any, name: str) -> Array:
-    """Return a geometry_msgs/Point, shape (3,) [m], or raise MessageError."""
-    return numbers((point.x, point.y, point.z), name, 'm')
-
-
 def triple_of(vector: Any, name: str) -> tuple[float, float, float]:
     """Return a geometry_msgs/Point or Vector3 [m], or raise MessageError."""
     x, y, z = vector.x, vector.y, vector.z

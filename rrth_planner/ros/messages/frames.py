@@ -16,6 +16,7 @@ try:
 except ImportError:  # not among the wheels: only the base frame is known then
     tf2_ros = None
 
+# The pose of a frame in the base frame, shape (4, 4) [m], or FrameError.
 Lookup = Callable[[str], Array]
 
 
@@ -27,20 +28,7 @@ def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
     """
     Return the pose of a message's frame in the base frame, shape (4, 4) [m].
 
-    Parameters
-    ----------
-    frame : str
-        Of the header; empty stands for the base frame.
-    base_frame : str
-        The planner's frame.
-    lookup : callable or None
-        frame -> pose in the base frame; None: no other frame is known.
-
-    Raises
-    ------
-    FrameError
-        The frame is another one, and unknown.
-
+    An empty frame stands for the base frame; without `lookup` any other one is a FrameError.
     """
     if frame in ('', base_frame):
         return np.eye(4)
@@ -58,18 +46,10 @@ class Frames:
         self._buffer = None
         if tf2_ros is not None:
             self._buffer = tf2_ros.Buffer(node=node)
-            self._scene_monitor = tf2_ros.TransformListener(self._buffer, node)
+            self._listener = tf2_ros.TransformListener(self._buffer, node)
 
     def lookup(self, frame: str) -> Array:
-        """
-        Return the latest pose of a frame in the base frame, shape (4, 4) [m].
-
-        Raises
-        ------
-        FrameError
-            No transform is known.
-
-        """
+        """Return the latest pose of a frame in the base frame (`Lookup`), or raise FrameError."""
         if self._buffer is None:
             raise FrameError(
                 f'frame "{frame}", expected "{self._base_frame}" or an empty frame: '

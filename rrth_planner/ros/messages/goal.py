@@ -6,7 +6,7 @@ from geometry_msgs.msg import PointStamped
 import numpy as np
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.ros.messages.fields import position_of
+from rrth_planner.ros.messages.fields import triple_of
 from rrth_planner.ros.messages.frames import Lookup, pose_in_base
 
 
@@ -14,15 +14,7 @@ def goal_from_msg(
     msg: PointStamped, base_frame: str, lookup: Lookup | None = None
 ) -> PointingGoal:
     """
-    Return the goal to point at a point.
-
-    Parameters
-    ----------
-    msg : PointStamped
-    base_frame : str
-        Frame of the goal; an empty frame of the message is taken as it.
-    lookup : callable, optional
-        frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
+    Return the goal to point at a point, in the base frame; for frames see `pose_in_base`.
 
     Raises
     ------
@@ -30,7 +22,7 @@ def goal_from_msg(
         A bad point; a FrameError when its frame is the reason.
 
     """
-    point = position_of(msg.point, 'point')
+    point = np.array(triple_of(msg.point, 'point'))
     T = pose_in_base(msg.header.frame_id, base_frame, lookup)
     try:
         # What overflows is infinite, which a goal rejects.

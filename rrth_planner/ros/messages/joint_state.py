@@ -57,15 +57,11 @@ class JointReading:
 
     Parameters
     ----------
-    positions : ndarray, shape (dof,)
-        [rad].
-    velocities : ndarray, shape (dof,)
-        As given, NaN included, or differences of the positions [rad/s].
-    taken : float
+    positions, velocities : ndarray, shape (dof,)
+        [rad, rad/s]; velocities as given, NaN included, or differences of the positions.
+    taken, received : float
         Time of the measurement: the stamp if it is a little older than the reception, else the
-        reception [s].
-    received : float
-        [s].
+        reception; and that [s].
     velocities_expire : float
         Until when the velocities count; inf: as long as the positions [s].
 
@@ -84,14 +80,8 @@ def joint_reading(
     """
     Return the positions and velocities of these joints, by name; others are ignored.
 
-    Parameters
-    ----------
-    msg : JointState
-        Without velocities, these are the change since the reading before.
-    joint_names : sequence of str
-    received : float
-        When it came [s].
-    before : JointReading or None
+    Of a message without velocities, received at a time [s], these are the change since the reading
+    before.
 
     Raises
     ------

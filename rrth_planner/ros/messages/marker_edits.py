@@ -2,20 +2,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The edits of the wearer by the markers of one array, read in one pass: bodies come often."""
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 import math
 from typing import Any
 
 import numpy as np
 from rrth_planner.io.wearer_file import LONGEST_TEXT
-from rrth_planner.kernels.collision.boxes import first_bad as first_bad_row, place, POSED
+from rrth_planner.kernels.collision.boxes import first_bad, place, POSED
 from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import MessageError, one_line, SceneError
 from rrth_planner.model.scene import Box
 from rrth_planner.ros.messages.fields import seconds_of, triple_of, unit_quaternion_of
-from rrth_planner.ros.messages.frames import FrameError, Lookup, pose_in_base
+from rrth_planner.ros.messages.frames import Lookup, pose_in_base
 from visualization_msgs.msg import Marker, MarkerArray
 
 # More boxes than any wearer has; a longer array is a mistake, and would block the node.
@@ -29,36 +31,24 @@ Key = tuple[str, int]
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPart:
     """
-    The boxes of one marker.
+    The boxes of one marker: one of a CUBE, any number of a CUBE_LIST.
 
     Parameters
     ----------
     boxes : tuple of Box
-        One for a CUBE, any number for a CUBE_LIST, in the base frame.
+        In the base frame.
     expires : float
         When they vanish [s, the clock of `now`]; inf: never.
 
     """
 
     boxes: tuple[Box, ...]
-    expires: float = float('inf')
+    expires: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """
-    The edit by one marker.
-
-    Parameters
-    ----------
-    action : int
-        Marker.ADD, DELETE or DELETEALL.
-    key : (str, int)
-        Its ns and id.
-    part : BodyPart or None
-        What is added; None unless it adds.
-
-    """
+    """The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds."""
 
     action: int
     key: Key
@@ -73,7 +63,6 @@ def read_edits(
 
     Parameters
     ----------
-    msg : MarkerArray
     now : float
         Time of reception, from which lifetimes count [s].
     base_frame : str
@@ -88,21 +77,28 @@ def read_edits(
 
     """
     reading = _Reading(base_frame, lookup)
-    found = []
+    # Of each marker: when it expires, and where its boxes end among all.
+    expires, ends = [], [0]
     for index, marker in enumerate(msg.markers):
-        reading.n_markers = index
         try:
-            found.append(_read(marker, now, reading))
-        except FrameError as problem:
-            raise FrameError(f'{_label(index, marker)}: {problem}') from problem
+            expires.append(_read(marker, now, reading))
         except MessageError as problem:
-            raise MessageError(f'{_label(index, marker)}: {problem}') from problem
-    boxes = _placed(msg, reading)
+            raise type(problem)(f'{_label(index, marker)}: {problem}') from problem
+        ends.append(len(reading.rows))
+    numbers = np.empty((len(reading.rows), NUMBERS))
+    if reading.rows:
+        rows = np.array(reading.rows)
+        assert rows.shape[1] == POSED
+        # What overflows is infinite, which is no box.
+        place(rows, np.array(reading.which), np.array(reading.frames), numbers)
+    try:
+        boxes = boxes_of(reading.names, numbers)
+    except SceneError as problem:
+        index = bisect_right(ends, first_bad(numbers, FARTHEST)) - 1
+        raise MessageError(f'{_label(index, msg.markers[index])}: {problem}') from problem
     return tuple(
-        Edit(action, key)
-        if expires is None
-        else Edit(action, key, BodyPart(boxes[begin:end], expires))
-        for action, key, expires, begin, end in found
+        Edit(m.action, (m.ns, m.id), None if then is None else BodyPart(boxes[begin:end], then))
+        for m, then, (begin, end) in zip(msg.markers, expires, pairwise(ends), strict=True)
     )
 
 
@@ -117,41 +113,36 @@ class _Reading:
 
     def __init__(self, base_frame: str, lookup: Lookup | None) -> None:
         self._base_frame, self._lookup = base_frame, lookup
-        self.n_markers = 0
-        # Of each box: its name, its numbers as `place` takes them, marker and frame.
+        # Of each box: its name, its numbers as `place` takes them, and which frame is its own.
         self.names: list[str] = []
         self.rows: list[tuple[float, ...]] = []
-        self.owners: list[int] = []
         self.which: list[int] = []
         self.frames: list[Array] = []
         self._known: dict[str, int] = {}
 
     def frame(self, name: str) -> int:
         """Return the number of a frame, or raise FrameError."""
-        known = self._known.get(name)
-        if known is None:
+        if name not in self._known:
             self.frames.append(pose_in_base(name, self._base_frame, self._lookup))
-            known = self._known[name] = len(self.frames) - 1
-        return known
+            self._known[name] = len(self.frames) - 1
+        return self._known[name]
 
-    def add(self, name: str, pose: tuple[float, ...], point: tuple[float, ...], at: int) -> None:
-        """Add a box whose pose and size are those of its marker, and whose frame has a number."""
+    def add(self, name: str, row: tuple[float, ...], frame: int) -> None:
+        """Add a box in a frame."""
         self.names.append(name)
-        self.rows.append(pose + point)
-        self.owners.append(self.n_markers)
-        self.which.append(at)
+        self.rows.append(row)
+        self.which.append(frame)
 
 
-def _read(marker: Any, now: float, reading: _Reading) -> tuple[int, Key, float | None, int, int]:
-    """Return action, key, when it expires, and which boxes are its own; None: it adds none."""
-    key = (marker.ns, marker.id)
+def _read(marker: Any, now: float, reading: _Reading) -> float | None:
+    """Read the boxes of a marker; return when they expire [s], or None where it adds none."""
     if len(marker.ns) > LONGEST_NAMESPACE:
         raise MessageError(
             f'ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
         )
     action = marker.action
     if action in (Marker.DELETE, Marker.DELETEALL):
-        return action, key, None, 0, 0
+        return None
     if action != Marker.ADD:
         raise MessageError(f'action {action}, expected 0 (ADD), 2 (DELETE) or 3 (DELETEALL)')
     if marker.type not in (Marker.CUBE, Marker.CUBE_LIST):
@@ -168,36 +159,17 @@ def _read(marker: Any, now: float, reading: _Reading) -> tuple[int, Key, float |
     lifetime = seconds_of(marker.lifetime)
     if lifetime < 0.0:
         raise MessageError(f'lifetime: {lifetime}, expected 0 (for ever) or more [s]')
-    frame, name, begin = reading.frame(marker.header.frame_id), marker_name(marker), 0
-    begin = len(reading.rows)
+    frame, name = reading.frame(marker.header.frame_id), marker_name(marker)
     if marker.type == Marker.CUBE:
-        reading.add(name, row, (0.0, 0.0, 0.0), frame)
+        reading.add(name, (*row, 0.0, 0.0, 0.0), frame)
     else:
         if not 0 < len(marker.points) <= MOST_BOXES:
             raise MessageError(
                 f'points: {len(marker.points)}, expected 1 to {MOST_BOXES} in a CUBE_LIST'
             )
         for k, point in enumerate(marker.points):
-            reading.add(f'{name}[{k}]', row, triple_of(point, f'points[{k}]'), frame)
-    expires = now + lifetime if lifetime > 0.0 else math.inf
-    return action, key, expires, begin, len(reading.rows)
-
-
-def _placed(msg: MarkerArray, reading: _Reading) -> tuple[Box, ...]:
-    """Return the boxes in the base frame, or raise MessageError."""
-    if not reading.rows:
-        return ()
-    markers = np.array(reading.rows)
-    assert markers.shape[1] == POSED
-    which, frames = np.array(reading.which), np.array(reading.frames)
-    numbers = np.empty((len(markers), NUMBERS))
-    # What overflows is infinite, which is no box.
-    place(markers, which, frames, numbers)
-    try:
-        return boxes_of(reading.names, numbers)
-    except SceneError as problem:
-        index = reading.owners[first_bad(numbers)]
-        raise MessageError(f'{_label(index, msg.markers[index])}: {problem}') from problem
+            reading.add(f'{name}[{k}]', row + triple_of(point, f'points[{k}]'), frame)
+    return now + lifetime if lifetime > 0.0 else math.inf
 
 
 def _label(index: int, marker: Any) -> str:
@@ -208,20 +180,11 @@ def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:
     """
     Return boxes from their names and numbers, shape (n, 15), which are frozen by this.
 
-    Raises
-    ------
-    SceneError
-        Of the first that is no box.
-
+    Raises the SceneError of the first that is no box.
     """
     numbers.setflags(write=False)
-    bad = first_bad(numbers)
+    bad = first_bad(numbers, FARTHEST)
     if bad >= 0:
         row = numbers[bad]
         Box(names[bad], row[:SIZE], row[SIZE:ROTATION], row[ROTATION:].reshape(3, 3))
     return tuple(Box.of_row(name, row) for name, row in zip(names, numbers, strict=True))
-
-
-def first_bad(numbers: Array) -> int:
-    """Return which of some numbers, shape (n, 15), are the first that are no box; -1: none."""
-    return int(first_bad_row(numbers, FARTHEST))

@@ -37,20 +37,9 @@ class MarkerOrder:
         is_newer: Callable[[Stamp], bool] | None = None,
     ) -> WearerBody:
         """
-        Return the body after an array, and remember it.
+        Return the body after an array that came at a time [s], and remember when it was sent.
 
-        Parameters
-        ----------
-        body : WearerBody
-            As it is.
-        edits : sequence of Edit
-            Of the array.
-        sent : (int, int)
-            When it was sent.
-        received : float
-            When it came [s].
-        is_newer : callable, optional
-            Of a late array: whether another one was sent after it.
+        is_newer: of a late array, whether another one was sent after it.
 
         Raises
         ------
@@ -62,10 +51,14 @@ class MarkerOrder:
         after = body.edited(kept, received).at(received)
         for edit in edits:
             if edit.action == Marker.DELETEALL:
-                self._remember_all(edit.key[0], sent, is_newer)
-            elif not self._is_overtaken(edit.key, is_newer):
+                self._remember_all(edit.key[0], sent, is_newer or (lambda _: False))
+            elif is_newer is None or not self._is_overtaken(edit.key, is_newer):
                 self._markers[edit.key] = sent
-        self._forget(after)
+        if len(self._markers) > REMEMBERED + len(after.parts):
+            present = {key for key, _ in after.parts}
+            self._markers = {k: stamp for k, stamp in self._markers.items() if k in present}
+        while len(self._namespaces) > REMEMBERED:
+            del self._namespaces[next(iter(self._namespaces))]
         return after
 
     def _kept(
@@ -81,30 +74,18 @@ class MarkerOrder:
                 changes = [edit]
             yield from (one for one in changes if not self._is_overtaken(one.key, is_newer))
 
-    def _is_overtaken(self, key: Key, is_newer: Callable[[Stamp], bool] | None) -> bool:
+    def _is_overtaken(self, key: Key, is_newer: Callable[[Stamp], bool]) -> bool:
         """Return whether a marker has a newer edit."""
-        if is_newer is None:
-            return False
         done = (self._markers.get(key), *map(self._namespaces.get, ('', key[0])))
         return any(stamp is not None and is_newer(stamp) for stamp in done)
 
-    def _remember_all(
-        self, ns: str, sent: Stamp, is_newer: Callable[[Stamp], bool] | None
-    ) -> None:
+    def _remember_all(self, ns: str, sent: Stamp, is_newer: Callable[[Stamp], bool]) -> None:
         """Remember that all markers of a namespace were deleted."""
         before = self._namespaces.get(ns)
-        if before is None or is_newer is None or not is_newer(before):
+        if before is None or not is_newer(before):
             self._namespaces[ns] = sent
         self._markers = {
             key: stamp
             for key, stamp in self._markers.items()
-            if ns not in ('', key[0]) or (is_newer is not None and is_newer(stamp))
+            if ns not in ('', key[0]) or is_newer(stamp)
         }
-
-    def _forget(self, body: WearerBody) -> None:
-        """Forget deleted markers and namespaces where they have become too many."""
-        if len(self._markers) > REMEMBERED + len(body.parts):
-            present = {key for key, _ in body.parts}
-            self._markers = {k: stamp for k, stamp in self._markers.items() if k in present}
-        while len(self._namespaces) > REMEMBERED:
-            del self._namespaces[next(iter(self._namespaces))]

@@ -42,32 +42,27 @@ def message_from_file(path: str | Path, message_type: type[Message]) -> Message:
         raise MessageError(f'file {path}: {problem}') from problem
 
 
-def message_from_mapping(data: Any, message_type: type[Message]) -> Message:
-    """Return the message whose fields a mapping holds, or raise MessageError."""
-    message = message_type()
-    _fill(message, data, '')
-    return message
-
-
-def _fill(message: Any, values: Any, name: str) -> None:
+def message_from_mapping(data: Any, message_type: type[Message], name: str = '') -> Message:
+    """Return the message whose fields a mapping, so named, holds, or raise MessageError."""
+    message: Any = message_type()
     types = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
-    kind = type(message).__name__
-    if not isinstance(values, Mapping):
-        raise MessageError(f'{name or kind}: {shown(values)}, expected fields of {kind}')
-    for key, value in values.items():
+    kind = message_type.__name__
+    if not isinstance(data, Mapping):
+        raise MessageError(f'{name or kind}: {shown(data)}, expected fields of {kind}')
+    for key, value in data.items():
         if key not in types:
             raise MessageError(
                 f'{name or kind}: {key}, expected fields of {kind}: {", ".join(types)}'
             )
         setattr(message, key, _value(types[key], value, f'{name}.{key}' if name else key))
+    return message
 
 
 def _value(kind: Any, value: Any, name: str) -> Any:
     """Return the value of a field or an element of one: of its type, or raise MessageError."""
     if isinstance(kind, NamespacedType):
-        message = getattr(import_module('.'.join(kind.namespaces)), kind.name)()
-        _fill(message, value, name)
-        return message
+        message_type = getattr(import_module('.'.join(kind.namespaces)), kind.name)
+        return message_from_mapping(value, message_type, name)
     if isinstance(kind, AbstractNestedType):
         return [
             _value(kind.value_type, item, f'{name}[{i}]')

@@ -35,33 +35,22 @@ def plan_markers(
     """
     Return all markers of a plan; the first one clears those of the plan before.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-    margin : float
-        Boxes are shown grown by it on every side [m].
-    trajectory : Trajectory
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    tool_path : Path
-        Its frame is that of the markers.
-
+    Boxes are shown grown by the margin [m]; the target, shape (3,) [m], is in the base frame, that
+    of the tool's path and of all markers.
     """
-    frame = tool_path.header.frame_id
     q_start, q_goal = trajectory.positions[0], trajectory.positions[-1]
     tool = forward_kinematics(arm, q_goal)[-1, :3, 3]
     steps = [pose.pose.position for pose in tool_path.poses]
-    return MarkerArray(
-        markers=[
-            Marker(action=Marker.DELETEALL),
-            *(_cube(frame, k, box, margin) for k, box in enumerate(scene.boxes)),
-            _line(frame, 'arm_start', _points(_bars(arm, q_start)), BAR_WIDTH, START),
-            _line(frame, 'arm_goal', _points(_bars(arm, q_goal)), BAR_WIDTH, GOAL),
-            _line(frame, 'ray', _points((tool, target)), LINE_WIDTH, RAY),
-            _line(frame, 'tool_path', steps, LINE_WIDTH, TOOL_PATH),
-        ]
-    )
+    markers = [
+        *(box_marker('body', k, box, BODY, margin) for k, box in enumerate(scene.boxes)),
+        _line('arm_start', _points(_bars(arm, q_start)), BAR_WIDTH, START),
+        _line('arm_goal', _points(_bars(arm, q_goal)), BAR_WIDTH, GOAL),
+        _line('ray', _points((tool, target)), LINE_WIDTH, RAY),
+        _line('tool_path', steps, LINE_WIDTH, TOOL_PATH),
+    ]
+    for marker in markers:
+        marker.header.frame_id = tool_path.header.frame_id
+    return MarkerArray(markers=[Marker(action=Marker.DELETEALL), *markers])
 
 
 def _bars(arm: ArmModel, q: Array) -> list[Array]:
@@ -79,22 +68,21 @@ def _points(positions: Iterable[Array]) -> list[Point]:
     return [Point(x=float(x), y=float(y), z=float(z)) for x, y, z in positions]
 
 
-def _marker(frame: str, ns: str, index: int, kind: int, color: Color) -> Marker:
+def _marker(ns: str, index: int, kind: int, color: Color) -> Marker:
     marker = Marker(ns=ns, id=index, type=kind, action=Marker.ADD)
-    marker.header.frame_id = frame
     marker.color.r, marker.color.g, marker.color.b, marker.color.a = color
     return marker
 
 
-def _line(frame: str, ns: str, points: list[Point], width: float, color: Color) -> Marker:
-    marker = _marker(frame, ns, 0, Marker.LINE_STRIP, color)
-    marker.scale.x = width
-    marker.points = points
+def _line(ns: str, points: list[Point], width: float, color: Color) -> Marker:
+    marker = _marker(ns, 0, Marker.LINE_STRIP, color)
+    marker.scale.x, marker.points = width, points
     return marker
 
 
-def _cube(frame: str, index: int, box: Box, margin: float) -> Marker:
-    marker = _marker(frame, 'body', index, Marker.CUBE, BODY)
+def box_marker(ns: str, index: int, box: Box, color: Color, margin: float = 0.0) -> Marker:
+    """Return a box, grown by a margin on every side [m], as a marker without a frame."""
+    marker = _marker(ns, index, Marker.CUBE, color)
     p, o, s = marker.pose.position, marker.pose.orientation, marker.scale
     p.x, p.y, p.z = box.center.tolist()
     o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()

@@ -69,15 +69,8 @@ def joint_trajectory_from_msg(
 
     Rejects what joint_trajectory_controller rejects, and besides numbers that are not finite,
     joints named twice, a first point that is not at time 0, and points without velocities or
-    accelerations: between two points a quintic fits all three.
-
-    Parameters
-    ----------
-    msg : JointTrajectory
-    joint_names : sequence of str
-        All joints of the arm, each of them expected once, in any order.
-    now : float, optional
-        Time of reception [s]; with it a stamped message that has already ended is rejected.
+    accelerations: between two points a quintic fits all three. With the time of reception [s], a
+    stamped message that has already ended is rejected, too.
 
     Raises
     ------

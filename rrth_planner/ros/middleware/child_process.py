@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 from threading import Thread
-from types import TracebackType
 
 from rrth_planner.model.errors import RrthError
 
@@ -26,23 +25,12 @@ class ChildDiedError(RrthError):
 
 
 class ChildProcess:
-    """
-    A Python module that runs as a process during a `with` block.
-
-    Parameters
-    ----------
-    module : str
-        Run as `python -m module`.
-    arguments : sequence of str
-    on_line : callable
-        Called with each line that it writes, from another thread.
-
-    """
+    """A Python module that runs as a process during a `with` block."""
 
     def __init__(
         self, module: str, arguments: Sequence[str], on_line: Callable[[str], None]
     ) -> None:
-        """Remember what to run."""
+        """Remember what to run; `on_line` takes each line that it writes, in another thread."""
         self._module, self._on_line = module, on_line
         self._command = [sys.executable, '-m', module, *arguments]
         self._lines: deque[str] = deque(maxlen=LAST_LINES)
@@ -61,12 +49,7 @@ class ChildProcess:
         self._reader.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        problem: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """End it by SIGINT, later by SIGKILL."""
         try:
             self._process.send_signal(signal.SIGINT)

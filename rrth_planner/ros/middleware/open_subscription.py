@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
-from rrth_planner.model.errors import MessageError
+from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.fields import Stamp
 
 DEPTH = 50
@@ -48,14 +48,10 @@ def decoded(
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """
-    When a message was sent and received, and whether it is late.
+    When a message was sent and received [ns], and whether it is late.
 
     Parameters
     ----------
-    sent : (int, int)
-        Source timestamp [ns] and sequence number.
-    received : int
-        [ns].
     is_newer : callable or None
         Of a late message, which came after one that was sent later: whether another message was
         sent after it. None: the message is not late, as far as is known.
@@ -77,16 +73,10 @@ class Copies:
     order in which they were sent, though it may lose some: what this reader delivered before was
     not sent later by the same publisher, whatever the stamps are. For all other messages the
     stamps decide: those of one publisher are of one clock.
-
-    Parameters
-    ----------
-    takes_late : bool
-        Whether a late copy counts; without, the next copy may.
-
     """
 
     def __init__(self, takes_late: bool) -> None:
-        """Start without messages."""
+        """Start without messages; a late copy counts, or the next copy may."""
         self._takes_late = takes_late
         # By which readers each message has come, and whether it has counted.
         self._readers: dict[Stamp, set[Any]] = {}
@@ -136,18 +126,16 @@ class OpenSubscription:
 
     Parameters
     ----------
-    node : Node
-    msg_type : type
-    topic : str
     on_message : callable
         Takes each message and its Arrival.
-    on_late : callable, optional
-        Takes each late message and its Arrival; without, these are dropped, since the last one
-        wins.
     on_rejection : callable, optional
         Takes the MessageError of each message that is too long, or not of this type.
+    on_error : callable, optional
+        Takes the name and message of an unexpected error in one of the two above.
     decode : callable, optional
         Turns the bytes of a message into one; without, rclpy does.
+    takes_late : bool, optional
+        Without, late messages are dropped, since the last one wins.
 
     """
 
@@ -157,26 +145,23 @@ class OpenSubscription:
         msg_type: type,
         topic: str,
         on_message: Callable[[Any, Arrival], None],
-        on_late: Callable[[Any, Arrival], None] | None = None,
         on_rejection: Callable[[MessageError], None] = lambda problem: None,
+        on_error: Callable[[str], None] = lambda what: None,
         decode: Callable[[bytes], Any] | None = None,
+        takes_late: bool = False,
     ) -> None:
         """Subscribe."""
-        self._on_rejection, self._decode = on_rejection, decode
         self._node, self._msg_type, self._topic = node, msg_type, topic
-        self._on_message, self._on_late = on_message, on_late
-        self._copies = Copies(on_late is not None)
+        self._on_message, self._on_rejection, self._on_error = on_message, on_rejection, on_error
+        self._decode, self._copies = decode, Copies(takes_late)
         self._n_read = self._live_came = 0
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
-            self._live = self._subscribe(
-                profile,
-                self._on_live,
-                SubscriptionEventCallbacks(
-                    matched=lambda _: self.match_publishers(), use_default_callbacks=False
-                ),
+            on_match = SubscriptionEventCallbacks(
+                matched=lambda _: self.match_publishers(), use_default_callbacks=False
             )
+            self._live = self._subscribe(profile, self._on_live, on_match)
         except UnsupportedEventTypeError:
             self._live = self._subscribe(profile, self._on_live, None)
             self._timer = node.create_timer(
@@ -195,18 +180,17 @@ class OpenSubscription:
     def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
         for info in self._node.get_publishers_info_by_topic(self.topic_name):
-            durability = info.qos_profile.durability
+            qos = info.qos_profile
             if (
-                info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-                and durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
-                and durability not in self._reliable
+                qos.reliability == ReliabilityPolicy.RELIABLE
+                and qos.durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
+                and qos.durability not in self._reliable
             ):
-                profile = QoSProfile(
-                    depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=durability
-                )
-                self._reliable[durability] = self._subscribe(
-                    profile,
-                    partial(self._on_copy, reader=durability),
+                self._reliable[qos.durability] = self._subscribe(
+                    QoSProfile(
+                        depth=DEPTH, reliability=qos.reliability, durability=qos.durability
+                    ),
+                    partial(self._on_copy, reader=qos.durability),
                     SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
 
@@ -230,22 +214,19 @@ class OpenSubscription:
         received = info.get('received_timestamp') or time.time_ns()
         arrival = self._copies.take(sent, received, reader)
         if arrival is not None:
-            callback = self._on_message if arrival.is_newer is None else self._on_late
-            assert callback is not None
-            self._deliver(data, callback, arrival)
+            self._deliver(data, arrival)
 
-    def _deliver(
-        self, data: bytes, callback: Callable[[Any, Arrival], None], arrival: Arrival
-    ) -> None:
+    def _deliver(self, data: bytes, arrival: Arrival) -> None:
         """Decode a message and call the callback; an error in either does not end the node."""
         try:
-            msg = decoded(data, self._msg_type, decode=self._decode)
-        except MessageError as problem:
-            self._on_rejection(problem)
-            return
-        try:
-            callback(msg, arrival)
-        except Exception:
+            try:
+                msg = decoded(data, self._msg_type, decode=self._decode)
+            except MessageError as problem:
+                self._on_rejection(problem)
+            else:
+                self._on_message(msg, arrival)
+        except Exception as problem:
+            self._on_error(one_line(f'{self._topic}: {type(problem).__name__}: {problem}'))
             self._node.get_logger().error(
                 f'{self.topic_name}: the callback failed on a message\n{traceback.format_exc()}'
             )

@@ -25,14 +25,14 @@ OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One parameter: its name, default, range (None: no range), unit and meaning."""
+    """One parameter: its name, default, unit, meaning, and range (None: no range)."""
 
     name: str
     default: Any
-    low: float | None
-    high: float | None
     unit: str
     description: str
+    low: float | None = None
+    high: float | None = None
     is_read_only: bool = False
 
     @property
@@ -78,11 +78,9 @@ class Setting:
 ARM = Setting(
     'arm',
     '',
-    None,
-    None,
     'path of a YAML file',
     'the arm, as config/arm.yaml; empty: that one',
-    True,
+    is_read_only=True,
 )
 
 

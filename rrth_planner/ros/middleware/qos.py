@@ -5,12 +5,10 @@
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
+_LAST = {'depth': 1, 'reliability': ReliabilityPolicy.RELIABLE}
+_FOR_LATE = {**_LAST, 'durability': DurabilityPolicy.TRANSIENT_LOCAL}
 # The last message counts, for late subscribers too.
-LATCHED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-)
+LATCHED = QoSProfile(**_FOR_LATE)
 
 # A planner that has not asserted its liveliness for so long is lost [s].
 LEASE = 0.3
@@ -19,19 +17,9 @@ _LIVELINESS = {
     'liveliness_lease_duration': Duration(seconds=LEASE),
 }
 # Motions, whose planner asserts its liveliness while it monitors them; any subscriber matches.
-COMMANDED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    **_LIVELINESS,
-)
+COMMANDED = QoSProfile(**_FOR_LATE, **_LIVELINESS)
 # For subscribers that supervise the planner: liveliness needs a reliable reader.
-SUPERVISED = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.VOLATILE,
-    **_LIVELINESS,
-)
+SUPERVISED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE, **_LIVELINESS)
 
 # Requests may queue, and their responses: the default drops those beyond ten.
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

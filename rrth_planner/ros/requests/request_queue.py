@@ -18,11 +18,10 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import REST_SPEED, Trajectory
 from rrth_planner.pipeline.planning_process import Planner
-from rrth_planner.ros.interface.diagnostics import PlanReport
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
-from rrth_planner.ros.interface.reporter import Reporter
+from rrth_planner.ros.interface.reporter import PlanReport, Reporter
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
