@@ -32,17 +32,8 @@ class Inspection:
     """
     The figures of a motion that passed the inspection.
 
-    Parameters
-    ----------
-    length : float
-        Of its path in joint space [rad].
-    duration : float
-        [s].
-    clearance : float
-        Least distance of the arm and its ray up to `ray_guard_length` from the wearer [m].
-    pointing_error : float
-        Distance of the final ray from the target [m].
-
+    The length of its path in joint space [rad], its duration [s], the least distance of the arm
+    and its ray up to `ray_guard_length` from the wearer, and of the final ray from the target [m].
     """
 
     length: float
@@ -73,10 +64,8 @@ def inspect_motion(
 
     Parameters
     ----------
-    arm : ArmModel
     scene : Scene
         The wearer in the base frame.
-    trajectory : Trajectory
     limits : MotionLimits
         Velocities and accelerations must keep them, with a tolerance of 1 %.
     q_present : ndarray, shape (dof,)
@@ -100,13 +89,7 @@ def inspect_motion(
         raise UnsafeMotionError(
             f'the motion starts {gap:.2e} from the present configuration [rad]'
         )
-    times, q, v, a = quintic_states(
-        trajectory.times,
-        trajectory.positions,
-        trajectory.velocities,
-        trajectory.accelerations,
-        PERIOD,
-    )
+    times, q, v, a = quintic_states(trajectory, PERIOD)
     for what, unit, value in (('velocity', 'rad/s', v), ('acceleration', 'rad/s^2', a)):
         for end in (0, -1):
             if not np.abs(value[end]).max() <= REST:
