@@ -10,7 +10,7 @@ from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM
 from rrth_planner.kernels.collision.bar_box import nearer
 from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, VEC
-from rrth_planner.kernels.layout import D, LANES, REACH
+from rrth_planner.kernels.layout import BOX_HALF, D, LANES, REACH
 from rrth_planner.kernels.trajectory.quintics import state_at
 
 
@@ -39,7 +39,8 @@ def nearest(points, n_bars, boxes, least):
     for k in range(n_bars):
         for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
             for j in range(LANES):
-                least = nearer(points, 4 * k, boxes, g, j, least)
+                if boxes[g, LANES * BOX_HALF + j] > 0.0:
+                    least = nearer(points, 4 * k, boxes, g, j, least)
     return least
 
 

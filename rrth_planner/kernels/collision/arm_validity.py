@@ -31,6 +31,11 @@ FIRST_INTERVAL = 1.0
 @kernel(boolean(OUT_VEC, int64, int64, MAT))
 def is_in_contact(points, at, n_bars, boxes):
     """Return whether any bar of the arm at points[at] is in contact with a box: exact."""
+    if boxes.shape[0] == 1:
+        for k in range(n_bars - 1, -1, -1):
+            if contact_lanes(points, at + 4 * k, boxes, 0) != 0:
+                return True
+        return False
     waiting = scratch.ints(MAX_GROUPS)
     n_waiting, waiting[0] = 1, 0
     while n_waiting > 0:

@@ -136,7 +136,7 @@ def nearer(points, at, boxes, g, j, least):
     Mostly a face of the box already shows that it is not; an unused lane is infinitely far. The
     bar is at points[at] as in `contact_lanes`.
     """
-    start, step, half = np.empty(3), np.empty(3), np.empty(3)
+    start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
     gap, radius = -math.inf, points[at + 7]
     for r in range(3):
         at_start = at_end = boxes[g, LANES * (BOX_OFFSET + r) + j]
