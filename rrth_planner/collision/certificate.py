@@ -24,15 +24,9 @@ FINENESS = 0.2
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """
-    Whether a trajectory is proven free; if not, the piece that is not.
+    Whether a trajectory is proven free; if not, the first piece that is not (-1 where all are).
 
-    Parameters
-    ----------
-    piece : int
-        Index of the first piece that is not proven; -1 where all are.
-    is_violated : bool
-        Whether a clearance violation was found in that piece; otherwise it is undecided.
-
+    `is_violated`: a clearance violation was found in that piece; otherwise it is undecided.
     """
 
     is_proven: bool

@@ -100,12 +100,7 @@ class _Advancement:
     """Conservative advancement along a trajectory, and the first violation found."""
 
     def __init__(
-        self,
-        arm: ArmModel,
-        scene: Scene,
-        trajectory: Trajectory,
-        margin: float,
-        ray_length: float,
+        self, arm: ArmModel, scene: Scene, trajectory: Trajectory, margin: float, ray_length: float
     ) -> None:
         self._arm, self._trajectory, self._margin = arm, trajectory, margin
         self._boxes = boxes_of(scene)
@@ -170,15 +165,8 @@ def first_violation(
     them is sampled again, at intervals of `PERIOD` at least: each instant of that grid is checked
     or proven free.
 
-    Parameters
-    ----------
-    scene : Scene
-        The wearer in the base frame.
-    margin : float
-        Distance to keep from every box [m].
-    ray_guard_length, reach : float
-        How much of the ray must stay clear in motion, and at the end [m].
-
+    The scene is in the base frame. margin: distance to keep from every box; ray_guard_length,
+    reach: how much of the ray must stay clear in motion, and at the end [m].
     """
     advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length)
     end = advancement.last

@@ -62,21 +62,11 @@ def inspect_motion(
     """
     Return the figures of a motion, as a quintic-interpolating controller executes it.
 
-    Parameters
-    ----------
-    scene : Scene
-        The wearer in the base frame.
-    limits : MotionLimits
-        Velocities and accelerations must keep them, with a tolerance of 1 %.
-    q_present : ndarray, shape (dof,)
-        Present configuration [rad].
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    margin, ray_guard_length : float
-        Clearance from every box, and how much of the ray keeps it in motion [m]; at the end the
-        ray keeps it as far as the target.
-    start_tolerance, pointing_tolerance : float
-        Greatest distance from the present configuration [rad], and from the target [m].
+    Scene and target (3,) are in the base frame [m]; q_present (dof,) is the present configuration
+    [rad]. Velocities and accelerations must keep the limits, with a tolerance of 1 %. margin,
+    ray_guard_length: clearance from every box, and how much of the ray keeps it in motion [m]; at
+    the end the ray keeps it as far as the target. start_tolerance, pointing_tolerance: greatest
+    distance from the present configuration [rad], and from the target [m].
 
     Raises
     ------

@@ -85,9 +85,8 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
             return False
         # Once the arm is clear of all boxes, the remaining time is one interval.
         is_out = not by.any()
-        if not certify(
-            part_of(trajectory, 0.0, end if is_out else stop), smaller, start
-        ).is_proven:
+        part = part_of(trajectory, 0.0, end if is_out else stop)
+        if not certify(part, smaller, start).is_proven:
             return False
         if is_out:
             break

@@ -138,14 +138,8 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     """
     Return the world of an arm round its wearer.
 
-    Parameters
-    ----------
-    scene : Scene
-        The wearer in the base frame.
-    margin : float
-        Every box is grown by this on every side [m], >= 0.
-    ray_guard_length : float
-        How much of the pointing ray must stay clear in motion [m], >= 0.
+    The scene is in the base frame; every box is grown by the margin on every side [m], >= 0.
+    ray_guard_length: how much of the pointing ray must stay clear in motion [m], >= 0.
 
     Raises
     ------

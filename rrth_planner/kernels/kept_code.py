@@ -29,13 +29,8 @@ def private_folder(path: Path) -> Path:
     Return a folder, made if it is not there, to which nobody but this user can write.
 
     Nor can anybody put another one in its place: the folders above it belong to this user or to
-    root, and others cannot write to them, or, as in /tmp, only move what is their own.
-
-    Raises
-    ------
-    OSError
-        There is no such folder, and none can be made.
-
+    root, and others cannot write to them, or, as in /tmp, only move what is their own. Raises
+    OSError where there is no such folder, and none can be made.
     """
     _make(path)
     # What a link leads to may be changed later; where it leads to now is known.

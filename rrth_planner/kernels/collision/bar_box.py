@@ -38,11 +38,8 @@ def contact_lanes(points, at, boxes, g):
     for j in range(LANES):
         is_apart = False
         for r in range(3):
-            x, y, z = (
-                boxes[g, 3 * r * LANES + j],
-                boxes[g, (3 * r + 1) * LANES + j],
-                boxes[g, (3 * r + 2) * LANES + j],
-            )
+            i = 3 * r * LANES + j
+            x, y, z = boxes[g, i], boxes[g, i + LANES], boxes[g, i + 2 * LANES]
             e = x * ex + y * ey + z * ez
             m = boxes[g, (9 + r) * LANES + j] + x * mx + y * my + z * mz
             local[r * LANES + j], local[(3 + r) * LANES + j] = e, m
@@ -173,11 +170,8 @@ def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
     for j in range(LANES):
         is_apart = False
         for r in range(3):
-            x, y, z = (
-                boxes[g, 3 * r * LANES + j],
-                boxes[g, (3 * r + 1) * LANES + j],
-                boxes[g, (3 * r + 2) * LANES + j],
-            )
+            i = 3 * r * LANES + j
+            x, y, z = boxes[g, i], boxes[g, i + LANES], boxes[g, i + 2 * LANES]
             offset, half = boxes[g, (9 + r) * LANES + j], boxes[g, (12 + r) * LANES + j]
             p = offset + x * ax + y * ay + z * az
             q = offset + x * bx + y * by + z * bz

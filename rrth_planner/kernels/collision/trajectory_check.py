@@ -10,6 +10,10 @@ from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, VEC
 from rrth_planner.kernels.layout import BOX_ROWS, D, LANES
 from rrth_planner.kernels.trajectory.quintics import bound, fit
 
+# Newly received boxes: boxes, T_arm_base, growth, depth. Points of a motion: times, positions,
+# velocities, accelerations.
+NEW, POINTS = (MAT, MAT, float64, int64), (VEC, MAT, MAT, MAT)
+
 
 @kernel(void(MAT, float64, OUT_MAT))
 def shift(curve, begin, rest):
@@ -51,7 +55,7 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
     return -1
 
 
-@kernel(OUT_MAT(MAT, MAT, float64, int64))
+@kernel(OUT_MAT(*NEW))
 def packed(boxes, T_arm_base, growth, depth):
     """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
@@ -62,33 +66,13 @@ def packed(boxes, T_arm_base, growth, depth):
     return groups
 
 
-@kernel(boolean(VEC, float64, CHAIN, MAT, MAT, float64, int64), is_short=True)
+@kernel(boolean(VEC, float64, CHAIN, *NEW), is_short=True)
 def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
     """Return whether the arm at q (dof,) is free of newly received boxes, as below."""
-    groups = packed(boxes, T_arm_base, growth, depth)
-    return is_configuration_free(q, ray_length, chain, groups)
+    return is_configuration_free(q, ray_length, chain, packed(boxes, T_arm_base, growth, depth))
 
 
-@kernel(
-    boolean(
-        VEC,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        float64,
-        float64,
-        CHAIN,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        int64,
-        MAT,
-        MAT,
-    ),
-    is_short=True,
-)
+@kernel(boolean(*POINTS, float64, float64, float64, CHAIN, MAT, *NEW, MAT, MAT), is_short=True)
 def is_remaining_motion_free(
     times,
     positions,
@@ -135,7 +119,5 @@ def is_remaining_motion_free(
     speeds, curvatures = np.empty((n_pieces, dof)), np.empty((n_pieces, dof))
     bound(curves[first:], quartic, cubic, speeds[first:], curvatures[first:])
     share = max(0.0, (begin - times[first]) / (times[first + 1] - times[first]))
-    found = prove_pieces(
-        curves, speeds, curvatures, first, share, resolution, chain, robot, groups
-    )
-    return found == -1
+    motion = (curves, speeds, curvatures, first, share)
+    return prove_pieces(*motion, resolution, chain, robot, groups) == -1

@@ -81,11 +81,8 @@ class _Source:
             elif isinstance(left, float) or isinstance(right, float):
                 factor, name = (left, right) if isinstance(left, float) else (right, left)
                 if factor != 0.0:
-                    parts.append(
-                        {1.0: f'{name}', -1.0: f'-({name})'}.get(
-                            float(factor), f'{factor!r} * {name}'
-                        )
-                    )
+                    plain = {1.0: f'{name}', -1.0: f'-({name})'}
+                    parts.append(plain.get(float(factor), f'{factor!r} * {name}'))
             else:
                 parts.append(f'{left} * {right}')
         if not parts:

@@ -4,11 +4,10 @@
 
 import math
 
-from numba.core.types import Array, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBES, OUT_INTS, OUT_MAT, OUT_VEC, VEC
 
-CUBES = Array(float64, 4, 'C', readonly=True)
 # Columns of `rows`, one for the begin of each cell and one for the end of the last: time within
 # the motion [s], path parameter s [-], s_dot and s_ddot [1/s, 1/s^2].
 TIME, S, S_DOT, S_DDOT = range(4)

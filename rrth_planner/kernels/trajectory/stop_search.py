@@ -10,18 +10,9 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
-from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
-from rrth_planner.kernels.trajectory.lookahead import (
-    BEGIN,
-    CUBES,
-    END,
-    MOST,
-    S,
-    S_DDOT,
-    S_DOT,
-    TIME,
-    TINY,
-)
+from rrth_planner.kernels.jit import CUBES, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
+from rrth_planner.kernels.trajectory import lookahead
+from rrth_planner.kernels.trajectory.lookahead import BEGIN, END, MOST, S, S_DDOT, S_DOT, TIME
 
 # Columns of `phases`, (3, 5): duration [s]; s, s_dot and s_ddot at the begin [-, 1/s, 1/s^2], and
 # s_dddot [1/s^3].
@@ -115,7 +106,7 @@ def keeps_limits(phases, rows, geometry, pieces, first, n, reserve):
                 cell += 1
                 # At the end of a piece the derivatives jump: check both sides.
                 if pieces[cell] != pieces[cell - 1]:
-                    share = (rows[cell, S] - x_before) / max(x - x_before, TINY)
+                    share = (rows[cell, S] - x_before) / max(x - x_before, lookahead.TINY)
                     there = (v_before + share * (v - v_before), a_before + share * (a - a_before))
                     for side in range(2):
                         if not keeps_limits_at(
