@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.kernels.collision.boxes import pack
-from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 
@@ -18,20 +18,9 @@ def pack_boxes(rows: Array) -> tuple[Array, Indices]:
     """
     Return the groups of boxes that the kernels read, and where each box went.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (15, m)
-        Each box's rotation into its own axes, the position of the arm's base in them and its half
-        extents [m].
-
-    Returns
-    -------
-    groups : ndarray, shape (n_groups, 8 * 15)
-        Layout as in `kernels.jit`: a full tree of groups, each lane of an inner one the bound of
-        a group below. Unused lanes never collide.
-    lanes : ndarray, shape (m,)
-        Which lane of the last level holds box i.
-
+    rows (15, m): as from `boxes.rows_of` [m]. Groups (n_groups, 8 * 15): as in `kernels.layout`, a
+    full tree, each lane of an inner group the bound of a group below. Lanes (m,): which lane of
+    the last level holds box i.
     """
     m = rows.shape[1]
     depth = tree_depth(m)

@@ -24,16 +24,9 @@ FINENESS = 0.2
 @dataclass(frozen=True, slots=True)
 class Certificate:
     """
-    Whether a trajectory is proven free; if not, the piece that is not.
+    Whether a trajectory is proven free; if not, the first piece that is not (-1 where all are).
 
-    Parameters
-    ----------
-    is_proven : bool
-    piece : int
-        Index of the first piece that is not proven; -1 where all are.
-    is_violated : bool
-        Whether a clearance violation was found in that piece; otherwise it is undecided.
-
+    `is_violated`: a clearance violation was found in that piece; otherwise it is undecided.
     """
 
     is_proven: bool
@@ -48,18 +41,8 @@ def derivative_bounds(coefficients: Array) -> tuple[Array, Array]:
     """
     Return bounds of |dq/du| and |d2q/du2| of quintic pieces over u in [0, 1].
 
-    A polynomial lies between its least and greatest Bernstein coefficient (Farouki 2012).
-
-    Parameters
-    ----------
-    coefficients : ndarray, shape (n, 6, dof)
-        As from `piece_coefficients` [rad].
-
-    Returns
-    -------
-    tuple of ndarray, each of shape (n, dof)
-        [rad].
-
+    coefficients (n, 6, dof): as from `piece_coefficients` [rad]. Both bounds (n, dof) [rad]; as in
+    `quintics.bound`.
     """
     n, _, dof = coefficients.shape
     speed, curvature = np.empty((2, n, dof))
@@ -72,38 +55,20 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     Return the certificate of a quintic-interpolated trajectory against the world's boxes.
 
     Each piece is checked continuously by `kernels.collision.arm_validity.prove_curve`, with
-    second-order bounds and the numbers that the trajectory holds.
-
-    Parameters
-    ----------
-    trajectory : Trajectory
-    world : World
-    begin : float
-        Start of the part that is checked [s].
-
+    second-order bounds and the numbers that the trajectory holds, from the time `begin` on [s].
     """
     check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         is_free = world.is_valid(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, is_violated=not is_free)
-    coefficients = piece_coefficients(trajectory)
-    speed, curvature = bounds_of(trajectory)
     first, share = 0, 0.0
     if begin > 0.0:
         times = trajectory.times
         first = int(times.searchsorted(begin, side='right')) - 1
         share = (begin - float(times[first])) / float(times[first + 1] - times[first])
-    found = prove_pieces(
-        coefficients,
-        speed,
-        curvature,
-        first,
-        share,
-        FINENESS * world.resolution,
-        world.chain,
-        world.robot,
-        world.obstacles,
-    )
+    motion, resolution = piece_coefficients(trajectory), FINENESS * world.resolution
+    surroundings = (world.chain, world.robot, world.obstacles)
+    found = prove_pieces(motion, *bounds_of(trajectory), first, share, resolution, *surroundings)
     if found < 0:
         return Certificate(is_proven=True)
     return Certificate(is_proven=False, piece=found // 2, is_violated=bool(found % 2))
@@ -121,14 +86,6 @@ def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) ->
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
         return float(world.clearances(trajectory.positions[-1]).min(initial=np.inf))
     n = math.ceil((trajectory.duration - begin) / CLEARANCE_PERIOD) + 1
-    return float(
-        least_along(
-            piece_coefficients(trajectory),
-            trajectory.times,
-            max(begin, 0.0),
-            n,
-            world.ray_length,
-            world.chain,
-            world.obstacles,
-        )
-    )
+    motion = (piece_coefficients(trajectory), trajectory.times)
+    arm = (world.ray_length, world.chain)
+    return float(least_along(*motion, max(begin, 0.0), n, *arm, world.obstacles))

@@ -27,17 +27,10 @@ class PieceComparison:
     """
     The results of the three checkers for one piece of a motion.
 
-    Parameters
-    ----------
-    begin, end : float
-        [s]; equal for the final configuration, whose ray extends to the target.
-    certificate : str
-        `proven`, `violated` or `undecided`.
-    fcl : Violation
-        Where python-fcl finds the arm closest to the wearer, sampled.
-    reference : float
-        Least clearance by the reference checker, sampled [m].
-
+    `begin` and `end` [s] are equal for the final configuration, whose ray extends to the target.
+    `certificate`: `proven`, `violated` or `undecided`; `fcl`: where python-fcl finds the arm
+    closest to the wearer, sampled; `reference`: least clearance by the reference checker, sampled
+    [m].
     """
 
     begin: float
@@ -52,17 +45,9 @@ class MotionComparison:
     """
     The results of the three checkers for a whole motion.
 
-    Parameters
-    ----------
-    is_proven : bool
-        By the certificate.
-    violation : Violation or None
-        The first one that python-fcl finds.
-    clearance : float
-        Least clearance by the reference checker [m].
-    pieces : tuple of PieceComparison
-        One for each piece, and one for the final configuration.
-
+    `is_proven` by the certificate, the first `violation` that python-fcl finds, and the least
+    `clearance` by the reference checker [m]; `pieces`: one for each, and one for the final
+    configuration.
     """
 
     is_proven: bool
@@ -88,19 +73,8 @@ def compare_checkers(
     """
     Return the results of the three checkers for a motion.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    goal : PointingGoal
-        The final ray must be clear as far as the target.
-    trajectory : Trajectory
-    margin, ray_guard_length : float
-        [m].
-    escape_time : float
-        Until then the motion escapes from boxes, so its pieces violate the margin [s].
-
+    Lengths in m, the scene in the base frame; the final ray must be clear as far as the target.
+    Until `escape_time` [s] the motion escapes from boxes, so its pieces violate the margin.
     """
     world = arm_world(arm, scene, margin, ray_guard_length)
     q_end: Array = trajectory.positions[-1]
@@ -139,9 +113,7 @@ def _of_piece(
     certificate = certify(piece, world)
     times = np.linspace(0.0, end - begin, 2 + math.ceil((end - begin) / PERIOD))
     # The reference checker solves for the curve by itself.
-    _, q, _, _ = reference_checker.quintic_states(
-        piece.times, piece.positions, piece.velocities, piece.accelerations, PERIOD
-    )
+    _, q, _, _ = reference_checker.quintic_states(piece, PERIOD)
     found = 'violated' if certificate.is_violated else 'undecided'
     return PieceComparison(
         begin=begin,

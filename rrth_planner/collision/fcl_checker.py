@@ -9,13 +9,13 @@ from itertools import islice, pairwise
 import math
 
 import numpy as np
-from rrth_planner.collision.displacement_bounds import displacements
 from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel, bar_ends, forward_kinematics
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
+from rrth_planner.model.trajectory import part_of, piece_coefficients, positions_at, Trajectory
 
 # Spacing of the grid of instants that may be sampled [s].
 PERIOD = 0.001
@@ -26,6 +26,14 @@ TOLERANCE = 3e-6
 APART = 1e-3
 # Samples taken at once within a gap: of many, some may turn out to be needless.
 MAX_SAMPLES = 8
+# Intervals that each piece is cut into, and the powers of u that q'(u) has at their ends.
+INTERVALS = 8
+_CUTS = np.linspace(0.0, 1.0, INTERVALS + 1)
+_FIRST = np.arange(1, 6) * _CUTS[:, None] ** np.arange(5)
+# Bernstein coefficients of the third derivatives of u^3, u^4 and u^5, which bound them, and how
+# far a function can be from its chord over an interval for each unit of its second derivative.
+_THIRD = np.array([[6.0, 0.0, 0.0], [6.0, 12.0, 0.0], [6.0, 24.0, 60.0]])
+_CHORD = 0.125 / INTERVALS**2
 
 
 def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Violation:
@@ -40,22 +48,38 @@ def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Violati
     return Violation(0.0, least, *where)
 
 
+def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_length: float) -> Array:
+    """
+    Return upper bounds of the path length of the points of each bar since the start.
+
+    Between any two of the instants (n,) [s], which do not decrease, no point of the bar moves
+    further than the difference. (n_bars, n), bars as in `arm.bar_ends` [m].
+    """
+    reaches = reach_table(arm, ray_length)
+    # Both ends of a bar bound the speed of all its points.
+    reaches = np.maximum(reaches, np.vstack([reaches[:1], reaches[:-1]]))
+    if len(trajectory.times) == 1:
+        return np.zeros((len(reaches), len(times)))
+    c = piece_coefficients(trajectory)
+    speeds = np.abs(_FIRST @ c[:, 1:])
+    curvature = np.abs(_THIRD @ c[:, 3:]).max(axis=1)
+    top = np.maximum(speeds[:, :-1], speeds[:, 1:]) + _CHORD * curvature[:, None]
+    steps = (top / INTERVALS).reshape(-1, arm.dof) @ reaches.T
+    grid = trajectory.times[:-1, None] + np.diff(trajectory.times)[:, None] * _CUTS[:-1]
+    grid = np.append(grid, trajectory.times[-1])
+    bounds = np.zeros((len(reaches), len(grid)))
+    np.cumsum(steps.T, axis=1, out=bounds[:, 1:])
+    return np.array([np.interp(times, grid, bound) for bound in bounds])
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sample:
     """
-    The distances of a bar at an instant.
+    The distances of a bar at an instant, given by its index.
 
-    Parameters
-    ----------
-    index : int
-        Of the instant.
-    displacement : float
-        Upper bound of how far the bar has moved until then [m].
-    free : float
-        How far it may move before and after without violating the margin [m].
-    bounds : ndarray, shape (m,)
-        Lower bounds of the distances of the boxes [m].
-
+    `displacement`: upper bound of how far the bar has moved until then; `free`: how far it may
+    move before and after without violating the margin; `bounds` (m,): lower bounds of the
+    distances of the boxes [m].
     """
 
     index: int
@@ -76,12 +100,7 @@ class _Advancement:
     """Conservative advancement along a trajectory, and the first violation found."""
 
     def __init__(
-        self,
-        arm: ArmModel,
-        scene: Scene,
-        trajectory: Trajectory,
-        margin: float,
-        ray_length: float,
+        self, arm: ArmModel, scene: Scene, trajectory: Trajectory, margin: float, ray_length: float
     ) -> None:
         self._arm, self._trajectory, self._margin = arm, trajectory, margin
         self._boxes = boxes_of(scene)
@@ -146,19 +165,8 @@ def first_violation(
     them is sampled again, at intervals of `PERIOD` at least: each instant of that grid is checked
     or proven free.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    trajectory : Trajectory
-    margin : float
-        Distance to keep from every box [m].
-    ray_guard_length : float
-        How much of the ray must stay clear in motion [m].
-    reach : float
-        How much of it must be clear at the end [m].
-
+    The scene is in the base frame. margin: distance to keep from every box; ray_guard_length,
+    reach: how much of the ray must stay clear in motion, and at the end [m].
     """
     advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length)
     end = advancement.last
@@ -196,21 +204,10 @@ def first_escape_violation(
     """
     Return the first violation of a motion that escapes from boxes, or None.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    depths : ndarray, shape (m,)
-        Penetration depth at the start in each box, grown by the margin: by how much that would
-        have to shrink on every side for the arm to be clear [m]. No motion may exceed it; < 0:
-        clear.
-    trajectory : Trajectory
-    escape_time : float
-        When the escape ends; 0: there is none [s].
-    margin, ray_guard_length : float
-        [m].
-
+    depths (m,): penetration depth at the start in each box, grown by the margin: by how much that
+    would have to shrink on every side for the arm to be clear [m]. No motion may exceed it; < 0:
+    clear. escape_time: when the escape ends; 0: there is none [s]. All else as for
+    `first_violation`.
     """
     if escape_time == 0.0:
         return None

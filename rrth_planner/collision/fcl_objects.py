@@ -11,7 +11,7 @@ import fcl
 import numpy as np
 from rrth_planner.model.arm import ArmModel, bar_ends, bar_names
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.scene import Scene
 
 # Bars become capsules this thin, and their radius is taken off the distance: of thick ones the
 # library overestimates it by up to half a millimetre. Then it is good to a few micrometres, rarely
@@ -47,17 +47,14 @@ class Boxes:
         self._shapes: list[_Shape] = []
         self.names = [box.name for box in scene.boxes]
         for box in scene.boxes:
-            self._place(box)
+            shape = _taken(self._spare, lambda: fcl.Box(1.0, 1.0, 1.0))
+            self._shapes.append(shape)
+            shape.geometry.side = box.size
+            shape.geometry.computeLocalAABB()
+            shape.item.setTransform(fcl.Transform(box.rotation, box.center))
 
     def __del__(self) -> None:
         self._spare.extend(self._shapes)
-
-    def _place(self, box: Box) -> None:
-        shape = _taken(self._spare, lambda: fcl.Box(1.0, 1.0, 1.0))
-        self._shapes.append(shape)
-        shape.geometry.side = box.size
-        shape.geometry.computeLocalAABB()
-        shape.item.setTransform(fcl.Transform(box.rotation, box.center))
 
     def nearest(self, item: fcl.CollisionObject, bounds: Array) -> tuple[float, int]:
         """

@@ -32,17 +32,8 @@ class Inspection:
     """
     The figures of a motion that passed the inspection.
 
-    Parameters
-    ----------
-    length : float
-        Of its path in joint space [rad].
-    duration : float
-        [s].
-    clearance : float
-        Least distance of the arm and its ray up to `ray_guard_length` from the wearer [m].
-    pointing_error : float
-        Distance of the final ray from the target [m].
-
+    The length of its path in joint space [rad], its duration [s], the least distance of the arm
+    and its ray up to `ray_guard_length` from the wearer, and of the final ray from the target [m].
     """
 
     length: float
@@ -71,23 +62,11 @@ def inspect_motion(
     """
     Return the figures of a motion, as a quintic-interpolating controller executes it.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    trajectory : Trajectory
-    limits : MotionLimits
-        Velocities and accelerations must keep them, with a tolerance of 1 %.
-    q_present : ndarray, shape (dof,)
-        Present configuration [rad].
-    target : ndarray, shape (3,)
-        In the base frame [m].
-    margin, ray_guard_length : float
-        Clearance from every box, and how much of the ray keeps it in motion [m]; at the end the
-        ray keeps it as far as the target.
-    start_tolerance, pointing_tolerance : float
-        Greatest distance from the present configuration [rad], and from the target [m].
+    Scene and target (3,) are in the base frame [m]; q_present (dof,) is the present configuration
+    [rad]. Velocities and accelerations must keep the limits, with a tolerance of 1 %. margin,
+    ray_guard_length: clearance from every box, and how much of the ray keeps it in motion [m]; at
+    the end the ray keeps it as far as the target. start_tolerance, pointing_tolerance: greatest
+    distance from the present configuration [rad], and from the target [m].
 
     Raises
     ------
@@ -100,13 +79,7 @@ def inspect_motion(
         raise UnsafeMotionError(
             f'the motion starts {gap:.2e} from the present configuration [rad]'
         )
-    times, q, v, a = quintic_states(
-        trajectory.times,
-        trajectory.positions,
-        trajectory.velocities,
-        trajectory.accelerations,
-        PERIOD,
-    )
+    times, q, v, a = quintic_states(trajectory, PERIOD)
     for what, unit, value in (('velocity', 'rad/s', v), ('acceleration', 'rad/s^2', a)):
         for end in (0, -1):
             if not np.abs(value[end]).max() <= REST:

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.world import World
-from rrth_planner.kernels.collision.penetration import depths
-from rrth_planner.kernels.jit import BOX_HALF, BOX_ROWS, LANES
+from rrth_planner.kernels.collision.bar_box import depths
+from rrth_planner.kernels.layout import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
 
@@ -26,14 +26,8 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
     The depth is by how much a box would have to shrink on every side for the bar to be clear of
     it, or the margin with it. Found by separating axes, as in the edge check.
 
-    Parameters
-    ----------
-    world : World
-    q : ndarray, shape (n, dof) or (dof,)
-        Of n configurations the result is (n, n_bars, m) [rad].
-    ray_lengths : ndarray, shape (n,), optional
-        Length of the pointing ray in each; default: the world's [m].
-
+    q (n, dof) or (dof,): of n configurations the result is (n, n_bars, m) [rad]. ray_lengths (n,):
+    of the pointing ray in each; default: the world's [m].
     """
     rows = world.obstacles[(len(world.obstacles) - 1) // LANES :].reshape(-1, BOX_ROWS, LANES)
     rows = rows.transpose(1, 0, 2).reshape(BOX_ROWS, -1)[:, np.asarray(world.lanes, np.int64)]
@@ -70,16 +64,8 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
     So the arm enters no other box, and nowhere gets deeper by more than `GAP` than at the start
     of the interval.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-    world : World
-        Its boxes grown by the whole margin.
-    end : float
-        When the arm has to be clear [s].
-    begin : float
-        Start of the part that is checked [s].
-
+    The world has its boxes grown by the whole margin; end: when the arm has to be clear, begin:
+    start of the part that is checked [s].
     """
     times = np.linspace(min(max(begin, 0.0), end), end, INTERVALS + 1)
     deep = box_depths(world, positions_at(trajectory, times)).max(axis=1, initial=-np.inf)
@@ -99,9 +85,8 @@ def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0
             return False
         # Once the arm is clear of all boxes, the remaining time is one interval.
         is_out = not by.any()
-        if not certify(
-            part_of(trajectory, 0.0, end if is_out else stop), smaller, start
-        ).is_proven:
+        part = part_of(trajectory, 0.0, end if is_out else stop)
+        if not certify(part, smaller, start).is_proven:
             return False
         if is_out:
             break

@@ -13,6 +13,7 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,23 +92,13 @@ def first_contact(
     """
     Return the first contact of the arm with the boxes grown by `margin` [m], or None.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-    q : ndarray, shape (n, dof)
-        The instants of a motion [rad].
-    ray_length : float
-        How much of the pointing ray counts as arm [m].
-    margin : float
-        Growth of each box on every side [m]; the bars' own radii come on top.
-
+    q (n, dof): the instants of a motion [rad]; ray_length: how much of the pointing ray counts as
+    arm [m]. Each box grows on every side; the bars' own radii come on top.
     """
     ends = bars(arm, q, ray_length)
-    radii = _bar_radii(arm)
     found: Contact | None = None
     for box in scene.boxes:
-        for k, radius in enumerate(radii):
+        for k, radius in enumerate(_bar_radii(arm)):
             half = 0.5 * box.size + margin + radius
             hit = np.flatnonzero(bar_box_contact(ends[:, k], box.center, box.rotation, half))
             if len(hit) and (found is None or hit[0] < found.index):
@@ -115,13 +106,9 @@ def first_contact(
     return found
 
 
-def _bar_radii(arm: ArmModel) -> list[float]:
-    radii = []
-    for i in range(arm.dof + 1):
-        if i > 0:
-            radii.append(float(arm.radii[i]))
-        if i > 0 or arm.is_prismatic[0]:
-            radii.append(float(arm.radii[i]))
+def _bar_radii(arm: ArmModel) -> Array:
+    """Return the radius of each of the `bars` [m]."""
+    radii: Array = np.repeat(arm.radii, 2)[1 if arm.is_prismatic[0] else 2 :]
     return radii
 
 
@@ -132,7 +119,7 @@ def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) ->
     The closest point of each bar is found by golden section: its distance from a box is convex.
     """
     ends = bars(arm, q, ray_length)
-    radii = np.array(_bar_radii(arm))
+    radii = _bar_radii(arm)
     least = np.inf
     golden = 0.5 * (np.sqrt(5.0) - 1.0)
     for box in scene.boxes:
@@ -167,35 +154,24 @@ _HERMITE = np.array(
 )
 
 
-def quintic_states(
-    times: Array, positions: Array, velocities: Array, accelerations: Array, period: float
-) -> tuple[Array, Array, Array, Array]:
+def quintic_states(trajectory: Trajectory, period: float) -> tuple[Array, Array, Array, Array]:
     """
     Return what a quintic-interpolating controller commands, every `period` and at each point.
 
-    Each piece solves the six linear equations of its boundary values.
-
-    Returns
-    -------
-    tuple of ndarray
-        Times (m,) [s], positions, velocities, accelerations (m, dof) [rad, rad/s, rad/s^2].
-
+    Each piece solves the six linear equations of its boundary values. Times (m,) [s], positions,
+    velocities, accelerations (m, dof) [rad, rad/s, rad/s^2].
     """
+    times, positions = trajectory.times, trajectory.positions
     grid = np.unique(np.concatenate([np.arange(0.0, times[-1], period), times]))
     q, v, a = (np.empty((len(grid), positions.shape[1])) for _ in range(3))
     for i in range(len(times) - 1):
         # In units of the piece's own length the equations are well conditioned.
         T = times[i + 1] - times[i]
-        values = np.stack(
-            [
-                positions[i],
-                T * velocities[i],
-                T * T * accelerations[i],
-                positions[i + 1],
-                T * velocities[i + 1],
-                T * T * accelerations[i + 1],
-            ]
-        )
+        ends = [
+            (positions[k], T * trajectory.velocities[k], T * T * trajectory.accelerations[k])
+            for k in (i, i + 1)
+        ]
+        values = np.concatenate(ends)
         c = np.linalg.solve(_HERMITE, values)
         inside = (grid >= times[i]) & (grid <= times[i + 1])
         s = ((grid[inside] - times[i]) / T)[:, None]

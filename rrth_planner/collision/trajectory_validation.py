@@ -20,15 +20,8 @@ def is_proven_free(
     """
     Return whether a motion is certified, and its end with the ray out to the target.
 
-    Parameters
-    ----------
-    world : World
-    trajectory : Trajectory
-    reach : float
-        How far the target is from the tool at the end [m].
-    escape_time : float
-        Until then the motion escapes from boxes that the arm was in [s].
-
+    reach: how far the target is from the tool at the end [m]; escape_time: until then the motion
+    escapes from boxes that the arm was in [s].
     """
     return (
         world.is_valid(trajectory.positions[-1], reach)
@@ -49,19 +42,7 @@ def violation_seen(
     """
     Return the first clearance violation of a motion by python-fcl, or None.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    trajectory : Trajectory
-    margin : float
-        Distance to keep from every box [m].
-    ray_guard_length : float
-        How much of the ray must stay clear in motion [m].
-    reach, escape_time : float
-        As in `is_proven_free`.
-
+    As `fcl_checker.first_violation`; reach and escape_time as in `is_proven_free`.
     """
     ray = ray_guard_length
     if escape_time > 0.0:

@@ -12,15 +12,7 @@ class Violation:
     """
     Where a trajectory comes closer to the wearer than the margin.
 
-    Parameters
-    ----------
-    time : float
-        [s].
-    distance : float
-        From the body itself [m].
-    bar, box : str
-        Which part of the arm, which box.
-
+    When [s], the distance from the body itself [m], which part of the arm, and which box.
     """
 
     time: float
@@ -32,17 +24,9 @@ class Violation:
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """
-    A certified motion in which python-fcl finds a clearance violation.
+    A certified motion in which python-fcl finds a clearance violation, here the first one.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        Never published.
-    violation : Violation
-        The first one that python-fcl found.
-    escape_time : float
-        Until then the motion escapes from boxes that the arm was in [s].
-
+    It is never published. Until `escape_time` it escapes from boxes that the arm was in [s].
     """
 
     trajectory: Trajectory

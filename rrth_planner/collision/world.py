@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
-from rrth_planner.kernels import jit
+from rrth_planner.kernels import jit, layout
 from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_contacts as contacts
 from rrth_planner.kernels.collision.boxes import rows_of
 from rrth_planner.kernels.kinematics import generated_fk as chain
@@ -43,16 +43,12 @@ class World:
     chain : compiled function
         The arm's forward kinematics, `kernels.jit.CHAIN`.
     robot : ndarray, shape (n_rows, 8 + 2 dof)
-        Rows of the arm, columns as in `kernels.jit`.
+        Rows of the arm, columns as in `kernels.layout`.
     obstacles : ndarray, shape (n_groups, 8 * 15)
-        Boxes grown by the margin, in the arm's base frame, groups as in `kernels.jit` [m]. On a
+        Boxes grown by the margin, in the arm's base frame, groups as in `kernels.layout` [m]. On a
         map: lower and upper corners, shape (m, 2 dof).
-    edge_check : compiled function
-        The seam `kernels.jit.EDGE_CHECK`.
-    free_radius : compiled function
-        The seam `kernels.jit.FREE_RADIUS`.
-    contacts : compiled function
-        The seam `kernels.jit.CONTACTS`.
+    edge_check, free_radius, contacts : compiled function
+        The seams `kernels.jit.EDGE_CHECK`, `FREE_RADIUS` and `CONTACTS`.
     resolution : float
         Third argument of the edge check [rad], at least `FINEST`.
     bar_names, box_names : tuple of str
@@ -93,7 +89,7 @@ class World:
     @property
     def ray_length(self) -> float:
         """Length of the pointing ray that must stay clear in motion [m]."""
-        return float(self.robot[-1, jit.D])
+        return float(self.robot[-1, layout.D])
 
     def is_in_bounds(self, q: Array) -> bool:
         """Return whether a configuration, shape (dof,), respects the joints' limits."""
@@ -132,7 +128,7 @@ class World:
         """
         check_dof(q, self.bounds.shape[1], 'q')
         ray = self.ray_length if ray_length is None else ray_length
-        distances = np.empty((len(self.bar_names), jit.LANES * len(self.obstacles)))
+        distances = np.empty((len(self.bar_names), layout.LANES * len(self.obstacles)))
         arm_clearance.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)
         chosen: Array = distances[:, self.lanes]
         return chosen
@@ -142,15 +138,8 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     """
     Return the world of an arm round its wearer.
 
-    Parameters
-    ----------
-    arm : ArmModel
-    scene : Scene
-        The wearer in the base frame.
-    margin : float
-        Every box is grown by this on every side [m], >= 0.
-    ray_guard_length : float
-        How much of the pointing ray must stay clear in motion [m], >= 0.
+    The scene is in the base frame; every box is grown by the margin on every side [m], >= 0.
+    ray_guard_length: how much of the pointing ray must stay clear in motion [m], >= 0.
 
     Raises
     ------
@@ -162,7 +151,9 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         if not 0.0 <= value <= FARTHEST:
             raise OptionsError(f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]')
     robot, compiled_chain = arm_rows(arm, ray_guard_length)
-    obstacles, lanes = pack_boxes(_box_rows(arm, scene, margin))
+    rows = np.empty((layout.BOX_ROWS, len(scene.boxes)))
+    rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
+    obstacles, lanes = pack_boxes(rows)
     return World(
         bounds=arm.bounds,
         chain=compiled_chain,
@@ -194,21 +185,21 @@ def arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
 
 
 def robot_rows(arm: ArmModel, ray_length: float) -> Array:
-    """Return the rows of an arm, columns as in `kernels.jit`, with a ray of that length [m]."""
+    """Return the rows of an arm, columns as in `kernels.layout`, with a ray of that length [m]."""
     dof = arm.dof
-    rows: Any = np.zeros((dof + 1, jit.REACH + 2 * dof))
+    rows: Any = np.zeros((dof + 1, layout.REACH + 2 * dof))
     alpha, a, offset, d = arm.dh.T
-    rows[:, jit.COS_ALPHA], rows[:, jit.SIN_ALPHA] = np.cos(alpha), np.sin(alpha)
-    rows[:, jit.A], rows[:, jit.OFFSET], rows[:, jit.D] = a, offset, d
-    rows[-1, jit.D] = ray_length
-    rows[:, jit.KIND] = [jit.PRISMATIC if p else jit.REVOLUTE for p in arm.is_prismatic] + [
-        jit.FIXED
-    ]
-    rows[:, jit.RADIUS_A] = rows[:, jit.RADIUS_D] = jit.NO_BAR
+    rows[:, layout.COS_ALPHA], rows[:, layout.SIN_ALPHA] = np.cos(alpha), np.sin(alpha)
+    rows[:, layout.A], rows[:, layout.OFFSET], rows[:, layout.D] = a, offset, d
+    rows[-1, layout.D] = ray_length
+    rows[:, layout.KIND] = [
+        layout.PRISMATIC if p else layout.REVOLUTE for p in arm.is_prismatic
+    ] + [layout.FIXED]
+    rows[:, layout.RADIUS_A] = rows[:, layout.RADIUS_D] = layout.NO_BAR
     for (row, end), reach in zip(bar_ends(arm), reach_table(arm, ray_length), strict=True):
-        column = jit.RADIUS_A if end == 'a' else jit.RADIUS_D
+        column = layout.RADIUS_A if end == 'a' else layout.RADIUS_D
         rows[row, column] = arm.radii[row]
-        first = jit.REACH + (0 if end == 'a' else dof)
+        first = layout.REACH + (0 if end == 'a' else dof)
         rows[row, first : first + dof] = reach
     return rows
 
@@ -218,10 +209,3 @@ def mount_inverse(arm: ArmModel) -> Array:
     """Return the pose of the base frame in that of the arm, (4, 4) [m]."""
     inverse: Array = np.linalg.inv(arm.T_base_mount).astype(np.float64)
     return inverse
-
-
-def _box_rows(arm: ArmModel, scene: Scene, margin: float) -> Array:
-    """Return the rows of the boxes, grown by the margin, (15, m), as `boxes.rows_of`."""
-    rows = np.empty((jit.BOX_ROWS, len(scene.boxes)))
-    rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
-    return rows

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Argument types, column names and the one decorator of the compiled kernels."""
+"""Argument types and the one decorator of the compiled kernels."""
 
 from collections.abc import Callable
 import contextlib
@@ -19,8 +19,7 @@ from numba.core.types import float64, int32, int64
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 import numpy as np
-from rrth_planner.kernels.kept_code import KeptCode, private_folder
-from rrth_planner.kernels.slim_library import use_slim_libraries
+from rrth_planner.kernels.kept_code import KeptCode, private_folder, use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
 # a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). What describes a world is
@@ -32,6 +31,7 @@ OUT_VEC = types.Array(float64, 1, 'C')
 OUT_MAT = types.Array(float64, 2, 'C')
 CUBE = types.Array(float64, 3, 'C', readonly=True)
 OUT_CUBE = types.Array(float64, 3, 'C')
+CUBES = types.Array(float64, 4, 'C', readonly=True)
 OUT_CUBES = types.Array(float64, 4, 'C')
 OUT_FLAGS = types.Array(types.int8, 1, 'C')
 OUT_INTS = types.Array(int64, 1, 'C')
@@ -81,21 +81,6 @@ EDGE_CHECK_AT, CHAIN_AT, FREE_RADIUS_AT, CONTACTS_AT = range(4)
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
 N_START, N_GOAL, N_MEETINGS, N_GOALS = range(4)
-
-# Columns of `robot`, a row for each DH row of the arm; then dof columns with the reach of the end
-# of the row's `a` offset and dof with that of its `d` offset.
-COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D, REACH = range(9)
-REVOLUTE, PRISMATIC, FIXED = 0.0, 1.0, 2.0
-NO_BAR = -1.0
-
-# `boxes`: a row for each group of LANES boxes, their numbers side by side, so that the compiler
-# works on them all at once: number r of box l stands in column LANES r + l. The numbers: the
-# rotation into the box's own axes (9), the position of the arm's base in them (3), the half
-# extents grown by margin and slack (3). The groups form a tree: lane l of group g bounds the whole
-# group LANES g + l + 1, if there is such a row; the last ones hold the boxes themselves. Unused
-# lanes have half extents of minus infinity: they never collide.
-LANES = 8
-BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
 
 # The file that marks the cache of all kernels of the planner as complete.
 COMPLETE = 'complete'
@@ -232,11 +217,6 @@ class FirstClass:
         # Where numba looks for the type of a value.
         self._numba_type_ = types.FunctionType(self._signature)
 
-    @property
-    def address(self) -> int:
-        """Address of the compiled code, for `functions`."""
-        return int(self._address)
-
     def __wrapper_address__(self) -> int:
         """Return the address of the compiled code, as numba's protocol asks."""
         return int(self._address)
@@ -255,18 +235,18 @@ def first_class(compiled: Any) -> Any:
     return compiled if config.DISABLE_JIT else FirstClass(compiled)
 
 
+def address(seam: Any) -> Any:
+    """Return the address of one compiled seam."""
+    return seam if config.DISABLE_JIT else seam.__wrapper_address__()
+
+
 def addresses(*seams: Any) -> Any:
     """Return what `functions` holds: the addresses of compiled seams."""
     if config.DISABLE_JIT:
         return seams
-    found = np.array([seam.address for seam in seams], dtype=np.int64)
+    found = np.array([address(seam) for seam in seams], dtype=np.int64)
     found.setflags(write=False)
     return found
-
-
-def address(seam: Any) -> Any:
-    """Return the address of one compiled seam."""
-    return seam if config.DISABLE_JIT else seam.address
 
 
 def _from_address(seam: Any) -> Any:

@@ -22,7 +22,6 @@ SHARES = (
         'trajectory.fast_stop',
         'trajectory.quintics',
         'trajectory.speed_profile',
-        'collision.penetration',
         'search.shortcut',
         'search.rrt',
         'search.rrt_h',
@@ -54,21 +53,13 @@ def compile_kernels() -> bool:
     """
     folder = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, (folder, os.environ.get('PYTHONPATH', ''))))
-    children = [
-        subprocess.Popen(
-            [
-                sys.executable,
-                '-W',
-                'ignore',
-                '-c',
-                '; '.join(f'import rrth_planner.kernels.{name}' for name in share),
-            ],
-            env={**os.environ, 'PYTHONPATH': paths},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+    env, nothing = {**os.environ, 'PYTHONPATH': paths}, subprocess.DEVNULL
+    children = []
+    for share in SHARES:
+        imports = '; '.join(f'import rrth_planner.kernels.{name}' for name in share)
+        command = [sys.executable, '-W', 'ignore', '-c', imports]
+        children.append(
+            subprocess.Popen(command, env=env, stdin=nothing, stdout=nothing, stderr=nothing)
         )
-        for share in SHARES
-    ]
     codes = [child.wait() for child in children]
     return not any(codes)

@@ -24,6 +24,13 @@ def distance(p, q):
     return math.sqrt(total)
 
 
+@kernel(void(VEC, VEC, float64, OUT_VEC))
+def between(q_from, q_to, share, q):
+    """Write the configuration at a share of an edge."""
+    for k in range(q_from.shape[0]):
+        q[k] = q_from[k] + share * (q_to[k] - q_from[k])
+
+
 @kernel(float64(MAT, int64))
 def path_length(path, n):
     """Return the length of the first n waypoints of a path."""

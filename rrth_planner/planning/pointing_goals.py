@@ -158,10 +158,9 @@ def goal_configurations(
     kernels, dof = pointing_kernels(arm), arm.dof
     check_dof(q_near, dof, 'q_near')
     check_dof(world.bounds, dof, 'world')
-    goals, reaches = np.empty((MOST, dof)), np.empty(MOST)
-    blocked, blocked_reaches = np.empty((MOST_BLOCKED, dof)), np.empty(MOST_BLOCKED)
-    counts = np.empty(3, dtype=np.int64)
-    find_goals(
+    goals, blocked = np.empty((MOST, dof)), np.empty((MOST_BLOCKED, dof))
+    blocked_reaches = np.empty(MOST_BLOCKED)
+    n_free, n_blocked, is_straight = find_goals(
         world.functions,
         jit.address(kernels.goal_candidates),
         world.resolution,
@@ -173,16 +172,13 @@ def goal_configurations(
         _spreading_ratios(dof - kernels.n_solved),
         n_draws,
         goals,
-        reaches,
         blocked,
         blocked_reaches,
-        counts,
     )
-    n_free, n_blocked = int(counts[0]), int(counts[1])
     n_kept = min(n_blocked, MOST_BLOCKED)
     return GoalSet(
         q_goals=goals[:n_free],
-        n_bent=n_free - int(counts[2]),
+        n_bent=n_free - is_straight,
         n_aiming=n_free + n_blocked,
         q_blocked=blocked[:n_kept],
         blocked_reaches=blocked_reaches[:n_kept],

@@ -10,7 +10,7 @@ import pytest
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.collision.reference_checker import bar_box_contact, bars
 from rrth_planner.collision.world import arm_world
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Scene
 from worlds import (

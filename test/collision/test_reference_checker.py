@@ -54,7 +54,7 @@ def test_states_of_a_controller_are_samples_of_the_trajectory():
     times = np.cumsum(np.append(0.0, rng.uniform(0.05, 1.0, 6)))
     p, v, a = rng.normal(size=(3, 7, 4))
     trajectory = Trajectory(times=times, positions=p, velocities=v, accelerations=a)
-    grid, *states = quintic_states(times, p, v, a, 0.003)
+    grid, *states = quintic_states(trajectory, 0.003)
     for one, other in zip(states, sample(trajectory, grid), strict=True):
         # At the points both pieces give position, velocity and acceleration.
         np.testing.assert_allclose(one, other, atol=1e-6)

@@ -77,9 +77,7 @@ def test_a_fast_stop_begins_as_the_motion_and_rests_on_its_path(seed):
     late = min(0.9 * LATENCY, stop.duration)
     for mine, its in zip(sample(stop, [late]), sample(motion, [time + late]), strict=True):
         assert np.allclose(mine, its, atol=1e-6)
-    grid, q, _, _ = quintic_states(
-        stop.times, stop.positions, stop.velocities, stop.accelerations, 0.01
-    )
+    grid, q, _, _ = quintic_states(stop, 0.01)
     assert off_the_path(motion, q[::3]).max() < 1e-4
 
 

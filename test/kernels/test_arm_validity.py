@@ -23,17 +23,8 @@ from rrth_planner.kernels.collision.arm_validity import (
     MAX_OPEN,
     prove_curve,
 )
-from rrth_planner.kernels.jit import (
-    BOX_HALF,
-    BOX_OFFSET,
-    BOX_ROWS,
-    CHAIN,
-    D,
-    first_class,
-    kernel,
-    MAT,
-    VEC,
-)
+from rrth_planner.kernels.jit import CHAIN, first_class, kernel, MAT, VEC
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, D
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan

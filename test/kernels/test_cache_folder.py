@@ -34,7 +34,7 @@ os.replace = full
 CHAIN = """
 import sys
 import numpy as np
-from rrth_planner.kernels import jit
+from rrth_planner.kernels import layout
 from rrth_planner.kernels.kinematics.generated_fk import chain_of
 from rrth_planner.kernels.kept_code import KeptCode
 compiled = []
@@ -43,10 +43,10 @@ def note(self, signature, result):
     compiled.append(self._function.__name__)
     save(self, signature, result)
 KeptCode.save_overload = note
-rows = np.zeros((2, jit.REACH))
-rows[:, jit.COS_ALPHA] = 1.0
-rows[:, [jit.RADIUS_A, jit.RADIUS_D]] = jit.NO_BAR
-rows[1, [jit.A, jit.RADIUS_A]] = LENGTH, 0.0
+rows = np.zeros((2, layout.REACH))
+rows[:, layout.COS_ALPHA] = 1.0
+rows[:, [layout.RADIUS_A, layout.RADIUS_D]] = layout.NO_BAR
+rows[1, [layout.A, layout.RADIUS_A]] = LENGTH, 0.0
 points = np.zeros(12)
 chain_of(rows)(np.zeros(1), 0.0, points, 0)
 print(points[4], *compiled, file=sys.stderr)

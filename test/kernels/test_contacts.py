@@ -16,7 +16,7 @@ from rrth_planner.kernels.collision.edge_contacts import (
     SHARE,
     SPACING,
 )
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.scene import Scene
 from worlds import (
     compiled_chain,

@@ -4,7 +4,7 @@
 
 from hypothesis import given, strategies
 import numpy as np
-from rrth_planner.kernels.collision.penetration import depths, PARALLEL
+from rrth_planner.kernels.collision.bar_box import depths, PARALLEL
 from worlds import examples, random_rotation
 
 SEEDS = strategies.integers(0, 2**31)

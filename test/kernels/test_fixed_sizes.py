@@ -14,9 +14,9 @@ from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
 from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
-from rrth_planner.kernels.jit import BOX_ROWS, LANES
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
+from rrth_planner.kernels.layout import BOX_ROWS, LANES
 from rrth_planner.kernels.search import elastic_band, tree
 from rrth_planner.kernels.trajectory import speed_profile
 from rrth_planner.model.arm import ArmModel, bar_ends, pointing_error, tool_pose
@@ -92,15 +92,18 @@ NAMED = {
 }
 # Sizes that are numbers, by what they count: nothing that is given changes it.
 NUMBERS = {
-    'arm_clearance': {'3': 'coordinates'},
     'arm_validity': {'2': 'ends of an edge', '16': 'two bars of two points of four numbers'},
     'boxes': {'3': 'coordinates', '1': 'the part that is all boxes'},
     'clock': {'2': 'seconds and nanoseconds'},
-    'penetration': {'3': 'coordinates'},
     'bar_box': {'3': 'coordinates'},
     'trajectory_check': {'6': 'coefficients of a quintic'},
     'pan_tilt_ik': {'12': 'three axes and an origin', '3': 'coordinates'},
-    'fast_stop': {'3': 'limits; phases', '4': 'derivatives; columns', '5': 'columns'},
+    'fast_stop': {
+        '3': 'limits; phases',
+        '4': 'derivatives; columns',
+        '5': 'columns',
+        '6': 'coefficients of a quintic',
+    },
     'rrt': {'2': 'ends of a path'},
     'speed_profile': {'2': 'columns', '3': 'derivatives'},
     'stop_trajectory': {'3': 'derivatives', '4': 'derivatives'},

@@ -10,7 +10,7 @@ import pytest
 from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.kernels.collision.bar_box import bar_box_distance, contact_lanes, open_lanes
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from worlds import examples, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -134,9 +134,7 @@ def test_a_part_is_seen_by_the_reference_checker_as_the_trajectory_is():
     motion = a_motion(np.random.default_rng(5))
     begin, end = 0.31 * motion.duration, 0.77 * motion.duration
     part = part_of(motion, begin, end)
-    grid, q, v, a = quintic_states(
-        part.times, part.positions, part.velocities, part.accelerations, 1e-3
-    )
+    grid, q, v, a = quintic_states(part, 1e-3)
     for mine, its, most in zip(
         (q, v, a), sample(motion, begin + grid), (1e-13, 1e-10, 1e-8), strict=True
     ):

@@ -87,7 +87,7 @@ def test_every_command_of_the_tutorial_is_one():
 
 def test_keys_and_options_of_the_tutorial_exist():
     text = (ROOT / 'docs/tutorial.md').read_text(encoding='utf-8')
-    sources = [ROOT / f'rrth_planner/cli/{name}.py' for name in ('read_urdf', 'plan')]
+    sources = [ROOT / f'rrth_planner/cli/{name}.py' for name in ('read_urdf', 'plan', 'program')]
     declared = {
         node.value
         for source in sources

@@ -80,9 +80,7 @@ def test_at_rest_there_is_nothing_to_brake(time):
 def test_the_reference_checker_runs_a_brake_as_it_is_sampled():
     trajectory = parameterize(Path([[0.0] * 4, [1.0, -0.5, 0.3, 0.8]]), (), LIMITS)
     braked = brake(trajectory, 0.5, LIMITS)
-    grid, *states = quintic_states(
-        braked.times, braked.positions, braked.velocities, braked.accelerations, 0.001
-    )
+    grid, *states = quintic_states(braked, 0.001)
     for got, expected in zip(sample(braked, grid), states, strict=True):
         np.testing.assert_allclose(got, expected, atol=1e-6)
 

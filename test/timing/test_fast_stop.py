@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rrth_planner.kernels.trajectory.fast_stop import first_rest, first_window
 from rrth_planner.kernels.trajectory.lookahead import look_ahead, MOST, S, TIME, time_after
-from rrth_planner.kernels.trajectory.stop_profile import keeps_limits, line_stop, stop_s
+from rrth_planner.kernels.trajectory.stop_search import keeps_limits, line_stop, stop_s
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
     MotionLimits,

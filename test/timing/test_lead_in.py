@@ -66,9 +66,7 @@ def test_a_lead_in_begins_with_the_state_and_ends_straight_ahead(seed):
     whole = joined(first, rest)
     assert limit_ratio(whole, bounds) <= 1.002
     # The reference checker's quintics through the points: velocity and acceleration have no jumps.
-    grid, q, v, a = quintic_states(
-        whole.times, whole.positions, whole.velocities, whole.accelerations, 0.001
-    )
+    grid, q, v, a = quintic_states(whole, 0.001)
     step = np.diff(grid)[:, None]
     assert (np.abs(np.diff(a, axis=0)) <= 1.01 * bounds.jerk * step + 1e-4).all()
     assert (np.abs(np.diff(v, axis=0)) <= 1.01 * bounds.acceleration * step + 1e-6).all()
@@ -227,9 +225,7 @@ def test_in_its_last_milliseconds_a_motion_is_taken_over_within_the_limits(seed)
     taken = motion(scene, q, rng.uniform(-2.0, 2.0, 3), 2, moving).trajectory
     if taken is None:
         return
-    grid, q, v, a = quintic_states(
-        taken.times, taken.positions, taken.velocities, taken.accelerations, 1e-4
-    )
+    grid, q, v, a = quintic_states(taken, 1e-4)
     assert np.abs(v).max() <= 1.01 * limits().velocity[0]
     assert np.abs(a).max() <= 1.01 * limits().acceleration[0]
     assert np.abs(np.diff(a, axis=0) / np.diff(grid)[:, None]).max() <= 1.01 * limits().jerk[0]

@@ -228,13 +228,7 @@ def test_the_reference_checkers_quintics_are_those_that_are_sampled(seed):
     # The reference checker solves linear equations in seconds: of short pieces it loses digits.
     if np.diff(trajectory.times).min() < 1e-3:
         return
-    grid, q, v, a = quintic_states(
-        trajectory.times,
-        trajectory.positions,
-        trajectory.velocities,
-        trajectory.accelerations,
-        0.002,
-    )
+    grid, q, v, a = quintic_states(trajectory, 0.002)
     for got, expected, tolerance in zip(
         sample(trajectory, grid), (q, v, a), (1e-9, 1e-6, 1e-3), strict=True
     ):

@@ -8,21 +8,9 @@ from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM
-from rrth_planner.kernels.collision.bar_box import bar_box_distance, bar_distance
-from rrth_planner.kernels.jit import (
-    BOX_HALF,
-    BOX_OFFSET,
-    CHAIN,
-    CUBE,
-    D,
-    kernel,
-    LANES,
-    MAT,
-    OUT_MAT,
-    OUT_VEC,
-    REACH,
-    VEC,
-)
+from rrth_planner.kernels.collision.bar_box import nearer
+from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, VEC
+from rrth_planner.kernels.layout import BOX_HALF, D, LANES, REACH
 from rrth_planner.kernels.trajectory.quintics import state_at
 
 
@@ -41,33 +29,19 @@ def clearances(positions, ray_length, chain, boxes, distances):
         for k in range(n_bars):
             for g in range(first, boxes.shape[0]):
                 for j in range(LANES):
-                    if boxes[g, 12 * LANES + j] > 0.0:
-                        distance = bar_distance(points, 4 * k, boxes, g, j)
-                        lane = LANES * (g - first) + j
-                        distances[k, lane] = min(distances[k, lane], distance)
+                    lane = LANES * (g - first) + j
+                    distances[k, lane] = nearer(points, 4 * k, boxes, g, j, distances[k, lane])
 
 
-@kernel(float64(OUT_VEC, int64, MAT, int64, int64, float64))
-def nearer(points, at, boxes, g, j, least):
-    """
-    Return the distance of the bar at points[at] from lane j of group g, where it is less [m].
-
-    Mostly a face of the box already shows that it is not.
-    """
-    start, step, half = np.empty(3), np.empty(3), np.empty(3)
-    gap, radius = -math.inf, points[at + 7]
-    for r in range(3):
-        at_start = at_end = boxes[g, LANES * (BOX_OFFSET + r) + j]
-        for c in range(3):
-            cosine = boxes[g, LANES * (3 * r + c) + j]
-            at_start += cosine * points[at + c]
-            at_end += cosine * points[at + 4 + c]
-        start[r], step[r] = at_start, at_end - at_start
-        half[r] = boxes[g, LANES * (BOX_HALF + r) + j]
-        gap = max(gap, min(at_start, at_end) - half[r], -max(at_start, at_end) - half[r])
-    if gap > 0.0 and gap - radius >= least:
-        return least
-    return min(least, bar_box_distance(start, step, half) - radius)
+@kernel(float64(OUT_VEC, int64, MAT, float64))
+def nearest(points, n_bars, boxes, least):
+    """Return the least distance of the bars of an arm from the boxes, where it is less [m]."""
+    for k in range(n_bars):
+        for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
+            for j in range(LANES):
+                if boxes[g, LANES * BOX_HALF + j] > 0.0:
+                    least = nearer(points, 4 * k, boxes, g, j, least)
+    return least
 
 
 @kernel(float64(CUBE, VEC, float64, int64, float64, CHAIN, MAT))
@@ -85,11 +59,7 @@ def least_along(curves, times, begin, n, ray_length, chain, boxes):
     for i in range(n):
         state_at(curves, times, begin + (last - begin) * (i / (n - 1)), q, v)
         n_bars = chain(q, ray_length, points, 0)
-        for k in range(n_bars):
-            for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
-                for j in range(LANES):
-                    if boxes[g, LANES * BOX_HALF + j] > 0.0:
-                        least = nearer(points, 4 * k, boxes, g, j, least)
+        least = nearest(points, n_bars, boxes, least)
     return least
 
 
@@ -104,12 +74,7 @@ def free_radius(q, chain, robot, boxes):
     dof = q.shape[0]
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, robot[robot.shape[0] - 1, D], points, 0)
-    least = math.inf
-    for bar in range(n_bars):
-        for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
-            for j in range(LANES):
-                if boxes[g, LANES * BOX_HALF + j] > 0.0:
-                    least = min(least, bar_distance(points, 4 * bar, boxes, g, j))
+    least = nearest(points, n_bars, boxes, math.inf)
     squared = 0.0
     for k in range(dof):
         reach = 0.0

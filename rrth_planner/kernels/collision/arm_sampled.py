@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sampled checks of an arm's edge, for comparison: configurations, or points, at a spacing."""
 
-from numba.core.types import boolean, float64, int64, void
+from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import (
@@ -10,31 +10,15 @@ from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
     is_edge_free,
 )
-from rrth_planner.kernels.jit import (
-    BOX_HALF,
-    BOX_OFFSET,
-    CHAIN,
-    D,
-    kernel,
-    LANES,
-    MAT,
-    OUT_VEC,
-    VEC,
-)
-from rrth_planner.kernels.vectors import distance
+from rrth_planner.kernels.jit import CHAIN, kernel, MAT, VEC
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, D, LANES
+from rrth_planner.kernels.vectors import between, distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
 POINTS_PER_BAR = 10
 # Resolution of the continuous check that is tried first, in spacings: it has to be cheaper than
 # checking each configuration.
 SHORT_PROOF = 8.0
-
-
-@kernel(void(VEC, VEC, float64, OUT_VEC))
-def between(q_from, q_to, share, q):
-    """Write the configuration at a share of the edge."""
-    for k in range(q.shape[0]):
-        q[k] = q_from[k] + share * (q_to[k] - q_from[k])
 
 
 @kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))

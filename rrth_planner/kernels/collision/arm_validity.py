@@ -8,22 +8,8 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.bar_box import contact_lanes, MAX_ENDS, open_lanes
-from rrth_planner.kernels.jit import (
-    CHAIN,
-    D,
-    kernel,
-    KIND,
-    LANES,
-    MAT,
-    NO_BAR,
-    OUT_POOL,
-    OUT_VEC,
-    PRISMATIC,
-    RADIUS_A,
-    REACH,
-    VEC,
-)
-from rrth_planner.kernels.layout import MAX_DOF
+from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_POOL, OUT_VEC, VEC
+from rrth_planner.kernels.layout import D, KIND, LANES, MAX_DOF, NO_BAR, PRISMATIC, RADIUS_A, REACH
 
 ENDS_ROOM = 4 * MAX_ENDS
 # Most configurations of a continuous check, and room for the numbers of their points.
@@ -73,14 +59,7 @@ def is_configuration_free(q, ray_length, chain, boxes):
     """Return whether the arm at q, with a ray of the given length [m], is clear of all boxes."""
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
-    if boxes.shape[0] > 1:
-        return not is_in_contact(points, 0, n_bars, boxes)
-    n_hit = 0
-    for k in range(n_bars - 1, -1, -1):
-        n_hit += contact_lanes(points, 4 * k, boxes, 0)
-        if n_hit != 0:
-            break
-    return n_hit == 0
+    return not is_in_contact(points, 0, n_bars, boxes)
 
 
 @kernel(void(MAT, VEC, VEC, OUT_VEC))
@@ -124,28 +103,27 @@ def curve_point(curve, u, q):
 def cut_bar(points, a, b, n_parts, part, piece):
     """Write one of the equal parts of a bar at two instants, laid out as points."""
     low, high = part / n_parts, (part + 1) / n_parts
-    for c in range(3):
-        p, r = points[a + c], points[a + 4 + c]
-        piece[c], piece[4 + c] = p + low * (r - p), p + high * (r - p)
-        p, r = points[b + c], points[b + 4 + c]
-        piece[8 + c], piece[12 + c] = p + low * (r - p), p + high * (r - p)
+    for i, at in enumerate((a, b)):
+        for c in range(3):
+            p, r = points[at + c], points[at + 4 + c]
+            piece[8 * i + c], piece[8 * i + 4 + c] = p + low * (r - p), p + high * (r - p)
     piece[7] = piece[15] = points[a + 7]
 
 
-@kernel(int64(OUT_VEC, int64, int64, int64, float64, float64, MAT, OUT_POOL, int64))
-def open_bar(points, a, b, k, first, last, boxes, pool, n_open):
+@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64))
+def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
     """
-    Append to the pool the groups of boxes that are open to a whole bar; return its new length.
+    Append to the pool the groups of boxes that are open to bar k; return its new length.
 
-    points[a], points[b]: bar k at two instants; first, last: the thickening round its ends [m].
-    -1: the pool has no room.
+    points[a], points[b]: the arm at two instants; bow: width^2 / 8. -1: the pool has no room.
     """
+    first, last = bow * bows[k], bow * bows[k + 1]
     waiting = scratch.ints(MAX_GROUPS)
     n_waiting, waiting[0] = 1, 0
     while n_waiting > 0:
         n_waiting -= 1
         g = int64(waiting[n_waiting])
-        lanes = open_lanes(points, a, b, first, last, boxes, g)
+        lanes = open_lanes(points, a + 4 * k, b + 4 * k, first, last, boxes, g)
         if lanes == 0:
             continue
         if LANES * g + 1 < boxes.shape[0]:
@@ -253,15 +231,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         if last < 0:
             for k in range(n_bars):
                 n_open = open_bar(
-                    points,
-                    a * stride + 4 * k,
-                    b * stride + 4 * k,
-                    k,
-                    bow * bows[k],
-                    bow * bows[k + 1],
-                    boxes,
-                    pool,
-                    n_open,
+                    points, a * stride, b * stride, bow, bows, k, boxes, pool, n_open
                 )
                 if n_open < 0:
                     return -1

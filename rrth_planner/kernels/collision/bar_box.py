@@ -1,17 +1,19 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Bars against boxes: exact contact, signed distance, and the hull of a moving bar."""
+"""Bars against boxes: contact, signed distance, hull of a moving bar, penetration depth."""
 
 import math
 
-from numba.core.types import float64, int64
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.jit import BOX_HALF, BOX_OFFSET, kernel, LANES, MAT, OUT_VEC
-from rrth_planner.kernels.layout import MAX_BARS
+from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, LANES, MAX_BARS
 
 # Bars nearer than this are in contact [m].
 CONTACT = 1e-12
+# Least sine for a cross axis: a bar parallel to an axis of the box has none.
+PARALLEL = 1e-12
 # Up to four points in the axes of LANES boxes.
 LOCAL_ROOM = 12 * LANES
 # Ends of all bars of an arm, and the start of the first one.
@@ -36,11 +38,8 @@ def contact_lanes(points, at, boxes, g):
     for j in range(LANES):
         is_apart = False
         for r in range(3):
-            x, y, z = (
-                boxes[g, 3 * r * LANES + j],
-                boxes[g, (3 * r + 1) * LANES + j],
-                boxes[g, (3 * r + 2) * LANES + j],
-            )
+            i = 3 * r * LANES + j
+            x, y, z = boxes[g, i], boxes[g, i + LANES], boxes[g, i + 2 * LANES]
             e = x * ex + y * ey + z * ez
             m = boxes[g, (9 + r) * LANES + j] + x * mx + y * my + z * mz
             local[r * LANES + j], local[(3 + r) * LANES + j] = e, m
@@ -126,10 +125,16 @@ def bar_box_distance(start, step, half):
     return -max(overlap, 0.0)
 
 
-@kernel(float64(OUT_VEC, int64, MAT, int64, int64))
-def bar_distance(points, at, boxes, g, j):
-    """Return the signed distance of the bar at points[at] from lane j of group g [m]."""
-    start, step, half = np.empty(3), np.empty(3), np.empty(3)
+@kernel(float64(OUT_VEC, int64, MAT, int64, int64, float64))
+def nearer(points, at, boxes, g, j, least):
+    """
+    Return the signed distance of a bar from lane j of group g, where it is less than `least` [m].
+
+    Mostly a face of the box already shows that it is not; an unused lane is infinitely far. The
+    bar is at points[at] as in `contact_lanes`.
+    """
+    start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
+    gap, radius = -math.inf, points[at + 7]
     for r in range(3):
         at_start = at_end = boxes[g, LANES * (BOX_OFFSET + r) + j]
         for c in range(3):
@@ -138,7 +143,10 @@ def bar_distance(points, at, boxes, g, j):
             at_end += cosine * points[at + 4 + c]
         start[r], step[r] = at_start, at_end - at_start
         half[r] = boxes[g, LANES * (BOX_HALF + r) + j]
-    return bar_box_distance(start, step, half) - points[at + 7]
+        gap = max(gap, min(at_start, at_end) - half[r], -max(at_start, at_end) - half[r])
+    if gap > 0.0 and gap - radius >= least:
+        return least
+    return min(least, bar_box_distance(start, step, half) - radius)
 
 
 @kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64), inline='always')
@@ -162,11 +170,8 @@ def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
     for j in range(LANES):
         is_apart = False
         for r in range(3):
-            x, y, z = (
-                boxes[g, 3 * r * LANES + j],
-                boxes[g, (3 * r + 1) * LANES + j],
-                boxes[g, (3 * r + 2) * LANES + j],
-            )
+            i = 3 * r * LANES + j
+            x, y, z = boxes[g, i], boxes[g, i + LANES], boxes[g, i + 2 * LANES]
             offset, half = boxes[g, (9 + r) * LANES + j], boxes[g, (12 + r) * LANES + j]
             p = offset + x * ax + y * ay + z * az
             q = offset + x * bx + y * by + z * bz
@@ -206,3 +211,36 @@ def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
         is_apart |= max(max(p, s) + u, max(q, t) + v) < -reach
         apart |= (1 if is_apart else 0) << j
     return left & ~apart
+
+
+@kernel(void(MAT, CUBE, OUT_CUBE), is_short=True)
+def depths(boxes, points, found):
+    """
+    Write by how much each box would have to shrink on every side for each bar to be clear.
+
+    boxes (15, m): a column for each box, its axes, offset and half sizes as from `boxes.rows_of`;
+    points (n, n_bars + 1, 4): the corners of the arm in n configurations, each with the radius of
+    the bar that ends there [m]; found (n, n_bars, m) [m], < 0: apart.
+    """
+    middle, along, half = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(points.shape[0]):
+        for bar in range(points.shape[1] - 1):
+            p, q = points[k, bar], points[k, bar + 1]
+            for j in range(boxes.shape[1]):
+                depth = math.inf
+                for i in range(3):
+                    begin = boxes[BOX_OFFSET + i, j]
+                    end = begin
+                    for c in range(3):
+                        begin += boxes[3 * i + c, j] * p[c]
+                        end += boxes[3 * i + c, j] * q[c]
+                    middle[i], along[i] = 0.5 * (end + begin), 0.5 * (end - begin)
+                    half[i] = boxes[BOX_HALF + i, j] + q[3]
+                    depth = min(depth, half[i] + abs(along[i]) - abs(middle[i]))
+                for i in range(3):
+                    r, s = (i + 1) % 3, (i + 2) % 3
+                    a, b = abs(along[r]), abs(along[s])
+                    if a + b > PARALLEL:
+                        offset = abs(middle[r] * along[s] - middle[s] * along[r])
+                        depth = min(depth, (half[r] * b + half[s] * a - offset) / (a + b))
+                found[k, bar, j] = depth

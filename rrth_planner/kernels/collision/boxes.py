@@ -6,20 +6,16 @@ import math
 
 from numba.core.types import float64, int64, void
 import numpy as np
-from rrth_planner.kernels.jit import (
+from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_INTS, OUT_MAT, OUT_VEC, READ_INTS
+from rrth_planner.kernels.layout import (
     BOX_HALF,
     BOX_OFFSET,
     BOX_ROWS,
-    CUBE,
-    kernel,
     LANES,
-    MAT,
-    OUT_INTS,
-    OUT_MAT,
-    OUT_VEC,
-    READ_INTS,
+    ORTHOGONAL,
+    ROTATION,
+    SIZE,
 )
-from rrth_planner.kernels.layout import ORTHOGONAL, ROTATION, SIZE
 
 # Numbers of a marker: position, quaternion x y z w, scale, and a point in its own axes.
 QUATERNION, SCALE, POINT, POSED = 3, 7, 10, 13
@@ -115,23 +111,20 @@ def write_bound(rows, order, begin, end, groups, g, lane):
     or those of the arm's frame.
     """
     best = math.inf
-    low, high = np.empty(3), np.empty(3)
+    low, high, axes = np.empty(3), np.empty(3), np.empty((3, 3))
     for candidate in range(begin, min(end, begin + LANES) + 1):
         is_last = candidate == min(end, begin + LANES)
         for k in range(3):
             low[k], high[k] = math.inf, -math.inf
+            for r in range(3):
+                axes[k, r] = float64(r == k) if is_last else rows[3 * k + r, order[candidate]]
             for n in range(begin, end):
                 i = order[n]
                 middle, reach = 0.0, 0.0
                 for axis in range(3):
                     cosine = 0.0
                     for r in range(3):
-                        u = (
-                            (1.0 if r == k else 0.0)
-                            if is_last
-                            else rows[3 * k + r, order[candidate]]
-                        )
-                        cosine += u * rows[3 * axis + r, i]
+                        cosine += axes[k, r] * rows[3 * axis + r, i]
                     # The centre has minus the offset as its coordinates along the box's own axes.
                     middle -= cosine * rows[BOX_OFFSET + axis, i]
                     reach += abs(cosine) * rows[BOX_HALF + axis, i]
@@ -141,9 +134,7 @@ def write_bound(rows, order, begin, end, groups, g, lane):
             best = volume
             for k in range(3):
                 for r in range(3):
-                    groups[g, LANES * (3 * k + r) + lane] = (
-                        (1.0 if r == k else 0.0) if is_last else rows[3 * k + r, order[candidate]]
-                    )
+                    groups[g, LANES * (3 * k + r) + lane] = axes[k, r]
                 groups[g, LANES * (BOX_OFFSET + k) + lane] = -0.5 * (low[k] + high[k])
                 groups[g, LANES * (BOX_HALF + k) + lane] = 0.5 * (high[k] - low[k]) + SPARE
 
@@ -188,8 +179,8 @@ def pack(rows, depth, groups, lanes):
     """
     Write the tree of groups of boxes, and which lane of its last level holds box i.
 
-    rows (15, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 15), layout as
-    in `kernels.jit`; lanes (n,). On every level the boxes are halved three times, each time along
+    rows (15, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 15) as in
+    `kernels.layout`; lanes (n,). On every level the boxes are halved three times, each time along
     the axis that their centres spread most along.
     """
     n = rows.shape[1]

@@ -7,6 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, VEC
+from rrth_planner.kernels.vectors import between, distance
 
 # Obstacles of a map are rows lower corner, upper corner, (m, 2 dof). Contact is allowed: a wall
 # begins this far inside its faces.
@@ -94,15 +95,10 @@ def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, obstacles):
     The check points are spread evenly, their number by the length of the edge (section 2), no
     further apart than `resolution`. Contacts between them are missed.
     """
-    dof = q_from.shape[0]
-    length = 0.0
-    for k in range(dof):
-        length += (q_to[k] - q_from[k]) ** 2
-    n = int64(math.sqrt(length) / resolution) + 1
-    q = np.empty(dof)
+    n = int64(distance(q_from, q_to) / resolution) + 1
+    q = np.empty(q_from.shape[0])
     for i in range(n, 0, -1):
-        for k in range(dof):
-            q[k] = q_from[k] + i / n * (q_to[k] - q_from[k])
+        between(q_from, q_to, i / n, q)
         if is_point_inside(q, obstacles):
             return False
     return True

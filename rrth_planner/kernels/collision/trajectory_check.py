@@ -6,18 +6,13 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.boxes import pack, rows_of
-from rrth_planner.kernels.jit import (
-    BOX_ROWS,
-    CHAIN,
-    CUBE,
-    D,
-    kernel,
-    LANES,
-    MAT,
-    OUT_MAT,
-    VEC,
-)
+from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, VEC
+from rrth_planner.kernels.layout import BOX_ROWS, D, LANES
 from rrth_planner.kernels.trajectory.quintics import bound, fit
+
+# Newly received boxes: boxes, T_arm_base, growth, depth. Points of a motion: times, positions,
+# velocities, accelerations.
+NEW, POINTS = (MAT, MAT, float64, int64), (VEC, MAT, MAT, MAT)
 
 
 @kernel(void(MAT, float64, OUT_MAT))
@@ -53,55 +48,31 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
     """
     rest = np.empty((curves.shape[1], curves.shape[2]))
     for i in range(first, curves.shape[0]):
-        if i == first and begin > 0.0:
-            shift(curves[i], begin, rest)
-            proof = prove_curve(rest, speeds[i], curvatures[i], resolution, chain, robot, boxes)
-        else:
-            proof = prove_curve(
-                curves[i], speeds[i], curvatures[i], resolution, chain, robot, boxes
-            )
+        shift(curves[i], begin if i == first else 0.0, rest)
+        proof = prove_curve(rest, speeds[i], curvatures[i], resolution, chain, robot, boxes)
         if proof != 1:
             return 2 * i + (1 if proof == 0 else 0)
     return -1
 
 
-@kernel(void(MAT, MAT, float64, int64, OUT_MAT))
-def pack_new(boxes, T_arm_base, growth, depth, groups):
-    """Write newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
+@kernel(OUT_MAT(*NEW))
+def packed(boxes, T_arm_base, growth, depth):
+    """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
     rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
+    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
     rows_of(boxes, T_arm_base, growth, rows)
     pack(rows, depth, groups, lanes)
+    return groups
 
 
-@kernel(boolean(VEC, float64, CHAIN, MAT, MAT, float64, int64), is_short=True)
+@kernel(boolean(VEC, float64, CHAIN, *NEW), is_short=True)
 def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
     """Return whether the arm at q (dof,) is free of newly received boxes, as below."""
-    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    pack_new(boxes, T_arm_base, growth, depth, groups)
-    return is_configuration_free(q, ray_length, chain, groups)
+    return is_configuration_free(q, ray_length, chain, packed(boxes, T_arm_base, growth, depth))
 
 
-@kernel(
-    boolean(
-        VEC,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        float64,
-        float64,
-        CHAIN,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        int64,
-        MAT,
-        MAT,
-    ),
-    is_short=True,
-)
+@kernel(boolean(*POINTS, float64, float64, float64, CHAIN, MAT, *NEW, MAT, MAT), is_short=True)
 def is_remaining_motion_free(
     times,
     positions,
@@ -131,8 +102,7 @@ def is_remaining_motion_free(
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
-    groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    pack_new(boxes, T_arm_base, growth, depth, groups)
+    groups = packed(boxes, T_arm_base, growth, depth)
     q_end = np.empty(dof)
     for k in range(dof):
         q_end[k] = 0.0
@@ -149,7 +119,5 @@ def is_remaining_motion_free(
     speeds, curvatures = np.empty((n_pieces, dof)), np.empty((n_pieces, dof))
     bound(curves[first:], quartic, cubic, speeds[first:], curvatures[first:])
     share = max(0.0, (begin - times[first]) / (times[first + 1] - times[first]))
-    found = prove_pieces(
-        curves, speeds, curvatures, first, share, resolution, chain, robot, groups
-    )
-    return found == -1
+    motion = (curves, speeds, curvatures, first, share)
+    return prove_pieces(*motion, resolution, chain, robot, groups) == -1

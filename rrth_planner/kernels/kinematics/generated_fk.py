@@ -9,22 +9,19 @@ from types import ModuleType
 from typing import Any
 
 from numba.core.types import float64, int64
-from rrth_planner.kernels.jit import (
+from rrth_planner.kernels.jit import first_class, kernel, OUT_VEC, VEC
+from rrth_planner.kernels.layout import (
     A,
     COS_ALPHA,
     D,
-    first_class,
-    kernel,
     KIND,
     NO_BAR,
     OFFSET,
-    OUT_VEC,
     PRISMATIC,
     RADIUS_A,
     RADIUS_D,
     REVOLUTE,
     SIN_ALPHA,
-    VEC,
 )
 
 # Sines and cosines nearer than this to 0 or 1 are rounding of a right angle.
@@ -84,11 +81,8 @@ class _Source:
             elif isinstance(left, float) or isinstance(right, float):
                 factor, name = (left, right) if isinstance(left, float) else (right, left)
                 if factor != 0.0:
-                    parts.append(
-                        {1.0: f'{name}', -1.0: f'-({name})'}.get(
-                            float(factor), f'{factor!r} * {name}'
-                        )
-                    )
+                    plain = {1.0: f'{name}', -1.0: f'-({name})'}
+                    parts.append(plain.get(float(factor), f'{factor!r} * {name}'))
             else:
                 parts.append(f'{left} * {right}')
         if not parts:
@@ -119,7 +113,7 @@ def chain_source(rows: Any) -> str:
     """
     Return the text of the module whose kernel `chain` writes the bars of an arm.
 
-    rows (dof + 1, >= 8): DH rows, columns as in `jit`; Craig's T = Rx(alpha) Tx(a) Rz(theta)
+    rows (dof + 1, >= 8): DH rows, columns as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta)
     Tz(d) each.
     The kernel `chain(q, ray_length, points, at)` writes four numbers a point from points[at] on:
     x, y, z in the arm's base frame [m], and the radius of the bar that ends there [m]; first the

@@ -5,21 +5,9 @@
 import math
 
 from numba.core.types import float64, UniTuple, void
-from rrth_planner.kernels.jit import (
-    A,
-    COS_ALPHA,
-    D,
-    kernel,
-    KIND,
-    MAT,
-    OFFSET,
-    OUT_MAT,
-    OUT_VEC,
-    PRISMATIC,
-    SIN_ALPHA,
-    VEC,
-)
+from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
+from rrth_planner.kernels.layout import A, COS_ALPHA, D, KIND, OFFSET, PRISMATIC, SIN_ALPHA
 
 # Rows of `work`, a column for each joint: how it moves the target past the tool (3), the Jacobian
 # of the two equations (2), is the joint held at a limit, a wish, the step, a configuration.

@@ -1,22 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The goal manifold of any arm, numerically: the counterparts of `pointing`."""
+"""The goal manifold of any arm, numerically: the counterparts of `pan_tilt_ik`."""
 
 import math
 
 from numba.core.types import boolean, float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import (
-    CHAIN,
-    EDGE_CHECK,
-    kernel,
-    KIND,
-    MAT,
-    OUT_MAT,
-    OUT_VEC,
-    REVOLUTE,
-    VEC,
-)
+from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.kinematics.ik_projection import (
     measure_aim,
     project,
@@ -26,6 +16,7 @@ from rrth_planner.kernels.kinematics.ik_projection import (
     WORK_ROWS,
 )
 from rrth_planner.kernels.kinematics.pan_tilt_ik import is_goal_free, unwrap
+from rrth_planner.kernels.layout import KIND, REVOLUTE
 from rrth_planner.kernels.vectors import copy, distance
 
 # Configurations nearer than this in every joint are one [rad or m].

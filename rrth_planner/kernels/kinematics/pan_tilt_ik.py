@@ -8,26 +8,11 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free
-from rrth_planner.kernels.jit import (
-    A,
-    CHAIN,
-    COS_ALPHA,
-    D,
-    EDGE_CHECK,
-    kernel,
-    KIND,
-    MAT,
-    OFFSET,
-    OUT_MAT,
-    OUT_VEC,
-    PRISMATIC,
-    SIN_ALPHA,
-    VEC,
-)
+from rrth_planner.kernels.jit import CHAIN, EDGE_CHECK, kernel, MAT, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
+from rrth_planner.kernels.layout import A, COS_ALPHA, D, KIND, OFFSET, PRISMATIC, SIN_ALPHA
 from rrth_planner.kernels.vectors import copy, distance
 
-TURN = 2.0 * math.pi
 # Joints of an arm that aims in closed form, at most: the search for a nearer goal tries all
 # neighbours on a grid, three times as many with every joint.
 MAX_CLOSED_DOF = 8
@@ -50,11 +35,11 @@ def tilt_frame(robot, i, frame):
 @kernel(float64(float64, float64, float64, float64))
 def unwrap(angle, near, lower, upper):
     """Return angle + 2 pi n within [lower, upper] closest to `near`, or NaN where none fits."""
-    angle += TURN * math.floor((near - angle) / TURN + 0.5)
+    angle += math.tau * math.floor((near - angle) / math.tau + 0.5)
     if angle > upper:
-        angle -= TURN * math.ceil((angle - upper) / TURN)
+        angle -= math.tau * math.ceil((angle - upper) / math.tau)
     if angle < lower:
-        angle += TURN * math.ceil((lower - angle) / TURN)
+        angle += math.tau * math.ceil((lower - angle) / math.tau)
     return angle if lower <= angle <= upper else math.nan
 
 

@@ -8,8 +8,8 @@ from numba.core.types import float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, VEC
 from rrth_planner.kernels.trajectory.lookahead import derivatives_on, look_ahead, MOST, S, TIME
-from rrth_planner.kernels.trajectory.stop_profile import stop_s
-from rrth_planner.kernels.trajectory.stop_search import soonest_stop
+from rrth_planner.kernels.trajectory.quintics import fit
+from rrth_planner.kernels.trajectory.stop_search import soonest_stop, stop_s
 from rrth_planner.kernels.trajectory.stop_trajectory import (
     CLOSEST,
     CLOSEST_FIRST,
@@ -99,21 +99,10 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     """
     Write the points of the soonest stop found; return their number.
 
-    Parameters
-    ----------
-    curves : array, shape (n, 6, dof)
-        Pieces of the motion, as from `trajectory.piece_coefficients`.
-    times : array, shape (n + 1,)
-        [s].
-    now, lead : float
-        Time of the request within the motion, and time for which it continues unchanged [s].
-    velocity, acceleration, jerk : array, shape (dof,)
-        Limits.
-    points : array, shape (m,)
-        Written [s].
-    states : array, shape (3, m, dof)
-        Written: positions, velocities, accelerations.
-
+    curves (n, 6, dof): pieces of the motion, as from `trajectory.piece_coefficients`; times
+    (n + 1,) [s]; now, lead: time of the request within the motion, and time for which it continues
+    unchanged [s]; velocity, acceleration, jerk (dof,): limits. points (m,) [s] and states
+    (3, m, dof), positions, velocities, accelerations, are written.
     """
     dof, phases = curves.shape[2], np.empty((3, 5))
     limits = np.empty((3, dof))
@@ -144,8 +133,10 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
                 m = stop_times(rows, pieces, phases, row, spacing, points)
                 at = points[:m]
                 stop_states(curves, times, rows, pieces, phases, row, limits, at, states)
-                if not is_within(at, states, rows[row, TIME] - now, geometry[last, MOST]):
+                stop = np.empty((m - 1, 6, dof))
+                fit(at, states[0], states[1], states[2], stop)
+                if not is_within(at, stop, rows[row, TIME] - now, geometry[last, MOST]):
                     break
-                if is_on_path(curves, times, rows, pieces, phases, row, limits, at, states):
+                if is_on_path(curves, times, rows, pieces, phases, row, limits, at, stop):
                     return m
     return remaining_motion(curves, times, now, rest, points, states)

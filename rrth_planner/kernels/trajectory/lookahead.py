@@ -4,11 +4,10 @@
 
 import math
 
-from numba.core.types import Array, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBES, OUT_INTS, OUT_MAT, OUT_VEC, VEC
 
-CUBES = Array(float64, 4, 'C', readonly=True)
 # Columns of `rows`, one for the begin of each cell and one for the end of the last: time within
 # the motion [s], path parameter s [-], s_dot and s_ddot [1/s, 1/s^2].
 TIME, S, S_DOT, S_DDOT = range(4)
@@ -111,25 +110,10 @@ def look_ahead(curves, times, now, begin, end, step, limits, rows, pieces, geome
     """
     Write the cells of a motion between two of its times; return their number.
 
-    Cells end at points of the motion and at `begin`, and no later than `step` after they begin.
-
-    Parameters
-    ----------
-    curves, times : array, shape (n, 6, dof) and (n + 1,)
-        The motion.
-    now, begin, end : float
-        [s].
-    step : float
-        [s].
-    limits : array, shape (3, dof)
-        Velocity, acceleration, jerk.
-    rows : array, shape (m + 1, 4)
-        Written.
-    pieces : array, shape (m,)
-        Written: the piece of the motion that each cell is on.
-    geometry : array, shape (m, 3, 3, dof)
-        Written.
-
+    Cells end at points of the motion and at `begin`, and no later than `step` after they begin;
+    all times in s. curves (n, 6, dof), times (n + 1,): the motion; limits (3, dof): velocity,
+    acceleration, jerk. rows (m + 1, 4), pieces (m,), the piece of the motion that each cell is on,
+    and geometry (m, 3, 3, dof) are written.
     """
     dof = curves.shape[2]
     states, speeds, most = np.empty((4, dof)), np.empty(3), limits.copy()

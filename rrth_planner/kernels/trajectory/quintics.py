@@ -64,10 +64,8 @@ def bound(curves, quartic, cubic, speeds, curvatures):
                     factor = (power + 1) * (power + 2)
                     value += cubic[row, power] * factor * curves[i, power + 2, k]
                 curvature = larger(curvature, abs(value))
-            speeds[i, k], curvatures[i, k] = (
-                speed * (1 + SHARE) + LEAST,
-                curvature * (1 + SHARE) + LEAST,
-            )
+            speeds[i, k] = speed * (1 + SHARE) + LEAST
+            curvatures[i, k] = curvature * (1 + SHARE) + LEAST
 
 
 @kernel(void(CUBE, VEC, float64, OUT_VEC, OUT_VEC))
@@ -97,20 +95,9 @@ def time_on(curves, times, guess, q, same, slow, latest):
     """
     Localize an arm at q, (dof,), on a motion: return its time, NaN where it is off the path.
 
-    Parameters
-    ----------
-    curves, times : array
-        As for `state_at`.
-    guess : float
-        The time that is expected without delay [s].
-    q : array, shape (dof,)
-    same : float
-        Greatest distance of a joint from the nearest point of the motion [rad].
-    slow : float
-        Where no joint is faster than this, `guess` is not corrected [rad/s].
-    latest : float
-        Greatest delay or lead [s].
-
+    curves, times: as for `state_at`; guess: the time that is expected without delay [s], not
+    corrected where no joint is faster than `slow` [rad/s]; same: greatest distance of a joint from
+    the nearest point of the motion [rad]; latest: greatest delay or lead [s].
     """
     p, v = np.empty_like(q), np.empty_like(q)
     at = guess

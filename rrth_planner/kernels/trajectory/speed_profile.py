@@ -165,10 +165,8 @@ def path_limits(q_s, limits, speed, cell):
     for k in range(q_s.shape[1]):
         left = limits[JERK, k] - q_s[2, k] * speed**3
         if q_s[0, k] > 0.0:
-            a_max = min(
-                a_max,
-                (limits[ACCELERATION, k] - q_s[1, k] * speed * speed) / q_s[0, k],
-            )
+            most = limits[ACCELERATION, k] - q_s[1, k] * speed * speed
+            a_max = min(a_max, most / q_s[0, k])
         if q_s[1, k] * speed > 0.0:
             a_max = min(a_max, A_MAX_SHARE * left / (3.0 * q_s[1, k] * speed))
     straight_a_max, straight_j_max = math.inf, math.inf
@@ -201,35 +199,16 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     The greatest speeds from which constant accelerations lead on, backwards and forwards, as in
     time-optimal path parameterization by reachability (Pham and Pham 2018), with bounds over whole
     cells in place of points; then the same with ramps of limited jerk, from and to constant speed
-    at the knots.
+    at the knots. The duration is infinite where the arm cannot slow down in time from `v_start`.
 
-    Parameters
-    ----------
-    directions, turns : array, shape (n, dof)
-        Of the segment of each cell: direction at its begin, and change of direction to its end.
-    places : array, shape (n, 3)
-        As `place` of `bound_derivatives`.
-    limits : array, shape (3, dof)
-        Velocity, acceleration, jerk.
-    v_start : float
-        Speed at the first knot [rad/s].
-    cells : array, shape (n, 4)
-        Written: length [rad], and greatest speed, acceleration and jerk along the path.
-    speeds : array, shape (n + 1,)
-        Written [rad/s].
-
-    Returns
-    -------
-    float
-        [s]; infinity where the arm cannot slow down in time from `v_start`.
-
+    directions, turns (n, dof): of the segment of each cell, the direction at its begin, and the
+    change of direction to its end; places (n, 3): as `place` of `bound_derivatives`; limits
+    (3, dof): velocity, acceleration, jerk; v_start: speed at the first knot [rad/s]. cells (n, 4)
+    are written in rad, and speeds (n + 1,) [rad/s].
     """
     n, dof = directions.shape
-    q_s = np.empty((3, dof))
-    squares = np.empty(n + 1)
+    q_s, squares = np.empty((3, dof)), np.full(n + 1, math.inf)
     squares[0], squares[n] = v_start * v_start, 0.0
-    for k in range(1, n):
-        squares[k] = math.inf
     for i in range(n):
         bound_derivatives(directions, turns, i, places[i], q_s)
         cells[i, LENGTH] = (places[i, 1] - places[i, 0]) * places[i, 2]

@@ -8,7 +8,7 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_INTS, VEC
 from rrth_planner.kernels.trajectory.lookahead import derivatives_on, S, TIME, time_after
-from rrth_planner.kernels.trajectory.stop_profile import A, J, LASTS, stop_s, V, X
+from rrth_planner.kernels.trajectory.stop_search import A, J, LASTS, stop_s, V, X
 
 # Points of a stop are no further apart, where that keeps it on its path, and no closer [s]:
 # between close points the jerk is mostly rounding, and between distant ones a jump of the jerk
@@ -108,15 +108,8 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
             x = phases[phase, X] + t * (v0 + t * (0.5 * a0 + t * j / 6.0))
             while cell < pieces.shape[0] - 1 and (cell < begin or rows[cell + 1, S] <= x):
                 cell += 1
-            time = time_after(
-                curves,
-                times,
-                pieces[cell],
-                rows[cell, TIME],
-                rows[cell + 1, TIME],
-                x - rows[cell, S],
-                limits,
-            )
+            begins, ends = rows[cell, TIME], rows[cell + 1, TIME]
+            time = time_after(curves, times, pieces[cell], begins, ends, x - rows[cell, S], limits)
             derivatives_on(curves, times, pieces[cell], time, states)
             vv, va = 0.0, 0.0
             for k in range(dof):
@@ -133,9 +126,9 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
 
 
 @kernel(boolean(VEC, CUBE, float64, MAT))
-def is_within(points, states, begin, most):
+def is_within(points, stop, begin, most):
     """
-    Return whether the quintics through the points that come after `begin` keep limits, (3, dof).
+    Return whether the pieces of a stop that end after `begin` keep limits, (3, dof).
 
     As `parameterization.limit_ratio`: between two of the instants, h apart, a function f is no
     greater than there by more than h^2 / 8 max|f''|.
@@ -146,13 +139,10 @@ def is_within(points, states, begin, most):
             continue
         T = points[i + 1] - points[i]
         for k in range(most.shape[1]):
-            c1, c2 = states[1, i, k] * T, 0.5 * states[2, i, k] * T * T
-            p = states[0, i + 1, k] - states[0, i, k] - c1 - c2
-            v = states[1, i + 1, k] * T - c1 - 2.0 * c2
-            a = states[2, i + 1, k] * T * T - 2.0 * c2
-            c3, c4, c5 = 10 * p - 4 * v + 0.5 * a, -15 * p + 7 * v - a, 6 * p - 3 * v + 0.5 * a
+            c0, c1, c2 = stop[i, 0, k], stop[i, 1, k], stop[i, 2, k]
+            c3, c4, c5 = stop[i, 3, k], stop[i, 4, k], stop[i, 5, k]
             # Rounding of positions in a piece so short.
-            noise = ROUNDING * abs(states[0, i, k])
+            noise = ROUNDING * abs(c0)
             top = most[0, k] * ALLOWED * WITHIN * T - between * (
                 6 * abs(c3) + 24 * abs(c4) + 60 * abs(c5)
             )
@@ -172,31 +162,27 @@ def is_within(points, states, begin, most):
 
 
 @kernel(boolean(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, CUBE))
-def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, states):
+def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, stop):
     """
-    Return whether the quintics through the points of a stop, (3, n, dof), stay on its path.
+    Return whether a stop, in pieces (n - 1, 6, dof) between its points (n,), stays on its path.
 
     At each sample no joint is further from the path of the stop than `OFF_PATH`.
     """
-    n, dof = points.shape[0], states.shape[2]
-    between = np.empty(len(SHARES) * (n - 1))
-    for i in range(n - 1):
-        for k in range(len(SHARES)):
-            between[len(SHARES) * i + k] = points[i] + SHARES[k] * (points[i + 1] - points[i])
-    exact = np.empty((3, between.shape[0] + 1, dof))
+    n_pieces, _, dof = stop.shape
+    n = len(SHARES)
+    asked, exact = np.empty(n * n_pieces + 1), np.empty((3, n * n_pieces + 1, dof))
+    for i in range(n_pieces):
+        for k in range(n):
+            asked[n * i + k] = points[i] + SHARES[k] * (points[i + 1] - points[i])
     # The last time is taken as the end, where the stop is at rest.
-    asked = np.append(between, points[n - 1])
+    asked[n * n_pieces] = points[n_pieces]
     stop_states(curves, times, rows, pieces, phases, begin, limits, asked, exact)
-    for m in range(between.shape[0]):
-        i, u = m // len(SHARES), SHARES[m % len(SHARES)]
-        T = points[i + 1] - points[i]
+    for m in range(n * n_pieces):
+        i, u = m // n, SHARES[m % n]
         for k in range(dof):
-            c1, c2 = states[1, i, k] * T, 0.5 * states[2, i, k] * T * T
-            p = states[0, i + 1, k] - states[0, i, k] - c1 - c2
-            v = states[1, i + 1, k] * T - c1 - 2.0 * c2
-            a = states[2, i + 1, k] * T * T - 2.0 * c2
-            c3, c4, c5 = 10 * p - 4 * v + 0.5 * a, -15 * p + 7 * v - a, 6 * p - 3 * v + 0.5 * a
-            q = states[0, i, k] + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
+            c0, c1, c2 = stop[i, 0, k], stop[i, 1, k], stop[i, 2, k]
+            c3, c4, c5 = stop[i, 3, k], stop[i, 4, k], stop[i, 5, k]
+            q = c0 + u * (c1 + u * (c2 + u * (c3 + u * (c4 + u * c5))))
             if not abs(q - exact[0, m, k]) <= OFF_PATH:
                 return False
     return True
