@@ -9,7 +9,7 @@ import logging
 import os
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 import warnings
 
 import numba
@@ -55,11 +55,22 @@ FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 # rows of `contacts` were written (`edge_contacts.py`).
 CONTACTS = types.FunctionType(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 
-# A third: (edge check, contacts, resolution, chain, robot, obstacles, bounds, path, n, how) ->
-# number of waypoints of the path, made shorter in place; how: settings of its own.
-SHORTEN = types.FunctionType(
-    int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC)
-)
+
+class Space(NamedTuple):
+    """A world as searches hand it on; from Python all its arrays are read-only."""
+
+    functions: Any
+    resolution: float
+    robot: Any
+    obstacles: Any
+    bounds: Any
+
+
+SPACE = types.NamedTuple([READ_INTS, float64, MAT, MAT, MAT], Space)
+
+# A third: (space, path, n, how) -> number of waypoints of the path, made shorter in place; how:
+# settings of its own.
+SHORTEN = types.FunctionType(int64(SPACE, OUT_MAT, int64, VEC))
 
 # A fourth: (edge check, resolution, chain, robot, obstacles, bounds, target, path, n, finest) ->
 # by how much the path got shorter as its last waypoint moved along the goal manifold.

@@ -15,7 +15,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan
@@ -159,7 +158,7 @@ def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
     start = perf_counter()
     growths = scattered_growths(named.problem, options, seed)
     elapsed = perf_counter() - start
-    paths = [Path(g.waypoints) for g in growths if g.waypoints is not None]
+    paths = [g.path for g in growths if g.path is not None]
     is_valid = all(named.is_path_valid(path.waypoints) for path in paths)
     return {
         'status': (PlanStatus.SOLVED if paths else PlanStatus.SAMPLE_LIMIT).value,
@@ -168,7 +167,7 @@ def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
         'cost_final': min(path.length for path in paths) if paths else None,
         'draws_total': sum(g.n_samples for g in growths),
         'is_valid': is_valid if paths else None,
-        'ways': [None if g.waypoints is None else goes_over_the_top(g.waypoints) for g in growths],
+        'ways': [None if g.path is None else goes_over_the_top(g.path.waypoints) for g in growths],
     }
 
 

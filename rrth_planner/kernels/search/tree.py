@@ -9,7 +9,6 @@ from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
     CHAIN,
     EDGE_CHECK,
-    FREE_RADIUS,
     kernel,
     MAT,
     OUT_CUBE,
@@ -80,20 +79,6 @@ def steer(q_near, q_towards, step_size, q_new):
 def stay(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path, n, finest):
     """Leave the last waypoint where it is (`SLIDE`): the goal is a point."""
     return 0.0
-
-
-@kernel(float64(FREE_RADIUS, CHAIN, MAT, MAT, VEC, float64, float64))
-def adapted_step(free_radius, chain, robot, obstacles, q, step_size, clearance_gain):
-    """
-    Return the step from q: shorter where obstacles are near (after Cai, as the paper cites it).
-
-    clearance_gain times the free radius, between a tenth of step_size and step_size; a gain of 0
-    leaves step_size as it is.
-    """
-    if clearance_gain == 0.0:
-        return step_size
-    step = clearance_gain * free_radius(q, chain, robot, obstacles)
-    return min(step_size, max(step, 0.1 * step_size))
 
 
 @kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))

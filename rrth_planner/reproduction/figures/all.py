@@ -117,7 +117,7 @@ def draw_pictures(rows: Rows, extent: Extent, output: Path) -> dict[str, list[st
 def _scattered(name: str) -> list[Array | None]:
     """Return the paths of growths after each other, of one seed."""
     growths = scattered_growths(load_problem(TWO_WAYS).problem, SCATTERED[name], SEED)
-    return [growth.waypoints for growth in growths]
+    return [None if g.path is None else g.path.waypoints for g in growths]
 
 
 def _pair(rows: Rows, target: str) -> tuple[JointPath, JointPath]:
