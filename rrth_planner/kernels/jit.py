@@ -23,8 +23,8 @@ from rrth_planner.kernels.kept_code import KeptCode, private_folder
 from rrth_planner.kernels.slim_library import use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
-# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). What describes a world is
-# passed as single arguments: in a tuple it costs 6 to 16 ns more a call of an edge check.
+# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). An edge check is
+# passed single arguments: in a tuple it costs 6 to 16 ns more a call of an edge check.
 VEC = types.Array(float64, 1, 'C', readonly=True)
 MAT = types.Array(float64, 2, 'C', readonly=True)
 READ_INTS = types.Array(int64, 1, 'C', readonly=True)

@@ -79,20 +79,17 @@ def search(
 
 def growth_settings(options: GrowthOptions) -> list[float]:
     """Return the `settings` of a growth, entries as in `kernels.search.rrt`."""
-    club = [0.0, 0.0, 0.0]
+    club = (0.0, 0.0, 0.0)
     if isinstance(options, RRTHOptions):
-        club = [options.club_radius, options.club_count, options.club_probability]
-    return [*tree_settings(options), options.near_bias, *club]
-
-
-def tree_settings(options: TreeOptions) -> tuple[float, ...]:
-    """Return the first `settings` of any search, entries as in `kernels.search.space`."""
-    return (
+        club = (options.club_radius, options.club_count, options.club_probability)
+    return [
         options.step_size,
         options.clearance_gain,
         options.goal_bias,
         options.is_bidirectional,
-    )
+        options.near_bias,
+        *club,
+    ]
 
 
 def room_for(options: GrowthOptions, n_roots: int, previous: Sequence[Tree], budget: int) -> int:

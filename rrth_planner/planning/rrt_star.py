@@ -21,7 +21,7 @@ from rrth_planner.planning.options import (
 )
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
-from rrth_planner.planning.rrt import reuse, tree_settings
+from rrth_planner.planning.rrt import reuse
 
 # Samples between two checks of the clock.
 BATCH = 500
@@ -109,9 +109,18 @@ def search(
     elif isinstance(options, RRTStarSmartOptions):
         advance, ratio = rrt_star_smart.advance, options.biasing_ratio
     radius = options.rewire_factor * optimal_radius(world.bounds)
-    settings = np.array([*tree_settings(options), radius, ratio])
+    settings = np.array(
+        [
+            options.step_size,
+            options.clearance_gain,
+            options.goal_bias,
+            options.is_bidirectional,
+            radius,
+            ratio,
+        ]
+    )
     cost = first_time = np.inf
-    history: tuple[list[float], list[int], list[float]] = [], [], []
+    history: list[tuple[float, int, float]] = []
     drawn, stopped, is_cut, bits = 0, None, False, random_state(rng)
     while drawn < options.max_samples:
         stopped = deadline.status()
@@ -131,8 +140,7 @@ def search(
         if len(falls):
             moments = before + (falls + 1) * ((after - before) / len(costs))
             found = costs[falls], drawn + 1 + falls, moments
-            for column, more in zip(history, found, strict=True):
-                column.extend(more.tolist())
+            history.extend(zip(*[column.tolist() for column in found], strict=True))
             cost = float(costs[falls[-1]])
         drawn += len(costs)
         if cost < np.inf and first_time == np.inf:
@@ -144,9 +152,9 @@ def search(
         status=(stopped or PlanStatus.SAMPLE_LIMIT) if best_path is None else PlanStatus.SOLVED,
         path=None if best_path is None else Path(best_path),
         trees=trees.grown(),
-        cost_history=tuple(history[0]),
-        sample_history=tuple(history[1]),
-        time_history=tuple(history[2]),
+        cost_history=tuple([row[0] for row in history]),
+        sample_history=tuple([row[1] for row in history]),
+        time_history=tuple([row[2] for row in history]),
         n_samples=drawn,
         planning_time=deadline.elapsed(),
         is_reproducible=stopped is None and not is_cut,

@@ -10,7 +10,7 @@ from rrth_planner.kernels.jit import kernel, N_GOALS
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.rrt_star import extend, STAR_SIGNATURE
 from rrth_planner.kernels.search.sampling import draw_informed, draw_uniform
-from rrth_planner.kernels.search.space import BIAS, TWO_TREES
+from rrth_planner.kernels.search.space import BIAS, borrowed, TWO_TREES
 from rrth_planner.kernels.vectors import copy
 
 
@@ -23,7 +23,7 @@ def advance(space, settings, shortened, rng, tree_q, links, costs, sizes, meetin
     2014, algorithm 2). history (n,): cost of the best path after each draw.
     `shortened` is not used.
     """
-    is_bidirectional = settings[TWO_TREES] != 0.0
+    space, is_bidirectional = borrowed(space), settings[TWO_TREES] != 0.0
     q = np.empty(tree_q.shape[2])
     for draw in range(history.shape[0]):
         side = draw & 1 if is_bidirectional else 0

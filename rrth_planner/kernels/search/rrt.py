@@ -19,7 +19,14 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.sampling import draw_informed, draw_near, draw_uniform
-from rrth_planner.kernels.search.space import adapted_step, BIAS, is_free, STEP, TWO_TREES
+from rrth_planner.kernels.search.space import (
+    adapted_step,
+    BIAS,
+    borrowed,
+    is_free,
+    STEP,
+    TWO_TREES,
+)
 from rrth_planner.kernels.search.tree import nearest, steer
 from rrth_planner.kernels.vectors import copy, distance
 
@@ -52,6 +59,7 @@ def advance(space, settings, best_cost, club, n_draws, rng, tree_q, parents, siz
     shorten a path of best_cost are not made. settings[NEAR]: chance that a draw is near an end,
     where a tree that grows from there fails more often; it falls as the trees grow.
     """
+    space = borrowed(space)
     bounds, is_bidirectional = space.bounds, settings[TWO_TREES] != 0.0
     dof, capacity = tree_q.shape[2], tree_q.shape[1]
     q, q_new = np.empty(dof), np.empty(dof)

@@ -26,7 +26,7 @@ from rrth_planner.kernels.jit import (
 from rrth_planner.kernels.search.path_shortening import shorten_and_slide
 from rrth_planner.kernels.search.rrt import advance as grow
 from rrth_planner.kernels.search.shortcut import LEAST_GAIN
-from rrth_planner.kernels.search.space import is_free
+from rrth_planner.kernels.search.space import borrowed, is_free
 from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
@@ -102,6 +102,7 @@ def go_straight(
     goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
     first n_bent are known to have no free edge. state[END]: whether no other path can be shorter.
     """
+    space = borrowed(space)
     for i in range(n_bent, goals.shape[0]):
         if is_free(space, q_start, goals[i]):
             copy(q_start, paths[WORK, 0])
@@ -162,6 +163,7 @@ def advance(
     where a shorter path is possible. Of the first paths only the shortest is shortened finely.
     tree_q (2, 2, capacity, dof): the growing pair of trees, and the pair of the best path.
     """
+    space = borrowed(space)
     shorten, slide_goal, how = as_shorten(shorten_at), as_slide(slide_at), settings[HOW:]
     tree_q, parents, sizes, meeting, club = growth
     while state[END] == RUNNING:

@@ -22,7 +22,14 @@ from rrth_planner.kernels.jit import (
 )
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.sampling import draw_uniform
-from rrth_planner.kernels.search.space import adapted_step, BIAS, is_free, STEP, TWO_TREES
+from rrth_planner.kernels.search.space import (
+    adapted_step,
+    BIAS,
+    borrowed,
+    is_free,
+    STEP,
+    TWO_TREES,
+)
 from rrth_planner.kernels.search.tree import nearest, squared_distances, steer
 from rrth_planner.kernels.vectors import copy, distance
 
@@ -228,7 +235,7 @@ def advance(space, settings, shortened, rng, tree_q, links, costs, sizes, meetin
 
     `shortened` is not used.
     """
-    is_bidirectional = settings[TWO_TREES] != 0.0
+    space, is_bidirectional = borrowed(space), settings[TWO_TREES] != 0.0
     q = np.empty(tree_q.shape[2])
     for draw in range(history.shape[0]):
         side = draw & 1 if is_bidirectional else 0

@@ -10,7 +10,7 @@ from rrth_planner.kernels.jit import kernel, N_GOALS, OUT_MAT, SPACE
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.rrt_star import extend, RATIO, STAR_SIGNATURE, trace_path
 from rrth_planner.kernels.search.sampling import draw_ball, draw_uniform
-from rrth_planner.kernels.search.space import BIAS, is_free, STEP, TWO_TREES
+from rrth_planner.kernels.search.space import BIAS, borrowed, is_free, STEP, TWO_TREES
 from rrth_planner.kernels.vectors import copy, path_length
 
 
@@ -42,14 +42,15 @@ def advance(space, settings, shortened, rng, tree_q, links, costs, sizes, meetin
     path is kept in `shortened`, its inner waypoints are the beacons: one in settings[RATIO] draws
     of each tree comes from a ball of half a step round one of them (Nasir et al. 2013).
     """
-    is_bidirectional = settings[TWO_TREES] != 0.0
+    space, is_bidirectional = borrowed(space), settings[TWO_TREES] != 0.0
+    ratio = int64(settings[RATIO])
     q, path = np.empty(tree_q.shape[2]), np.empty(shortened.shape)
     for draw in range(history.shape[0]):
         side = draw & 1 if is_bidirectional else 0
         # Counted for each tree: an even bias would leave one of them without beacons.
         turn = draw // 2 if is_bidirectional else draw
         n_beacons = int64(best[2]) - 2
-        if n_beacons > 0 and turn % settings[RATIO] == 0.0:
+        if n_beacons > 0 and turn % ratio == 0:
             beacon = 1 + int64(uniform(rng) * n_beacons)
             draw_ball(shortened[beacon], 0.5 * settings[STEP], space.bounds, rng, q)
         elif uniform(rng) < settings[BIAS]:

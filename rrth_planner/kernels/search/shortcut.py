@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Path shortcutting by the three steps of RRT-H (Zou et al. 2024, section 2, corrected)."""
 
-from numba.core.types import boolean, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
-from rrth_planner.kernels.jit import kernel, OUT_MAT, SPACE, VEC
+from rrth_planner.kernels.jit import kernel, OUT_MAT, SPACE
 from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
@@ -67,16 +67,6 @@ def shortcut_forward(space, path, n, spacing):
     return n
 
 
-@kernel(boolean(SPACE, OUT_MAT, int64, VEC, VEC))
-def is_corner_free(space, path, i, q_in, q_out):
-    """Return whether waypoint i may be replaced by the chord q_in -> q_out: all three edges."""
-    return (
-        is_free(space, q_in, q_out)
-        and is_free(space, path[i - 1], q_in)
-        and is_free(space, q_out, path[i + 1])
-    )
-
-
 @kernel(int64(SPACE, OUT_MAT, int64, float64))
 def cut_corners(space, path, n, spacing):
     """
@@ -112,7 +102,12 @@ def cut_corners(space, path, n, spacing):
                 for k in range(dof):
                     q_in[k] = path[i, k] + s_in * (path[i - 1, k] - path[i, k])
                     q_out[k] = path[i, k] + s_out * (path[i + 1, k] - path[i, k])
-                if is_corner_free(space, path, i, q_in, q_out):
+                # The chord, and what is left of both edges.
+                if (
+                    is_free(space, q_in, q_out)
+                    and is_free(space, path[i - 1], q_in)
+                    and is_free(space, q_out, path[i + 1])
+                ):
                     low = at
                     share[0], share[1] = s_in, s_out
                 else:
