@@ -23,8 +23,8 @@ from rrth_planner.kernels.kept_code import KeptCode, private_folder
 from rrth_planner.kernels.slim_library import use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
-# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). An edge check is
-# passed single arguments: in a tuple it costs 6 to 16 ns more a call of an edge check.
+# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). Edge checks take what
+# describes a world as single arguments: in a tuple it costs them 6 to 16 ns more a call.
 VEC = types.Array(float64, 1, 'C', readonly=True)
 MAT = types.Array(float64, 2, 'C', readonly=True)
 READ_INTS = types.Array(int64, 1, 'C', readonly=True)
@@ -239,18 +239,14 @@ class FirstClass:
     def __init__(self, compiled: Any) -> None:
         self.compiled = compiled
         (self._signature,) = compiled.nopython_signatures
-        self._address = _get_wrapper_address(compiled, self._signature)
+        # Of the compiled code, for `functions`.
+        self.address = int(_get_wrapper_address(compiled, self._signature))
         # Where numba looks for the type of a value.
         self._numba_type_ = types.FunctionType(self._signature)
 
-    @property
-    def address(self) -> int:
-        """Address of the compiled code, for `functions`."""
-        return int(self._address)
-
     def __wrapper_address__(self) -> int:
         """Return the address of the compiled code, as numba's protocol asks."""
-        return int(self._address)
+        return self.address
 
     def signature(self) -> Any:
         """Return the signature, as numba's protocol asks."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.kernels.search import informed_rrt_star, rrt_star, rrt_star_smart
 from rrth_planner.kernels.search.random import random_state
+from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
@@ -81,7 +82,7 @@ class _Trees:
         """Return the waypoints of the best path of the trees, (n, dof); None: buffer too small."""
         a, b = self.meetings[int(self.best[1])]
         path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
-        n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)
+        n = trace_path(self.tree_q, self.links[:, rrt_star.PARENT], a, b, path)
         return path[:n].copy() if n else None
 
     def grown(self) -> GrownTrees:

@@ -157,7 +157,7 @@ def advance(
     history,
 ):
     """
-    Grow and shorten paths until state[END] tells why it ended, or until settings[UNTIL].
+    Grow and shorten paths until state[END] says why it ended, or until settings[UNTIL].
 
     Growths after the first path avoid the path club, the points of all raw paths, and draw only
     where a shorter path is possible. Of the first paths only the shortest is shortened finely.

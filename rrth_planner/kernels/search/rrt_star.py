@@ -161,32 +161,6 @@ def find_best(tree_q, costs, sizes, meetings, best):
             best[0], best[1] = cost, row
 
 
-@kernel(int64(OUT_CUBE, OUT_INT_CUBE, int64, int64, OUT_MAT))
-def trace_path(tree_q, links, from_start, from_goal, path):
-    """Write the path root - from_start - from_goal - root; return its waypoints, 0: no room."""
-    n = 0
-    i = from_start
-    while i >= 0:
-        n += 1
-        i = links[0, PARENT, i]
-    if n >= path.shape[0]:
-        return 0
-    i = from_start
-    for row in range(n - 1, -1, -1):
-        copy(tree_q[0, i], path[row])
-        i = links[0, PARENT, i]
-    i = from_goal
-    if distance(path[n - 1], tree_q[1, i]) == 0.0:
-        i = links[1, PARENT, i]
-    while i >= 0:
-        if n >= path.shape[0]:
-            return 0
-        copy(tree_q[1, i], path[n])
-        n += 1
-        i = links[1, PARENT, i]
-    return n
-
-
 @kernel(boolean(SPACE, VEC, int64, VEC, *TREES))
 def extend(space, settings, side, q, tree_q, links, costs, sizes, meetings, best):
     """

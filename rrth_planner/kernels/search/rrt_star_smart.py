@@ -8,9 +8,10 @@ from numba.core.types import int64
 import numpy as np
 from rrth_planner.kernels.jit import kernel, N_GOALS, OUT_MAT, SPACE
 from rrth_planner.kernels.search.random import uniform
-from rrth_planner.kernels.search.rrt_star import extend, RATIO, STAR_SIGNATURE, trace_path
+from rrth_planner.kernels.search.rrt_star import extend, PARENT, RATIO, STAR_SIGNATURE
 from rrth_planner.kernels.search.sampling import draw_ball, draw_uniform
 from rrth_planner.kernels.search.space import BIAS, borrowed, is_free, STEP, TWO_TREES
+from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, path_length
 
 
@@ -62,7 +63,7 @@ def advance(space, settings, shortened, rng, tree_q, links, costs, sizes, meetin
         # Reused trees may have brought a path along.
         if is_better or best[0] < math.inf and best[3] == math.inf:
             row = int64(best[1])
-            n = trace_path(tree_q, links, meetings[row, 0], meetings[row, 1], path)
+            n = trace_path(tree_q, links[:, PARENT], meetings[row, 0], meetings[row, 1], path)
             n = skip_waypoints(space, path, n)
             length = path_length(path, n)
             if n > 0 and length < best[3]:

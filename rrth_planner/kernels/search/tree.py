@@ -4,6 +4,7 @@
 
 import math
 
+from numba import types
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
@@ -12,7 +13,6 @@ from rrth_planner.kernels.jit import (
     kernel,
     MAT,
     OUT_CUBE,
-    OUT_INT_MAT,
     OUT_MAT,
     OUT_VEC,
     VEC,
@@ -81,7 +81,7 @@ def stay(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path
     return 0.0
 
 
-@kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))
+@kernel(int64(OUT_CUBE, types.Array(int64, 2, 'A', readonly=True), int64, int64, OUT_MAT))
 def trace_path(tree_q, parents, from_start, from_goal, path):
     """
     Write the path root - from_start - from_goal - root of two trees; return its waypoints.
