@@ -76,6 +76,7 @@ class World:
     lanes: Any = ()
 
     functions: Any = field(init=False)
+    space: jit.Space = field(init=False)
 
     def __post_init__(self) -> None:
         """Validate, and look up the addresses of the seams, entries as in `kernels.jit`."""
@@ -85,6 +86,10 @@ class World:
             )
         found = jit.addresses(self.edge_check, self.chain, self.free_radius, self.contacts)
         object.__setattr__(self, 'functions', found)
+        arrays = [array.view() for array in (self.robot, self.obstacles, self.bounds)]
+        for array in arrays:
+            array.setflags(write=False)
+        object.__setattr__(self, 'space', jit.Space(found, float(self.resolution), *arrays))
 
     @property
     def ray_length(self) -> float:

@@ -9,7 +9,7 @@ import logging
 import os
 from pathlib import Path
 import sys
-from typing import Any
+from typing import Any, NamedTuple
 import warnings
 
 import numba
@@ -22,8 +22,8 @@ import numpy as np
 from rrth_planner.kernels.kept_code import KeptCode, private_folder, use_slim_libraries
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
-# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). What describes a world is
-# passed as single arguments: in a tuple it costs 6 to 16 ns more a call of an edge check.
+# a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). Edge checks take what
+# describes a world as single arguments: in a tuple it costs them 6 to 16 ns more a call.
 VEC = types.Array(float64, 1, 'C', readonly=True)
 MAT = types.Array(float64, 2, 'C', readonly=True)
 READ_INTS = types.Array(int64, 1, 'C', readonly=True)
@@ -55,11 +55,22 @@ FREE_RADIUS = types.FunctionType(float64(VEC, CHAIN, MAT, MAT))
 # rows of `contacts` were written (`edge_contacts.py`).
 CONTACTS = types.FunctionType(int64(VEC, VEC, CHAIN, MAT, MAT, OUT_MAT))
 
-# A third: (edge check, contacts, resolution, chain, robot, obstacles, bounds, path, n, how) ->
-# number of waypoints of the path, made shorter in place; how: settings of its own.
-SHORTEN = types.FunctionType(
-    int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC)
-)
+
+class Space(NamedTuple):
+    """A world as searches hand it on; from Python all its arrays are read-only."""
+
+    functions: Any
+    resolution: float
+    robot: Any
+    obstacles: Any
+    bounds: Any
+
+
+SPACE = types.NamedTuple([READ_INTS, float64, MAT, MAT, MAT], Space)
+
+# A third: (space, path, n, how) -> number of waypoints of the path, made shorter in place; how:
+# settings of its own.
+SHORTEN = types.FunctionType(int64(SPACE, OUT_MAT, int64, VEC))
 
 # A fourth: (edge check, resolution, chain, robot, obstacles, bounds, target, path, n, finest) ->
 # by how much the path got shorter as its last waypoint moved along the goal manifold.
@@ -213,13 +224,14 @@ class FirstClass:
     def __init__(self, compiled: Any) -> None:
         self.compiled = compiled
         (self._signature,) = compiled.nopython_signatures
-        self._address = _get_wrapper_address(compiled, self._signature)
+        # Of the compiled code, for `functions`.
+        self.address = int(_get_wrapper_address(compiled, self._signature))
         # Where numba looks for the type of a value.
         self._numba_type_ = types.FunctionType(self._signature)
 
     def __wrapper_address__(self) -> int:
         """Return the address of the compiled code, as numba's protocol asks."""
-        return int(self._address)
+        return self.address
 
     def signature(self) -> Any:
         """Return the signature, as numba's protocol asks."""

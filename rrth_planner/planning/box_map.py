@@ -27,7 +27,6 @@ class BoxMap:
 
     Parameters
     ----------
-    name : str
     bounds : array_like, shape (2, dof)
         Lower and upper corner of the map, in 1 to 64 dimensions. A box at the border extends
         beyond it, so no path passes there.
@@ -56,10 +55,10 @@ class BoxMap:
         dof = bounds.shape[1]
         if not 1 <= dof <= MAX_DOF:
             raise SceneError(f'{name}: bounds of {dof} dimensions, expected 1 to {MAX_DOF}')
-        obstacles = np.reshape(self.obstacles, (-1, 2, dof)) if len(self.obstacles) == 0 else None
+        obstacles = self.obstacles if len(self.obstacles) else np.empty((0, 2, dof))
         for field, value, shape in (
             ('bounds', bounds, (2, dof)),
-            ('obstacles', self.obstacles if obstacles is None else obstacles, (None, 2, dof)),
+            ('obstacles', obstacles, (None, 2, dof)),
             ('start', self.start, (dof,)),
             ('goal', self.goal, (dof,)),
         ):

@@ -22,7 +22,6 @@ class Workspace:
 
     Parameters
     ----------
-    dof : int
     capacity : int
         Nodes that each tree has room for.
 

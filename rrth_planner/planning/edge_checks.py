@@ -25,7 +25,6 @@ def sampled(world: World, resolution: float) -> World:
 
     Parameters
     ----------
-    world : World
     resolution : float
         Spacing of the checks along an edge [rad].
 
@@ -42,7 +41,6 @@ def by_check_points(world: World, resolution: float) -> World:
 
     Parameters
     ----------
-    world : World
     resolution : float
         Spacing of the checks along an edge [rad].
 

@@ -51,7 +51,6 @@ def plan(
 
     Parameters
     ----------
-    problem : PlanningProblem
     options : TreeOptions
         Its class is the choice of the algorithm.
     rng : numpy.random.Generator

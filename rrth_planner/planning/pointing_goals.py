@@ -147,8 +147,6 @@ def goal_configurations(
     ----------
     arm : ArmModel
         Passes `check_pointing_arm`.
-    goal : PointingGoal
-    world : World
     q_near : ndarray, shape (dof,)
         [rad].
     n_draws : int
@@ -193,8 +191,6 @@ def pointing_problem(
 
     Parameters
     ----------
-    arm : ArmModel
-    goal : PointingGoal
     world : World
         Of that arm.
     q_start : ndarray, shape (dof,)

@@ -23,7 +23,6 @@ class PlanningProblem:
 
     Parameters
     ----------
-    world : World
     q_start : array_like, shape (dof,)
         A valid configuration [rad].
     q_goals : array_like, shape (n, dof)

@@ -18,7 +18,7 @@ from rrth_planner.planning.deadline import Deadline
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.result import PlanResult, Tree
-from rrth_planner.planning.rrt import grown_trees, plant, room_for
+from rrth_planner.planning.rrt import grown_trees, growth_settings, plant, room_for
 
 SHORTEN = jit.first_class(elastic_band.shorten)
 # Time between two checks of the deadline [s].
@@ -42,51 +42,35 @@ def search(
     stopped = deadline.status()
     if stopped is not None:
         return PlanResult(status=stopped, path=None, is_reproducible=False)
-    world = problem.world
     n_roots = min(len(problem.q_goals), rrt_h.MAX_ROOTS)
     budget = max(options.max_samples, options.club_budget)
     room = workspace(len(problem.q_start), room_for(options, n_roots, previous, budget))
+    settings = _settings(options, deadline)
     given = (
-        world.functions,
+        problem.world.space,
         jit.address(shorten),
         jit.address(problem.slide_goal),
-        world.resolution,
-        world.robot,
-        world.obstacles,
-        world.bounds,
         problem.target,
         problem.q_start,
         problem.q_goals,
+        settings,
     )
-    settings = _settings(options, deadline)
-    rrt_h.go_straight(*given, problem.n_bent, settings, room.paths, room.state, room.history)
+    left = room.paths, room.state, room.history
+    rrt_h.go_straight(*given, problem.n_bent, *left)
     is_straight = room.state[rrt_h.N_BEST] > 0
     settings[rrt_h.ATTEMPTS] = options.club_attempts + (not is_straight)
-    if is_straight and _is_best(problem, room):
-        room.state[rrt_h.END] = rrt_h.DONE
-    elif previous and settings[rrt_h.ATTEMPTS] > 0:
-        plant(problem, problem.q_goals[:n_roots], options, room, previous)
+    is_done = room.state[rrt_h.END] == rrt_h.DONE
+    if previous and not is_done and settings[rrt_h.ATTEMPTS] > 0:
+        plant(problem, n_roots, options, room, previous)
         room.state[rrt_h.GROWING] = room.state[rrt_h.BEGUN] = 1
-    is_done = room.state[rrt_h.END] != rrt_h.RUNNING
     bits = None if is_done else random_state(rng)
+    growth = room.tree_q, room.parents, room.sizes, room.meeting, room.club
     while room.state[rrt_h.END] == rrt_h.RUNNING:
         stopped = deadline.status()
         if stopped is not None:
             break
-        rrt_h.advance(
-            *given,
-            settings,
-            deadline.within(SLICE),
-            bits,
-            room.tree_q,
-            room.parents,
-            room.sizes,
-            room.meeting,
-            room.club,
-            room.paths,
-            room.state,
-            room.history,
-        )
+        settings[rrt_h.UNTIL] = deadline.within(SLICE)
+        rrt_h.advance(*given, bits, growth, *left)
     return _result(problem, options, deadline, room, stopped, previous if is_straight else ())
 
 
@@ -97,27 +81,15 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
         how = (options.corner_spacing, 0.0, 0.0, options.target_spacing, options.check_spacing)
     return np.array(
         [
-            options.step_size,
-            options.clearance_gain,
-            options.goal_bias,
-            options.near_bias,
-            options.is_bidirectional,
-            options.club_radius,
-            options.club_count,
-            options.club_probability,
+            *growth_settings(options),
             options.max_samples,
             options.club_budget,
             0.0,
             deadline.start + options.improve_time if options.improve_time > 0.0 else -np.inf,
+            0.0,
             *how,
         ]
     )
-
-
-def _is_best(problem: PlanningProblem, room: Workspace) -> bool:
-    """Return whether no goal is near enough for a path shorter than the one that is known."""
-    cost = room.history[room.state[rrt_h.N_HISTORY] - 1, rrt_h.COST]
-    return rrt_h.count_useful(problem.q_goals, problem.q_start, cost) == 0
 
 
 def _result(

@@ -7,9 +7,10 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.kernels.search import informed_rrt_star, rrt_star, rrt_star_smart, tree_reuse
+from rrth_planner.kernels.search import informed_rrt_star, rrt_star, rrt_star_smart
 from rrth_planner.kernels.search.random import random_state
-from rrth_planner.model.arrays import Array, check_dof
+from rrth_planner.kernels.search.tree import trace_path
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.buffers import MAX_NODES, MAX_WAYPOINTS
@@ -21,6 +22,7 @@ from rrth_planner.planning.options import (
 )
 from rrth_planner.planning.problem import PlanningProblem
 from rrth_planner.planning.result import GrownTrees, PlanResult, Tree
+from rrth_planner.planning.rrt import reuse
 
 # Samples between two checks of the clock.
 BATCH = 500
@@ -50,60 +52,37 @@ class _Trees:
         self.best = np.array([np.inf, -1.0, 0.0, np.inf])
         self.shortened = np.empty((MAX_WAYPOINTS, dof))
         self.is_bidirectional = options.is_bidirectional
-        for side, grown in enumerate(previous[: 2 if options.is_bidirectional else 1]):
-            self._reuse(problem, side, grown)
         if previous:
-            self._meet(problem, options)
+            self._reuse(problem, options, previous)
 
-    def _reuse(self, problem: PlanningProblem, side: int, old: Tree) -> None:
-        """Begin with the branches of an earlier tree that are still free."""
-        check_dof(old.nodes, len(problem.q_start), 'previous')
-        world, n_roots = problem.world, int(self.sizes[side])
-        parents = np.full(self.tree_q.shape[1], -1, dtype=np.int64)
-        n = tree_reuse.transplant(
-            world.edge_check,
-            world.resolution,
-            world.chain,
-            world.robot,
-            world.obstacles,
-            old.nodes,
-            old.parents,
-            n_roots,
-            self.tree_q[side],
-            parents,
-        )
-        for i in range(n_roots, n):
-            parent = parents[i]
-            self.links[side, rrt_star.CHILD, i] = -1
-            rrt_star.attach(self.links[side], i, parent)
-            step = np.linalg.norm(self.tree_q[side, i] - self.tree_q[side, parent])
-            self.costs[side, i] = self.costs[side, parent] + step
-        self.sizes[side] = n
-
-    def _meet(self, problem: PlanningProblem, options: RRTStarOptions) -> None:
-        """Search for a first path in the reused trees."""
-        world, meeting = problem.world, np.full(2, -1, dtype=np.int64)
-        tree_reuse.join(
-            world.edge_check,
-            world.resolution,
-            world.chain,
-            world.robot,
-            world.obstacles,
-            options.step_size,
-            self.tree_q,
-            self.sizes,
-            meeting,
-        )
+    def _reuse(
+        self, problem: PlanningProblem, options: RRTStarOptions, previous: Sequence[Tree]
+    ) -> None:
+        """Begin with what is still free of earlier trees, and the path in them, if any."""
+        first, parents = self.sizes[:2].tolist(), np.empty(self.costs.shape, dtype=np.int64)
+        meeting = np.empty(2, dtype=np.int64)
+        reuse(problem, options, previous, self.tree_q, parents, self.sizes, meeting)
+        for side in range(2):
+            for i in range(first[side], self.sizes[side]):
+                parent = parents[side, i]
+                self.links[side, rrt_star.CHILD, i] = -1
+                rrt_star.attach(self.links[side], i, parent)
+                step = np.linalg.norm(self.tree_q[side, i] - self.tree_q[side, parent])
+                self.costs[side, i] = self.costs[side, parent] + step
         if meeting[0] >= 0:
             self.meetings[0] = meeting
             self.sizes[2] = 1
             rrt_star.find_best(self.tree_q, self.costs, self.sizes, self.meetings, self.best)
 
+    def arrays(self) -> tuple[Any, ...]:
+        """Return the arrays of the trees, in the order of `kernels.search.rrt_star.TREES`."""
+        return self.tree_q, self.links, self.costs, self.sizes, self.meetings, self.best
+
     def path(self) -> Array | None:
         """Return the waypoints of the best path of the trees, (n, dof); None: buffer too small."""
         a, b = self.meetings[int(self.best[1])]
         path = np.empty((MAX_WAYPOINTS, self.tree_q.shape[2]))
-        n = rrt_star.trace_path(self.tree_q, self.links, a, b, path)
+        n = trace_path(self.tree_q, self.links[:, rrt_star.PARENT], a, b, path)
         return path[:n].copy() if n else None
 
     def grown(self) -> GrownTrees:
@@ -125,18 +104,25 @@ def search(
     """Return the best path after `max_samples` draws, or after `improve_time` since the first."""
     world = problem.world
     trees = _Trees(problem, options, previous)
-    is_smart = isinstance(options, RRTStarSmartOptions)
-    bias = options.biasing_ratio if isinstance(options, RRTStarSmartOptions) else 1
-    advance = rrt_star.advance
+    advance, ratio, is_smart = rrt_star.advance, 1, isinstance(options, RRTStarSmartOptions)
     if isinstance(options, InformedRRTStarOptions):
         advance = informed_rrt_star.advance
-    elif is_smart:
-        advance = rrt_star_smart.advance
+    elif isinstance(options, RRTStarSmartOptions):
+        advance, ratio = rrt_star_smart.advance, options.biasing_ratio
     radius = options.rewire_factor * optimal_radius(world.bounds)
-    cost = np.inf
-    history: list[tuple[Array, Any, Array]] = []
+    settings = np.array(
+        [
+            options.step_size,
+            options.clearance_gain,
+            options.goal_bias,
+            options.is_bidirectional,
+            radius,
+            ratio,
+        ]
+    )
+    cost = first_time = np.inf
+    history: list[tuple[float, int, float]] = []
     drawn, stopped, is_cut, bits = 0, None, False, random_state(rng)
-    first_time = np.inf
     while drawn < options.max_samples:
         stopped = deadline.status()
         if stopped is not None:
@@ -148,38 +134,16 @@ def search(
             break
         before = deadline.elapsed()
         costs = np.empty(min(BATCH, options.max_samples - drawn))
-        made = advance(
-            world.functions,
-            world.resolution,
-            world.robot,
-            world.obstacles,
-            world.bounds,
-            options.step_size,
-            options.clearance_gain,
-            options.goal_bias,
-            radius,
-            options.is_bidirectional,
-            bias,
-            trees.shortened,
-            len(costs),
-            bits,
-            trees.tree_q,
-            trees.links,
-            trees.costs,
-            trees.sizes,
-            trees.meetings,
-            trees.best,
-            costs,
-        )
+        advance(world.space, settings, trees.shortened, bits, *trees.arrays(), costs)
         after = deadline.elapsed()
         # The draws of this batch after which the path was shorter than ever before.
-        costs = costs[:made]
         falls = np.flatnonzero(costs < np.append(cost, costs[:-1]))
         if len(falls):
-            moments = before + (falls + 1) * ((after - before) / made)
-            history.append((costs[falls], drawn + 1 + falls, moments))
+            moments = before + (falls + 1) * ((after - before) / len(costs))
+            found = costs[falls], drawn + 1 + falls, moments
+            history.extend(zip(*[column.tolist() for column in found], strict=True))
             cost = float(costs[falls[-1]])
-        drawn += made
+        drawn += len(costs)
         if cost < np.inf and first_time == np.inf:
             first_time = after
     best_path: Array | None = None
@@ -189,9 +153,9 @@ def search(
         status=(stopped or PlanStatus.SAMPLE_LIMIT) if best_path is None else PlanStatus.SOLVED,
         path=None if best_path is None else Path(best_path),
         trees=trees.grown(),
-        cost_history=tuple([c for costs, _, _ in history for c in costs.tolist()]),
-        sample_history=tuple([n for _, draws, _ in history for n in draws.tolist()]),
-        time_history=tuple([t for _, _, moments in history for t in moments.tolist()]),
+        cost_history=tuple([row[0] for row in history]),
+        sample_history=tuple([row[1] for row in history]),
+        time_history=tuple([row[2] for row in history]),
         n_samples=drawn,
         planning_time=deadline.elapsed(),
         is_reproducible=stopped is None and not is_cut,

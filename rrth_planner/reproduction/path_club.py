@@ -9,7 +9,8 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.planning.deadline import Deadline
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.problem import PlanningProblem
-from rrth_planner.planning.rrt import grow, Growth
+from rrth_planner.planning.result import PlanResult
+from rrth_planner.planning.rrt import search
 
 # Above this height a path goes round by the top of the map.
 TOP = 85.0
@@ -27,18 +28,16 @@ class ScatterOptions(RRTHOptions):
 
 def scattered_growths(
     problem: PlanningProblem, options: ScatterOptions, seed: int
-) -> list[Growth]:
+) -> list[PlanResult]:
     """Return growths after each other, each kept away from the paths of those before it."""
     rng, club = np.random.default_rng(seed), np.empty((0, len(problem.q_start)))
-    growths: list[Growth] = []
+    growths: list[PlanResult] = []
     for _ in range(options.club_attempts + 1):
         deadline = Deadline(options.time_limit, lambda: False)
-        grown = grow(
-            problem, problem.q_goals, options, rng, deadline, club=club, budget=options.club_budget
-        )
+        grown = search(problem, options, rng, deadline, club=club, budget=options.club_budget)
         growths.append(grown)
-        if grown.waypoints is not None and options.club_radius > 0.0:
-            club = np.concatenate([club, grown.waypoints[1:-1]])
+        if grown.path is not None and options.club_radius > 0.0:
+            club = np.concatenate([club, grown.path.waypoints[1:-1]])
     return growths
 
 

@@ -16,7 +16,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.planning.options import TreeOptions
 from rrth_planner.planning.planner import plan
@@ -170,12 +169,12 @@ def _scattered(named: NamedProblem, options: ScatterOptions, seed: int) -> Row:
     start = perf_counter()
     growths = scattered_growths(named.problem, options, seed)
     elapsed = perf_counter() - start
-    paths = [Path(g.waypoints) for g in growths if g.waypoints is not None]
+    paths = [g.path for g in growths if g.path is not None]
     row: Row = {
         'status': (PlanStatus.SOLVED if paths else PlanStatus.SAMPLE_LIMIT).value,
         'time_total': elapsed,
         'draws_total': sum(g.n_samples for g in growths),
-        'ways': [None if g.waypoints is None else goes_over_the_top(g.waypoints) for g in growths],
+        'ways': [None if g.path is None else goes_over_the_top(g.path.waypoints) for g in growths],
     }
     if paths:
         row |= {

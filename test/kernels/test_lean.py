@@ -29,12 +29,10 @@ def shortened(world, waypoints, kernel, *how, room=64):
     """Return a path as a kernel shortens it."""
     path = np.full((room, waypoints.shape[1]), np.nan)
     path[: len(waypoints)] = waypoints
-    seam = (world.resolution, world.chain, world.robot, world.obstacles)
     if kernel is shortcut_path:
-        n = shortcut_path(world.edge_check, *seam, path, len(waypoints), SPACING, LEAST_GAIN)
+        n = shortcut_path(world.space, path, len(waypoints), SPACING, LEAST_GAIN)
     else:
-        seam = (world.edge_check, world.contacts, *seam, world.bounds)
-        n = shorten(*seam, path, len(waypoints), np.array([SPACING, *how, LEAST_GAIN]))
+        n = shorten(world.space, path, len(waypoints), np.array([SPACING, *how, LEAST_GAIN]))
     return path[:n]
 
 

@@ -34,7 +34,7 @@ def grow(world, q_start, q_goals, rng, budget, **options):
     room = buffers.workspace(4, rrt.room_for(chosen, len(q_goals), (), budget))
     room.tree_q[:] = np.nan
     never = Deadline(1000.0, lambda: False)
-    return rrt.grow(problem, problem.q_goals, chosen, rng, never, budget=budget), room
+    return rrt.search(problem, chosen, rng, never, budget=budget), room
 
 
 @pytest.fixture(scope='module')
@@ -55,7 +55,7 @@ def test_trees_are_rooted_acyclic_and_their_edges_free(blocked_pairs, near_bias,
         q_goals = np.stack([q_goal, free_configuration(rng, world)])
         grown, room = grow(world, q_start, q_goals, rng, 200, **options)
         assert 1 <= grown.n_samples <= 200
-        assert grown.stopped is None
+        assert grown.is_reproducible
         assert len(grown.trees) == 1 + is_bidirectional
         assert np.array_equal(grown.trees[0].nodes[0], q_start)
         assert np.array_equal(room.tree_q[0, 1, :2], q_goals)
@@ -71,11 +71,12 @@ def test_trees_are_rooted_acyclic_and_their_edges_free(blocked_pairs, near_bias,
                 assert np.linalg.norm(q - before) <= STEP + 1e-12
                 assert not edge_touches(arm, scene, MARGIN, RAY, before, q, 1e-3)
         assert np.isnan(room.tree_q[1]).all()
-        if grown.waypoints is None:
+        if grown.path is None:
+            assert grown.status is PlanStatus.SAMPLE_LIMIT
             assert grown.n_samples == 200
             continue
         n_met += 1
-        path = grown.waypoints
+        path = grown.path.waypoints
         assert np.array_equal(path[0], q_start)
         assert (path[-1] == q_goals).all(axis=1).any()
         # All but the edge at which the trees meet are edges of one of them.
@@ -148,11 +149,15 @@ def test_the_club_turns_away_only_points_in_a_crowd():
     club = np.zeros((3, 4))
     club[2, 0] = 0.45
     q, far = np.zeros(4), np.full(4, 3.0)
-    assert is_rejected_by_club(q, club, 0.5, 2, 1.0, rng)
-    assert not is_rejected_by_club(q, club, 0.5, 3, 1.0, rng)
-    assert not is_rejected_by_club(q, club, 0.4, 2, 1.0, rng)
-    assert not is_rejected_by_club(q, club, 0.5, 2, 0.0, rng)
-    assert not is_rejected_by_club(far, club, 0.5, 0, 1.0, rng)
-    assert not is_rejected_by_club(q, np.empty((0, 4)), 0.5, 0, 1.0, rng)
-    share = np.mean([is_rejected_by_club(q, club, 0.5, 2, 0.9, rng) for _ in range(4000)])
+
+    def is_rejected(q, club, *options):
+        return is_rejected_by_club(q, club, np.array([0.0, 0.0, 0.0, 0.0, 0.0, *options]), rng)
+
+    assert is_rejected(q, club, 0.5, 2, 1.0)
+    assert not is_rejected(q, club, 0.5, 3, 1.0)
+    assert not is_rejected(q, club, 0.4, 2, 1.0)
+    assert not is_rejected(q, club, 0.5, 2, 0.0)
+    assert not is_rejected(far, club, 0.5, 0, 1.0)
+    assert not is_rejected(q, np.empty((0, 4)), 0.5, 0, 1.0)
+    share = np.mean([is_rejected(q, club, 0.5, 2, 0.9) for _ in range(4000)])
     assert abs(share - 0.9) < 0.02

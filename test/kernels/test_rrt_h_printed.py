@@ -41,16 +41,11 @@ def plane(obstacles=BOX):
     )
 
 
-def seam(world):
-    """Return what the kernels ask of a world."""
-    return (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-
-
 def after(step, world, waypoints, *spacings):
     """Return the path after a step."""
     path = np.full((len(waypoints) + 60, len(waypoints[0])), np.nan)
     path[: len(waypoints)] = waypoints
-    return path[: step(*seam(world), path, len(waypoints), *spacings)]
+    return path[: step(world.space, path, len(waypoints), *spacings)]
 
 
 def all_steps(world, waypoints, least, targets, checks):
@@ -58,10 +53,7 @@ def all_steps(world, waypoints, least, targets, checks):
     path = np.full((len(waypoints) + 60, len(waypoints[0])), np.nan)
     path[: len(waypoints)] = waypoints
     how = np.array([least, 0.0, 0.0, targets, checks])
-    functions = seam(world)
-    n = SHORTEN(
-        functions[0], world.contacts, *functions[1:], world.bounds, path, len(waypoints), how
-    )
+    n = SHORTEN(world.space, path, len(waypoints), how)
     return path[:n]
 
 
@@ -69,11 +61,11 @@ def test_the_first_check_point_that_collides_is_told_and_the_start_is_none():
     world = plane()
     a, b = np.array([0.0, 0.0]), np.array([3.0, 4.0])
     # The line is inside from 1.4 / 3 to 1 / 2 of its length.
-    assert first_contact(*seam(world), a, b, FINE) == pytest.approx(12 / 25)
-    assert first_contact(*seam(world), a, b, 1.01) == 2.0
+    assert first_contact(world.space, a, b, FINE) == pytest.approx(12 / 25)
+    assert first_contact(world.space, a, b, 1.01) == 2.0
     inside = np.array([2.0, 1.0])
-    assert first_contact(*seam(world), a, inside, 9.0) == 1.0
-    assert first_contact(*seam(world), inside, b, 9.0) == 2.0
+    assert first_contact(world.space, a, inside, 9.0) == 1.0
+    assert first_contact(world.space, inside, b, 9.0) == 2.0
 
 
 def test_forward_the_last_visible_point_takes_the_place_of_the_middle_one():

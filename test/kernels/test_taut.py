@@ -28,8 +28,7 @@ def raw():
 def taut(world, waypoints, spacing=0.01, room=64, enough=LEAST_GAIN):
     path = np.full((room, 4), np.nan)
     path[: len(waypoints)] = waypoints
-    seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    n = shortcut_path(*seam, path, len(waypoints), spacing, enough)
+    n = shortcut_path(world.space, path, len(waypoints), spacing, enough)
     return path[:n]
 
 
@@ -105,7 +104,6 @@ def test_forward_goes_to_the_last_visible_point_whatever_is_how_thin(spacing, wi
     )
     world = map_world(box_map)
     path = np.array([[0.0, 0.0], [0.0, 4.0], [8.0, 4.0]])
-    seam = (world.edge_check, world.resolution, world.chain, world.robot, world.obstacles)
-    assert shortcut_forward(*seam, path, 3, spacing) == 3
+    assert shortcut_forward(world.space, path, 3, spacing) == 3
     assert path[1, 1] == 4.0
     assert 2.8 - spacing <= path[1, 0] <= 2.8 + 1e-5

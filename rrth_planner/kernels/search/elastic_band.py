@@ -7,17 +7,20 @@ import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.edge_contacts import GAP, GRADIENT, MULTIPLIER, SHARE
 from rrth_planner.kernels.jit import (
-    CHAIN,
-    CONTACTS,
-    EDGE_CHECK,
+    as_chain,
+    as_contacts,
+    CHAIN_AT,
+    CONTACTS_AT,
     kernel,
     MAT,
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
+    SPACE,
     VEC,
 )
 from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES, shortcut_path, SPACING
+from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Gap that is left at contacts, for the edge checks to succeed [m].
@@ -88,8 +91,8 @@ def relax(path, n, inverse, share, moves):
             moves[i, k] = share * (rest - path[i + 1, k])
 
 
-@kernel(int64(CONTACTS, CHAIN, MAT, MAT, MAT, MAT, int64, OUT_MAT, OUT_INTS, OUT_VEC, int64))
-def add_constraints(find, chain, robot, obstacles, path, moved, e, contacts, edges, least, n):
+@kernel(int64(SPACE, MAT, MAT, int64, OUT_MAT, OUT_INTS, OUT_VEC, int64))
+def add_constraints(space, path, moved, e, contacts, edges, least, n):
     """
     Append the linearized contact constraints of edge e; return the number of constraints.
 
@@ -97,7 +100,9 @@ def add_constraints(find, chain, robot, obstacles, path, moved, e, contacts, edg
     """
     if n >= contacts.shape[0]:
         return n
-    n_found = find(moved[e], moved[e + 1], chain, robot, obstacles, contacts[n:])
+    find, chain = as_contacts(space.functions[CONTACTS_AT]), as_chain(space.functions[CHAIN_AT])
+    free = contacts[n:]
+    n_found = find(moved[e], moved[e + 1], chain, space.robot, space.obstacles, free)
     for i in range(n, n + n_found):
         share = contacts[i, SHARE]
         edges[i] = e
@@ -191,12 +196,8 @@ def shift(bounds, path, n, moves, moved):
     return path_length(moved, n)
 
 
-@kernel(
-    int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, OUT_MAT, OUT_INTS)
-)
-def relax_band(
-    is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, contacts, edges
-):
+@kernel(int64(SPACE, OUT_MAT, int64, OUT_MAT, OUT_INTS))
+def relax_band(space, path, n, contacts, edges):
     """
     Move all corners of a path to where it is shorter, without entering a box.
 
@@ -205,15 +206,13 @@ def relax_band(
     checked before they are accepted. Returns the number of contacts, less than 0 where no such
     move was found.
     """
-    m, length = n - 2, path_length(path, n)
+    m, length, bounds = n - 2, path_length(path, n), space.bounds
     inverse, least = scratch.floats(SQUARE), scratch.floats(MAX_CONTACTS)
     moves, moved = np.empty((m, path.shape[1])), np.empty((n, path.shape[1]))
     invert_springs(path, n, inverse)
     n_found = 0
     for e in range(n - 1):
-        n_found = add_constraints(
-            find, chain, robot, obstacles, path, path, e, contacts, edges, least, n_found
-        )
+        n_found = add_constraints(space, path, path, e, contacts, edges, least, n_found)
     if n_found == 0:
         return -1
     n_own, share = n_found, 1.0
@@ -228,24 +227,14 @@ def relax_band(
                 continue
             if shift(bounds, path, n, moves, moved) > length * (1.0 - 1e-6):
                 break
-            is_free = True
+            is_allowed = True
             for e in range(n - 1):
-                if not is_edge_free(moved[e], moved[e + 1], resolution, chain, robot, obstacles):
-                    is_free = False
+                if not is_free(space, moved[e], moved[e + 1]):
+                    is_allowed = False
                     n_found = add_constraints(
-                        find,
-                        chain,
-                        robot,
-                        obstacles,
-                        path,
-                        moved,
-                        e,
-                        contacts,
-                        edges,
-                        least,
-                        n_found,
+                        space, path, moved, e, contacts, edges, least, n_found
                     )
-            if is_free:
+            if is_allowed:
                 for i in range(1, n - 1):
                     copy(moved[i], path[i])
                 return n_found
@@ -280,38 +269,24 @@ def insert_corner(path, n, contacts, edges, n_found):
     return n + 1
 
 
-@kernel(int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC))
-def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how):
+@kernel(int64(SPACE, OUT_MAT, int64, VEC))
+def shorten(space, path, n, how):
     """
     Alternate shortcuts and the elastic band until a path gets no shorter (`SHORTEN`).
 
     how: settings, entries as in `shortcut`.
     """
     spacing, enough = how[SPACING], how[ENOUGH]
-    n = shortcut_path(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough)
+    n = shortcut_path(space, path, n, spacing, enough)
     contacts = np.empty((MAX_CONTACTS, GRADIENT + path.shape[1]))
     edges = np.empty(MAX_CONTACTS, np.int64)
     length, has_new_corner = path_length(path, n), False
     for _ in range(int64(how[MOVES])):
         if n < 3 or n > MAX_CORNERS + 2:
             break
-        n_found = relax_band(
-            is_edge_free,
-            find,
-            resolution,
-            chain,
-            robot,
-            obstacles,
-            bounds,
-            path,
-            n,
-            contacts,
-            edges,
-        )
+        n_found = relax_band(space, path, n, contacts, edges)
         if n_found >= 0:
-            n = shortcut_path(
-                is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough
-            )
+            n = shortcut_path(space, path, n, spacing, enough)
         shorter = path_length(path, n)
         is_done = shorter > length * (1.0 - WORTH)
         length = shorter
@@ -328,7 +303,5 @@ def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
             break
     if has_new_corner:
         # A corner without a gain is removed again.
-        n = shortcut_path(
-            is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough
-        )
+        n = shortcut_path(space, path, n, spacing, enough)
     return n

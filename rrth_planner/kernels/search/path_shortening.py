@@ -2,17 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Path shortening, coarse at first and fine later, with goals that slide along the manifold."""
 
-from numba.core.types import float64, int64
+from numba.core.types import boolean, int64
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
-    CHAIN,
-    CONTACTS,
-    EDGE_CHECK,
+    as_chain,
+    as_edge_check,
+    CHAIN_AT,
+    EDGE_CHECK_AT,
     kernel,
-    MAT,
     OUT_MAT,
     SHORTEN,
     SLIDE,
+    SPACE,
     VEC,
 )
 from rrth_planner.kernels.search.shortcut import ENOUGH, MOVES
@@ -30,109 +31,29 @@ FINEST_SLIDE = 2e-3
 MAX_SLIDES, MAX_BAND_SLIDES, SLID = 30, 1, 1e-3
 
 
-@kernel(
-    int64(
-        EDGE_CHECK,
-        CONTACTS,
-        SHORTEN,
-        SLIDE,
-        CHAIN,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        VEC,
-        VEC,
-        OUT_MAT,
-        int64,
-    )
-)
-def shorten_coarsely(
-    is_edge_free,
-    find,
-    shorten,
-    slide_goal,
-    chain,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    target,
-    how,
-    path,
-    n,
-):
+@kernel(int64(SPACE, SHORTEN, SLIDE, VEC, VEC, boolean, OUT_MAT, int64))
+def shorten_and_slide(space, shorten, slide_goal, target, how, is_fine, path, n):
     """
-    Alternate shortcuts and slides of the goal until little is gained; return n.
+    Alternate shortening and slides of the goal until little is gained; return n.
 
-    Coarse where the elastic band follows later: enough to compare paths by length.
+    Coarse where the elastic band follows later: enough to compare paths by length. Fine: the
+    elastic band too, on a path that is coarsely shortened already.
     """
-    coarse = scratch.floats(N_HOW)
-    for i in range(N_HOW):
-        coarse[i] = how[i]
-    if how[MOVES] > 0.0:
-        coarse[MOVES], coarse[ENOUGH] = 0.0, LOOSE
-    for _ in range(MAX_SLIDES):
-        n = shorten(
-            is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, coarse
-        )
-        gain = slide_goal(
-            is_edge_free,
-            resolution,
-            chain,
-            robot,
-            obstacles,
-            bounds,
-            target,
-            path,
-            n,
-            FINEST_SLIDE,
-        )
-        if gain < SLID * path_length(path, n):
-            break
-    return n
-
-
-@kernel(
-    int64(
-        EDGE_CHECK,
-        CONTACTS,
-        SHORTEN,
-        SLIDE,
-        CHAIN,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        VEC,
-        VEC,
-        OUT_MAT,
-        int64,
-    )
-)
-def shorten_finely(
-    is_edge_free,
-    find,
-    shorten,
-    slide_goal,
-    chain,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    target,
-    how,
-    path,
-    n,
-):
-    """Apply the elastic band to a path from `shorten_coarsely`, and slide its goal; return n."""
-    if how[MOVES] == 0.0:
+    if is_fine and how[MOVES] == 0.0:
         return n
-    for _ in range(MAX_BAND_SLIDES):
-        n = shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
+    is_edge_free = as_edge_check(space.functions[EDGE_CHECK_AT])
+    chain = as_chain(space.functions[CHAIN_AT])
+    robot, obstacles, bounds = space.robot, space.obstacles, space.bounds
+    used = scratch.floats(N_HOW)
+    for i in range(N_HOW):
+        used[i] = how[i]
+    if not is_fine and how[MOVES] > 0.0:
+        used[MOVES], used[ENOUGH] = 0.0, LOOSE
+    for _ in range(MAX_BAND_SLIDES if is_fine else MAX_SLIDES):
+        n = shorten(space, path, n, used)
         gain = slide_goal(
             is_edge_free,
-            resolution,
+            space.resolution,
             chain,
             robot,
             obstacles,
@@ -144,4 +65,4 @@ def shorten_finely(
         )
         if gain < SLID * path_length(path, n):
             return n
-    return shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how)
+    return shorten(space, path, n, used) if is_fine else n

@@ -7,89 +7,47 @@ import math
 from numba.core.types import boolean, float64, int64
 import numpy as np
 from rrth_planner.kernels.jit import (
-    as_chain,
-    as_edge_check,
-    as_free_radius,
-    CHAIN_AT,
-    EDGE_CHECK_AT,
-    FREE_RADIUS_AT,
     kernel,
     MAT,
     N_GOALS,
     OUT_CUBE,
     OUT_INT_MAT,
     OUT_INTS,
-    READ_INTS,
     RNG,
+    SPACE,
     VEC,
 )
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.sampling import draw_informed, draw_near, draw_uniform
-from rrth_planner.kernels.search.tree import adapted_step, nearest, steer
+from rrth_planner.kernels.search.space import (
+    adapted_step,
+    BIAS,
+    borrowed,
+    is_free,
+    STEP,
+    TWO_TREES,
+)
+from rrth_planner.kernels.search.tree import nearest, steer
 from rrth_planner.kernels.vectors import copy, distance
 
+# Further entries of `settings`.
+NEAR, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(4, 8)
 # With so many nodes the share of draws near the ends has fallen to a half.
 FEW_NODES = 64
 
 
-@kernel(boolean(VEC, MAT, float64, int64, float64, RNG))
-def is_rejected_by_club(q, club, radius, count, probability, rng):
+@kernel(boolean(VEC, MAT, VEC, RNG))
+def is_rejected_by_club(q, club, settings, rng):
     """Return whether the path club turns a new point away (Zou et al. 2024, section 4)."""
     n_near = 0
     for i in range(club.shape[0]):
-        if distance(q, club[i]) < radius:
+        if distance(q, club[i]) < settings[CLUB_RADIUS]:
             n_near += 1
-    return n_near > count and uniform(rng) < probability
+    return n_near > settings[CLUB_COUNT] and uniform(rng) < settings[CLUB_PROBABILITY]
 
 
-@kernel(
-    int64(
-        READ_INTS,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        float64,
-        float64,
-        float64,
-        float64,
-        boolean,
-        float64,
-        MAT,
-        float64,
-        int64,
-        float64,
-        int64,
-        RNG,
-        OUT_CUBE,
-        OUT_INT_MAT,
-        OUT_INTS,
-        OUT_INTS,
-    )
-)
-def advance(
-    functions,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    step_size,
-    clearance_gain,
-    goal_bias,
-    near_bias,
-    is_bidirectional,
-    best_cost,
-    club,
-    club_radius,
-    club_count,
-    club_probability,
-    n_draws,
-    rng,
-    tree_q,
-    parents,
-    sizes,
-    meeting,
-):
+@kernel(int64(SPACE, VEC, float64, MAT, int64, RNG, OUT_CUBE, OUT_INT_MAT, OUT_INTS, OUT_INTS))
+def advance(space, settings, best_cost, club, n_draws, rng, tree_q, parents, sizes, meeting):
     """
     Make at most n_draws draws until start and goal are joined; return how many were made.
 
@@ -98,11 +56,11 @@ def advance(
     towards each draw, and joins a goal within a step (LaValle 1998). Two: they take turns, and the
     other one reaches for each new node, at once or step by step (Kuffner and LaValle 2000). On
     success `meeting` holds the two nodes that an edge joins, otherwise -1. Draws that cannot
-    shorten a path of best_cost are not made. near_bias: chance that a draw is near an end, where
-    a tree that grows from there fails more often; it falls as the trees grow.
+    shorten a path of best_cost are not made. settings[NEAR]: chance that a draw is near an end,
+    where a tree that grows from there fails more often; it falls as the trees grow.
     """
-    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
-    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
+    space = borrowed(space)
+    bounds, is_bidirectional = space.bounds, settings[TWO_TREES] != 0.0
     dof, capacity = tree_q.shape[2], tree_q.shape[1]
     q, q_new = np.empty(dof), np.empty(dof)
     meeting[0] = meeting[1] = -1
@@ -116,8 +74,8 @@ def advance(
         goal = int64(uniform(rng) * n_goals)
         q_goal = tree_q[1, goal]
         n_nodes = sizes[0] + sizes[1] - n_goals
-        is_near = uniform(rng) * (FEW_NODES + n_nodes) < near_bias * FEW_NODES
-        if uniform(rng) < goal_bias:
+        is_near = uniform(rng) * (FEW_NODES + n_nodes) < settings[NEAR] * FEW_NODES
+        if uniform(rng) < settings[BIAS]:
             copy(q_goal if side == 0 or not is_bidirectional else tree_q[0, 0], q)
         elif is_near:
             hard_0 = 1.0 - n_grown[0] / n_tried[0]
@@ -138,13 +96,11 @@ def advance(
         q_near = tree_q[side, nearby]
         if distance(q_near, q) == 0.0:
             continue
-        step = adapted_step(
-            free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
-        )
+        step = adapted_step(space, settings, q_near)
         steer(q_near, q, step, q_new)
-        if is_rejected_by_club(q_new, club, club_radius, club_count, club_probability, rng):
+        if is_rejected_by_club(q_new, club, settings, rng):
             continue
-        if not is_edge_free(q_near, q_new, resolution, chain, robot, obstacles):
+        if not is_free(space, q_near, q_new):
             continue
         n_grown[end] += is_near
         new = sizes[side]
@@ -153,28 +109,24 @@ def advance(
         sizes[side] += 1
         reached = nearest(tree_q[other], sizes[other], q_new)
         gap = distance(tree_q[other, reached], q_new)
-        is_close = is_bidirectional or gap <= step_size
-        is_joined = is_close and is_edge_free(
-            tree_q[other, reached], q_new, resolution, chain, robot, obstacles
-        )
+        is_close = is_bidirectional or gap <= settings[STEP]
+        is_joined = is_close and is_free(space, tree_q[other, reached], q_new)
         while is_bidirectional and not is_joined and sizes[other] < capacity - 1:
             q_near = tree_q[other, reached]
-            step = adapted_step(
-                free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain
-            )
+            step = adapted_step(space, settings, q_near)
             # The rest of the extension is known to be blocked.
             if distance(q_near, q_new) <= step:
                 break
             steer(q_near, q_new, step, q)
-            if is_rejected_by_club(q, club, club_radius, club_count, club_probability, rng):
+            if is_rejected_by_club(q, club, settings, rng):
                 break
-            if not is_edge_free(q_near, q, resolution, chain, robot, obstacles):
+            if not is_free(space, q_near, q):
                 break
             copy(q, tree_q[other, sizes[other]])
             parents[other, sizes[other]] = reached
             reached = sizes[other]
             sizes[other] += 1
-            is_joined = is_edge_free(q, q_new, resolution, chain, robot, obstacles)
+            is_joined = is_free(space, q, q_new)
         if is_joined:
             meeting[side], meeting[other] = new, reached
             return draw + 1

@@ -4,17 +4,12 @@
 
 import math
 
+from numba import types
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels.clock import now
 from rrth_planner.kernels.jit import (
-    as_chain,
-    as_contacts,
-    as_edge_check,
     as_shorten,
     as_slide,
-    CHAIN_AT,
-    CONTACTS_AT,
-    EDGE_CHECK_AT,
     kernel,
     MAT,
     N_GOALS,
@@ -24,19 +19,20 @@ from rrth_planner.kernels.jit import (
     OUT_INT_MAT,
     OUT_INTS,
     OUT_MAT,
-    READ_INTS,
     RNG,
+    SPACE,
     VEC,
 )
-from rrth_planner.kernels.search.path_shortening import shorten_coarsely, shorten_finely
+from rrth_planner.kernels.search.path_shortening import shorten_and_slide
 from rrth_planner.kernels.search.rrt import advance as grow
 from rrth_planner.kernels.search.shortcut import LEAST_GAIN
+from rrth_planner.kernels.search.space import borrowed, is_free
 from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
-# Entries of `settings`: those of the options, and by when improvement ends [s].
-STEP, GAIN, BIAS, NEAR, TWO_TREES, CLUB_RADIUS, CLUB_COUNT, CLUB_PROBABILITY = range(8)
-MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, HOW = range(8, 13)
+# Further entries of `settings` after those of `rrt`: by when improvement ends [s], by when
+# `advance` returns [s], first of those of `shorten`.
+MAX_SAMPLES, CLUB_BUDGET, ATTEMPTS, IMPROVE_UNTIL, UNTIL, HOW = range(8, 14)
 # Entries of `state`: growths begun, whether one is active, draws of it and in all, waypoints
 # of the best and of the first raw path, points of the club, rows of the history, in which of the
 # two pairs of trees growth goes on, which one led to the best path, why the search ended, whether
@@ -59,6 +55,8 @@ WIDER = 1.3
 # takes as long as several growths. Later paths are shortened finely at once, if they are no longer
 # than this times the best one.
 N_COARSE, PROMISING = 4, 1.2
+# What grows: tree_q, parents and sizes of two pairs of trees, meeting, club.
+GROWTH = types.Tuple((OUT_CUBES, OUT_INT_CUBE, OUT_INT_MAT, OUT_INTS, OUT_MAT))
 # Waypoints closer than this are merged [rad].
 TWIN = 1e-9
 
@@ -73,8 +71,7 @@ def keep_best(paths, n, pair, state, history):
         is_twin |= m > 0 and i < n - 1 and distance(paths[WORK, i], paths[BEST, m - 1]) < TWIN
         if is_twin:
             continue
-        for k in range(paths.shape[2]):
-            paths[BEST, m, k] = paths[WORK, i, k]
+        copy(paths[WORK, i], paths[BEST, m])
         m += 1
     state[N_BEST], state[BEST_PAIR] = m, pair
     # The last row is that of the best path, even if the buffer is full.
@@ -82,74 +79,6 @@ def keep_best(paths, n, pair, state, history):
     history[row, COST] = path_length(paths[BEST], m)
     history[row, DRAWS], history[row, TIME] = state[SAMPLES], now()
     state[N_HISTORY] = row + 1
-
-
-@kernel(
-    void(
-        READ_INTS,
-        int64,
-        int64,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        VEC,
-        VEC,
-        MAT,
-        int64,
-        VEC,
-        OUT_CUBE,
-        OUT_INTS,
-        OUT_MAT,
-    )
-)
-def go_straight(
-    functions,
-    shorten_at,
-    slide_at,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    target,
-    q_start,
-    goals,
-    n_bent,
-    settings,
-    paths,
-    state,
-    history,
-):
-    """
-    Store the straight edge to the nearest goal that has a free one as the best path.
-
-    goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
-    first n_bent are known to have no free edge.
-    """
-    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
-    find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
-    slide_goal = as_slide(slide_at)
-    for i in range(n_bent, goals.shape[0]):
-        if is_edge_free(q_start, goals[i], resolution, chain, robot, obstacles):
-            for k in range(goals.shape[1]):
-                paths[WORK, 0, k], paths[WORK, 1, k] = q_start[k], goals[i, k]
-            n = shorten_coarsely(
-                is_edge_free,
-                find,
-                shorten,
-                slide_goal,
-                chain,
-                resolution,
-                robot,
-                obstacles,
-                bounds,
-                target,
-                settings[HOW:],
-                paths[WORK],
-                2,
-            )
-            keep_best(paths, n, 0, state, history)
-            break
 
 
 @kernel(int64(MAT, VEC, float64))
@@ -161,6 +90,31 @@ def count_useful(goals, q_start, cost):
             break
         n += 1
     return n
+
+
+@kernel(void(SPACE, int64, int64, VEC, VEC, MAT, VEC, int64, OUT_CUBE, OUT_INTS, OUT_MAT))
+def go_straight(
+    space, shorten_at, slide_at, target, q_start, goals, settings, n_bent, paths, state, history
+):
+    """
+    Store the straight edge to the nearest goal that has a free one as the best path.
+
+    goals (n, dof): nearest to the start first, so no path to a later one can be shorter; the
+    first n_bent are known to have no free edge. state[END]: whether no other path can be shorter.
+    """
+    space = borrowed(space)
+    for i in range(n_bent, goals.shape[0]):
+        if is_free(space, q_start, goals[i]):
+            copy(q_start, paths[WORK, 0])
+            copy(goals[i], paths[WORK, 1])
+            shorten, slide_goal = as_shorten(shorten_at), as_slide(slide_at)
+            n = shorten_and_slide(
+                space, shorten, slide_goal, target, settings[HOW:], False, paths[WORK], 2
+            )
+            keep_best(paths, n, 0, state, history)
+            if count_useful(goals, q_start, history[state[N_HISTORY] - 1, COST]) == 0:
+                state[END] = DONE
+            break
 
 
 @kernel(void(MAT, VEC, int64, OUT_CUBE, OUT_INT_MAT, OUT_INTS))
@@ -179,74 +133,39 @@ def store_raw(paths, n, club, state):
     """Add the inner points of a raw path to the path club, and keep the first raw path."""
     if state[N_RAW] == 0:
         for i in range(n):
-            for k in range(paths.shape[2]):
-                paths[RAW, i, k] = paths[WORK, i, k]
+            copy(paths[WORK, i], paths[RAW, i])
         state[N_RAW] = n
     for i in range(1, n - 1):
         if state[N_CLUB] < club.shape[0]:
-            for k in range(paths.shape[2]):
-                club[state[N_CLUB], k] = paths[WORK, i, k]
+            copy(paths[WORK, i], club[state[N_CLUB]])
             state[N_CLUB] += 1
 
 
-@kernel(
-    void(
-        READ_INTS,
-        int64,
-        int64,
-        float64,
-        MAT,
-        MAT,
-        MAT,
-        VEC,
-        VEC,
-        MAT,
-        VEC,
-        float64,
-        RNG,
-        OUT_CUBES,
-        OUT_INT_CUBE,
-        OUT_INT_MAT,
-        OUT_INTS,
-        OUT_MAT,
-        OUT_CUBE,
-        OUT_INTS,
-        OUT_MAT,
-    )
-)
+@kernel(void(SPACE, int64, int64, VEC, VEC, MAT, VEC, RNG, GROWTH, OUT_CUBE, OUT_INTS, OUT_MAT))
 def advance(
-    functions,
+    space,
     shorten_at,
     slide_at,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
     target,
     q_start,
     goals,
     settings,
-    until,
     rng,
-    tree_q,
-    parents,
-    sizes,
-    meeting,
-    club,
+    growth,
     paths,
     state,
     history,
 ):
     """
-    Grow and shorten paths until state[END] holds the reason why it ended, or until a time [s].
+    Grow and shorten paths until state[END] says why it ended, or until settings[UNTIL].
 
     Growths after the first path avoid the path club, the points of all raw paths, and draw only
     where a shorter path is possible. Of the first paths only the shortest is shortened finely.
     tree_q (2, 2, capacity, dof): the growing pair of trees, and the pair of the best path.
     """
-    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
-    find, shorten = as_contacts(functions[CONTACTS_AT]), as_shorten(shorten_at)
-    slide_goal = as_slide(slide_at)
+    space = borrowed(space)
+    shorten, slide_goal, how = as_shorten(shorten_at), as_slide(slide_at), settings[HOW:]
+    tree_q, parents, sizes, meeting, club = growth
     while state[END] == RUNNING:
         cost = math.inf
         if state[N_BEST] > 0:
@@ -276,21 +195,10 @@ def advance(
             budget = int64(settings[MAX_SAMPLES if state[N_BEST] == 0 else CLUB_BUDGET])
             if meeting[0] < 0:
                 n_drawn = grow(
-                    functions,
-                    resolution,
-                    robot,
-                    obstacles,
-                    bounds,
-                    settings[STEP],
-                    settings[GAIN],
-                    settings[BIAS],
-                    settings[NEAR],
-                    settings[TWO_TREES] != 0.0,
+                    space,
+                    settings,
                     WIDER * cost,
                     club[: state[N_CLUB]],
-                    settings[CLUB_RADIUS],
-                    int64(settings[CLUB_COUNT]),
-                    settings[CLUB_PROBABILITY],
                     min(BATCH, budget - state[DRAWN]),
                     rng,
                     tree_q[pair],
@@ -306,44 +214,18 @@ def advance(
                 n = trace_path(tree_q[pair], parents[pair], meeting[0], meeting[1], paths[WORK])
                 store_raw(paths, n, club, state)
             if n > 0:
-                n = shorten_coarsely(
-                    is_edge_free,
-                    find,
-                    shorten,
-                    slide_goal,
-                    chain,
-                    resolution,
-                    robot,
-                    obstacles,
-                    bounds,
-                    target,
-                    settings[HOW:],
-                    paths[WORK],
-                    n,
+                n = shorten_and_slide(
+                    space, shorten, slide_goal, target, how, False, paths[WORK], n
                 )
             elif state[DRAWN] >= budget or n_nodes >= tree_q.shape[2] - 1:
                 state[GROWING] = 0
         is_coarse = is_new and state[BEGUN] <= N_COARSE
         if n > 0 and not is_coarse and path_length(paths[WORK], n) <= PROMISING * cost:
-            n = shorten_finely(
-                is_edge_free,
-                find,
-                shorten,
-                slide_goal,
-                chain,
-                resolution,
-                robot,
-                obstacles,
-                bounds,
-                target,
-                settings[HOW:],
-                paths[WORK],
-                n,
-            )
+            n = shorten_and_slide(space, shorten, slide_goal, target, how, True, paths[WORK], n)
         if not is_new:
             state[TO_SHORTEN] = 0
         if n > 0 and path_length(paths[WORK], n) < cost:
             keep_best(paths, n, pair, state, history)
             state[PAIR], state[TO_SHORTEN] = 1 - pair, int64(is_coarse)
-        if now() > until:
+        if now() > settings[UNTIL]:
             break

@@ -4,15 +4,16 @@
 
 from numba.core.types import float64, int64
 import numpy as np
-from rrth_planner.kernels.jit import CHAIN, CONTACTS, EDGE_CHECK, kernel, MAT, OUT_MAT, VEC
+from rrth_planner.kernels.jit import kernel, OUT_MAT, SPACE, VEC
 from rrth_planner.kernels.search.shortcut import remove_waypoint, reverse_path, SPACING
+from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance
 
 MAX_CUTS = 1000
 
 
-@kernel(float64(EDGE_CHECK, float64, CHAIN, MAT, MAT, VEC, VEC, float64))
-def first_contact(is_edge_free, resolution, chain, robot, obstacles, q_from, q_to, spacing):
+@kernel(float64(SPACE, VEC, VEC, float64))
+def first_contact(space, q_from, q_to, spacing):
     """Return the share of the line at which the first check point P_C collides; 2: none does."""
     dof = q_from.shape[0]
     n = int64(distance(q_from, q_to) / spacing) + 1
@@ -21,13 +22,13 @@ def first_contact(is_edge_free, resolution, chain, robot, obstacles, q_from, q_t
         for k in range(dof):
             q[k] = q_from[k] + m / n * (q_to[k] - q_from[k])
         # An edge of length zero: the configuration itself.
-        if not is_edge_free(q, q, resolution, chain, robot, obstacles):
+        if not is_free(space, q, q):
             return m / n
     return 2.0
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
-def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks):
+@kernel(int64(SPACE, OUT_MAT, int64, float64, float64))
+def shortcut_forward(space, path, n, targets, checks):
     """
     Do step 1 in place: the lines from P_i to the points P_T on P_i+1 -> P_i+2, one by one.
 
@@ -42,12 +43,7 @@ def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n,
         for t in range(1, m + 1):
             for k in range(dof):
                 q[k] = path[i + 1, k] + t / m * (path[i + 2, k] - path[i + 1, k])
-            if (
-                first_contact(
-                    is_edge_free, resolution, chain, robot, obstacles, path[i], q, checks
-                )
-                <= 1.0
-            ):
+            if first_contact(space, path[i], q, checks) <= 1.0:
                 blocked = t
                 break
         if blocked == 0:
@@ -59,10 +55,8 @@ def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n,
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64, float64))
-def cut_corners(
-    is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least
-):
+@kernel(int64(SPACE, OUT_MAT, int64, float64, float64, float64))
+def cut_corners(space, path, n, targets, checks, least):
     """
     Do step 3 in place: a corner where the line of sight is first blocked, two lines back.
 
@@ -79,9 +73,7 @@ def cut_corners(
         for t in range(1, m + 1):
             for k in range(dof):
                 q[k] = path[i + 1, k] + t / m * (path[i + 2, k] - path[i + 1, k])
-            share = first_contact(
-                is_edge_free, resolution, chain, robot, obstacles, path[i], q, checks
-            )
+            share = first_contact(space, path[i], q, checks)
             if share <= 1.0:
                 blocked = t
                 break
@@ -110,8 +102,8 @@ def cut_corners(
     return n
 
 
-@kernel(int64(EDGE_CHECK, CONTACTS, float64, CHAIN, MAT, MAT, MAT, OUT_MAT, int64, VEC))
-def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, path, n, how):
+@kernel(int64(SPACE, OUT_MAT, int64, VEC))
+def shorten(space, path, n, how):
     """
     Do steps 1, 2 and 3 once each, in place; return the number of waypoints.
 
@@ -119,14 +111,8 @@ def shorten(is_edge_free, find, resolution, chain, robot, obstacles, bounds, pat
     [rad].
     """
     least, targets, checks = how[SPACING], how[3], how[4]
-    n = shortcut_forward(
-        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks
-    )
+    n = shortcut_forward(space, path, n, targets, checks)
     reverse_path(path, n)
-    n = shortcut_forward(
-        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks
-    )
+    n = shortcut_forward(space, path, n, targets, checks)
     reverse_path(path, n)
-    return cut_corners(
-        is_edge_free, resolution, chain, robot, obstacles, path, n, targets, checks, least
-    )
+    return cut_corners(space, path, n, targets, checks, least)

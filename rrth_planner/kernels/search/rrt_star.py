@@ -7,17 +7,7 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
-    as_chain,
-    as_edge_check,
-    as_free_radius,
-    CHAIN,
-    CHAIN_AT,
-    EDGE_CHECK,
-    EDGE_CHECK_AT,
-    FREE_RADIUS,
-    FREE_RADIUS_AT,
     kernel,
-    MAT,
     N_GOALS,
     N_MEETINGS,
     OUT_CUBE,
@@ -26,43 +16,32 @@ from rrth_planner.kernels.jit import (
     OUT_INTS,
     OUT_MAT,
     OUT_VEC,
-    READ_INTS,
     RNG,
+    SPACE,
     VEC,
 )
 from rrth_planner.kernels.search.random import uniform
 from rrth_planner.kernels.search.sampling import draw_uniform
-from rrth_planner.kernels.search.tree import adapted_step, nearest, squared_distances, steer
+from rrth_planner.kernels.search.space import (
+    adapted_step,
+    BIAS,
+    borrowed,
+    is_free,
+    STEP,
+    TWO_TREES,
+)
+from rrth_planner.kernels.search.tree import nearest, squared_distances, steer
 from rrth_planner.kernels.vectors import copy, distance
 
-# What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: functions, resolution,
-# robot, obstacles, bounds, step size, clearance gain, goal bias, rewire radius, two trees or one,
-# biasing ratio, shortened path, draws, rng, tree_q, links, costs, sizes, meetings, best, history.
-# best (4,): cost of the best path and row of its meeting, then number of waypoints and cost of the
-# shortened path, which RRT*-Smart alone keeps.
-STAR_SIGNATURE = int64(
-    READ_INTS,
-    float64,
-    MAT,
-    MAT,
-    MAT,
-    float64,
-    float64,
-    float64,
-    float64,
-    boolean,
-    int64,
-    OUT_MAT,
-    int64,
-    RNG,
-    OUT_CUBE,
-    OUT_INT_CUBE,
-    OUT_MAT,
-    OUT_INTS,
-    OUT_INT_MAT,
-    OUT_VEC,
-    OUT_VEC,
-)
+# Further entries of `settings`: rewire radius, and, for RRT*-Smart alone, the biasing ratio.
+REWIRE, RATIO = range(4, 6)
+# The trees: tree_q, links, costs, sizes, meetings, best. best (4,): cost of the best path and row
+# of its meeting, then number of waypoints and cost of the shortened path, which RRT*-Smart alone
+# keeps.
+TREES = OUT_CUBE, OUT_INT_CUBE, OUT_MAT, OUT_INTS, OUT_INT_MAT, OUT_VEC
+# What the `advance` of RRT*, Informed RRT* and RRT*-Smart have in common: space, settings,
+# shortened path, rng, the trees, history.
+STAR_SIGNATURE = void(SPACE, VEC, OUT_MAT, RNG, *TREES, OUT_VEC)
 # Rows of the links of a tree, (3, capacity): parent, first child, next sibling.
 PARENT, CHILD, SIBLING = 0, 1, 2
 # A gain below this is rounding.
@@ -118,25 +97,8 @@ def shift_costs(links, costs, node, change):
         costs[at] += change
 
 
-@kernel(
-    int64(
-        EDGE_CHECK,
-        float64,
-        CHAIN,
-        MAT,
-        MAT,
-        VEC,
-        int64,
-        float64,
-        OUT_MAT,
-        OUT_INT_MAT,
-        OUT_VEC,
-        int64,
-    )
-)
-def add_node(
-    is_edge_free, resolution, chain, robot, obstacles, q, near, radius, nodes, links, costs, n
-):
+@kernel(int64(SPACE, VEC, int64, float64, OUT_MAT, OUT_INT_MAT, OUT_VEC, int64))
+def add_node(space, q, near, radius, nodes, links, costs, n):
     """
     Add q to a tree of n nodes, then rewire; return 1 and how many were rewired, 0: not reached.
 
@@ -144,7 +106,7 @@ def add_node(
     parent unless one within the radius gives a shorter path (ChooseParent); afterwards q becomes
     the parent of those to which it makes one (Rewire).
     """
-    if not is_edge_free(nodes[near], q, resolution, chain, robot, obstacles):
+    if not is_free(space, nodes[near], q):
         return 0
     neighbours, lengths = np.empty(n, np.int64), np.empty(n)
     n_near = 0
@@ -169,7 +131,7 @@ def add_node(
         if at < 0:
             break
         totals[at] = math.inf
-        if is_edge_free(nodes[neighbours[at]], q, resolution, chain, robot, obstacles):
+        if is_free(space, nodes[neighbours[at]], q):
             parent, cost = neighbours[at], least
             break
     copy(q, nodes[n])
@@ -180,7 +142,7 @@ def add_node(
     for row in range(n_near):
         i, length = neighbours[row], lengths[row]
         is_shorter = i != parent and cost + length < costs[i] - GAIN
-        if is_shorter and is_edge_free(q, nodes[i], resolution, chain, robot, obstacles):
+        if is_shorter and is_free(space, q, nodes[i]):
             detach(links, i)
             attach(links, i, n)
             shift_costs(links, costs, i, cost + length - costs[i])
@@ -199,74 +161,8 @@ def find_best(tree_q, costs, sizes, meetings, best):
             best[0], best[1] = cost, row
 
 
-@kernel(int64(OUT_CUBE, OUT_INT_CUBE, int64, int64, OUT_MAT))
-def trace_path(tree_q, links, from_start, from_goal, path):
-    """Write the path root - from_start - from_goal - root; return its waypoints, 0: no room."""
-    n = 0
-    i = from_start
-    while i >= 0:
-        n += 1
-        i = links[0, PARENT, i]
-    if n >= path.shape[0]:
-        return 0
-    i = from_start
-    for row in range(n - 1, -1, -1):
-        copy(tree_q[0, i], path[row])
-        i = links[0, PARENT, i]
-    i = from_goal
-    if distance(path[n - 1], tree_q[1, i]) == 0.0:
-        i = links[1, PARENT, i]
-    while i >= 0:
-        if n >= path.shape[0]:
-            return 0
-        copy(tree_q[1, i], path[n])
-        n += 1
-        i = links[1, PARENT, i]
-    return n
-
-
-@kernel(
-    boolean(
-        EDGE_CHECK,
-        FREE_RADIUS,
-        float64,
-        CHAIN,
-        MAT,
-        MAT,
-        float64,
-        float64,
-        float64,
-        boolean,
-        int64,
-        VEC,
-        OUT_CUBE,
-        OUT_INT_CUBE,
-        OUT_MAT,
-        OUT_INTS,
-        OUT_INT_MAT,
-        OUT_VEC,
-    )
-)
-def extend(
-    is_edge_free,
-    free_radius,
-    resolution,
-    chain,
-    robot,
-    obstacles,
-    step_size,
-    clearance_gain,
-    rewire_radius,
-    is_bidirectional,
-    side,
-    q,
-    tree_q,
-    links,
-    costs,
-    sizes,
-    meetings,
-    best,
-):
+@kernel(boolean(SPACE, VEC, int64, VEC, *TREES))
+def extend(space, settings, side, q, tree_q, links, costs, sizes, meetings, best):
     """
     Extend one of the two trees towards q; return whether there is a better path now.
 
@@ -280,23 +176,11 @@ def extend(
     q_near, q_new, new = tree_q[side, near], np.empty(dof), sizes[side]
     if new >= tree_q.shape[1] or distance(q_near, q) == 0.0:
         return False
-    step = adapted_step(free_radius, chain, robot, obstacles, q_near, step_size, clearance_gain)
+    step_size, is_bidirectional = settings[STEP], settings[TWO_TREES] != 0.0
+    step = adapted_step(space, settings, q_near)
     steer(q_near, q, step, q_new)
-    radius = near_radius(new, dof, rewire_radius, step_size)
-    n_changed = add_node(
-        is_edge_free,
-        resolution,
-        chain,
-        robot,
-        obstacles,
-        q_new,
-        near,
-        radius,
-        tree_q[side],
-        links[side],
-        costs[side],
-        new,
-    )
+    radius = near_radius(new, dof, settings[REWIRE], step_size)
+    n_changed = add_node(space, q_new, near, radius, tree_q[side], links[side], costs[side], new)
     if n_changed == 0:
         return False
     sizes[side] += 1
@@ -308,7 +192,7 @@ def extend(
             continue
         if is_bidirectional and cost >= best[0] - GAIN:
             continue
-        if is_edge_free(tree_q[other, i], q_new, resolution, chain, robot, obstacles):
+        if is_free(space, tree_q[other, i], q_new):
             meetings[sizes[N_MEETINGS], side], meetings[sizes[N_MEETINGS], other] = new, i
             sizes[N_MEETINGS] += 1
     if n_changed == 1 and sizes[N_MEETINGS] == n_met:
@@ -319,63 +203,20 @@ def extend(
 
 
 @kernel(STAR_SIGNATURE)
-def advance(
-    functions,
-    resolution,
-    robot,
-    obstacles,
-    bounds,
-    step_size,
-    clearance_gain,
-    goal_bias,
-    rewire_radius,
-    is_bidirectional,
-    bias,
-    shortened,
-    n_draws,
-    rng,
-    tree_q,
-    links,
-    costs,
-    sizes,
-    meetings,
-    best,
-    history,
-):
+def advance(space, settings, shortened, rng, tree_q, links, costs, sizes, meetings, best, history):
     """
-    Make n_draws uniform draws; return how many were made.
+    Make n uniform draws; history (n,): cost of the best path after each.
 
-    history (n_draws,): cost of the best path after each draw. `bias` and `shortened` are not used.
+    `shortened` is not used.
     """
-    is_edge_free, chain = as_edge_check(functions[EDGE_CHECK_AT]), as_chain(functions[CHAIN_AT])
-    free_radius = as_free_radius(functions[FREE_RADIUS_AT])
+    space, is_bidirectional = borrowed(space), settings[TWO_TREES] != 0.0
     q = np.empty(tree_q.shape[2])
-    for draw in range(n_draws):
+    for draw in range(history.shape[0]):
         side = draw & 1 if is_bidirectional else 0
-        if uniform(rng) < goal_bias:
+        if uniform(rng) < settings[BIAS]:
             goal = int64(uniform(rng) * sizes[N_GOALS])
             copy(tree_q[1, goal] if side == 0 else tree_q[0, 0], q)
         else:
-            draw_uniform(bounds, rng, q)
-        extend(
-            is_edge_free,
-            free_radius,
-            resolution,
-            chain,
-            robot,
-            obstacles,
-            step_size,
-            clearance_gain,
-            rewire_radius,
-            is_bidirectional,
-            side,
-            q,
-            tree_q,
-            links,
-            costs,
-            sizes,
-            meetings,
-            best,
-        )
+            draw_uniform(space.bounds, rng, q)
+        extend(space, settings, side, q, tree_q, links, costs, sizes, meetings, best)
         history[draw] = best[0]
-    return n_draws

@@ -2,16 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Path shortcutting by the three steps of RRT-H (Zou et al. 2024, section 2, corrected)."""
 
-from numba.core.types import boolean, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
-from rrth_planner.kernels.jit import (
-    CHAIN,
-    EDGE_CHECK,
-    kernel,
-    MAT,
-    OUT_MAT,
-    VEC,
-)
+from rrth_planner.kernels.jit import kernel, OUT_MAT, SPACE
+from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance, path_length
 
 # Entries of the settings of `shorten` (kernels.jit.SHORTEN): k of the paper [rad], most
@@ -39,8 +33,8 @@ def reverse_path(path, n):
             path[i, k], path[n - 1 - i, k] = path[n - 1 - i, k], path[i, k]
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+@kernel(int64(SPACE, OUT_MAT, int64, float64))
+def shortcut_forward(space, path, n, spacing):
     """
     Do step 1 of RRT-H in place: slide P_i+1 along P_i+1 -> P_i+2 while P_i -> P_i+1 is free.
 
@@ -52,7 +46,7 @@ def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n,
     q_free, q_try = np.empty(dof), np.empty(dof)
     i = 0
     while i + 2 < n:
-        if is_edge_free(path[i], path[i + 2], resolution, chain, robot, obstacles):
+        if is_free(space, path[i], path[i + 2]):
             n = remove_waypoint(path, n, i + 1)
             continue
         length = distance(path[i + 1], path[i + 2])
@@ -62,9 +56,7 @@ def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n,
             for k in range(dof):
                 q_try[k] = path[i + 1, k] + share * (path[i + 2, k] - path[i + 1, k])
             # The rest of the old segment becomes an edge of its own, so it is checked too.
-            if is_edge_free(path[i], q_try, resolution, chain, robot, obstacles) and is_edge_free(
-                q_try, path[i + 2], resolution, chain, robot, obstacles
-            ):
+            if is_free(space, path[i], q_try) and is_free(space, q_try, path[i + 2]):
                 low = share
                 copy(q_try, q_free)
             else:
@@ -75,18 +67,8 @@ def shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n,
     return n
 
 
-@kernel(boolean(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, VEC, VEC))
-def is_corner_free(is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out):
-    """Return whether waypoint i may be replaced by the chord q_in -> q_out: all three edges."""
-    return (
-        is_edge_free(q_in, q_out, resolution, chain, robot, obstacles)
-        and is_edge_free(path[i - 1], q_in, resolution, chain, robot, obstacles)
-        and is_edge_free(q_out, path[i + 1], resolution, chain, robot, obstacles)
-    )
-
-
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64))
-def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing):
+@kernel(int64(SPACE, OUT_MAT, int64, float64))
+def cut_corners(space, path, n, spacing):
     """
     Do step 3 of RRT-H in place, from both sides: replace each corner by its largest free chord.
 
@@ -120,8 +102,11 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
                 for k in range(dof):
                     q_in[k] = path[i, k] + s_in * (path[i - 1, k] - path[i, k])
                     q_out[k] = path[i, k] + s_out * (path[i + 1, k] - path[i, k])
-                if is_corner_free(
-                    is_edge_free, resolution, chain, robot, obstacles, path, i, q_in, q_out
+                # The chord, and what is left of both edges.
+                if (
+                    is_free(space, q_in, q_out)
+                    and is_free(space, path[i - 1], q_in)
+                    and is_free(space, q_out, path[i + 1])
                 ):
                     low = at
                     share[0], share[1] = s_in, s_out
@@ -147,8 +132,8 @@ def cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spac
     return n
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, OUT_MAT, int64, float64, float64))
-def shortcut_path(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing, enough):
+@kernel(int64(SPACE, OUT_MAT, int64, float64, float64))
+def shortcut_path(space, path, n, spacing, enough):
     """
     Repeat the three steps until the path gets no shorter; return its number of waypoints.
 
@@ -160,11 +145,11 @@ def shortcut_path(is_edge_free, resolution, chain, robot, obstacles, path, n, sp
     for _ in range(MAX_ROUNDS):
         if n < 3:
             break
-        n = shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        n = shortcut_forward(space, path, n, spacing)
         reverse_path(path, n)
-        n = shortcut_forward(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        n = shortcut_forward(space, path, n, spacing)
         reverse_path(path, n)
-        n = cut_corners(is_edge_free, resolution, chain, robot, obstacles, path, n, spacing)
+        n = cut_corners(space, path, n, spacing)
         shorter = path_length(path, n)
         if shorter > length * (1.0 - enough):
             break

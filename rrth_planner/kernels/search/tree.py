@@ -4,16 +4,15 @@
 
 import math
 
+from numba import types
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
     CHAIN,
     EDGE_CHECK,
-    FREE_RADIUS,
     kernel,
     MAT,
     OUT_CUBE,
-    OUT_INT_MAT,
     OUT_MAT,
     OUT_VEC,
     VEC,
@@ -82,21 +81,7 @@ def stay(is_edge_free, resolution, chain, robot, obstacles, bounds, target, path
     return 0.0
 
 
-@kernel(float64(FREE_RADIUS, CHAIN, MAT, MAT, VEC, float64, float64))
-def adapted_step(free_radius, chain, robot, obstacles, q, step_size, clearance_gain):
-    """
-    Return the step from q: shorter where obstacles are near (after Cai, as the paper cites it).
-
-    clearance_gain times the free radius, between a tenth of step_size and step_size; a gain of 0
-    leaves step_size as it is.
-    """
-    if clearance_gain == 0.0:
-        return step_size
-    step = clearance_gain * free_radius(q, chain, robot, obstacles)
-    return min(step_size, max(step, 0.1 * step_size))
-
-
-@kernel(int64(OUT_CUBE, OUT_INT_MAT, int64, int64, OUT_MAT))
+@kernel(int64(OUT_CUBE, types.Array(int64, 2, 'A', readonly=True), int64, int64, OUT_MAT))
 def trace_path(tree_q, parents, from_start, from_goal, path):
     """
     Write the path root - from_start - from_goal - root of two trees; return its waypoints.

@@ -5,8 +5,6 @@
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import (
-    CHAIN,
-    EDGE_CHECK,
     kernel,
     MAT,
     N_START,
@@ -14,23 +12,14 @@ from rrth_planner.kernels.jit import (
     OUT_INTS,
     OUT_MAT,
     READ_INTS,
+    SPACE,
 )
+from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance
 
 
-@kernel(int64(EDGE_CHECK, float64, CHAIN, MAT, MAT, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))
-def transplant(
-    is_edge_free,
-    resolution,
-    chain,
-    robot,
-    obstacles,
-    old_nodes,
-    old_parents,
-    n_roots,
-    nodes,
-    parents,
-):
+@kernel(int64(SPACE, MAT, READ_INTS, int64, OUT_MAT, OUT_INTS))
+def transplant(space, old_nodes, old_parents, n_roots, nodes, parents):
     """
     Carry over what can still be reached of an old tree; return the number of nodes.
 
@@ -47,17 +36,13 @@ def transplant(
                 if distance(nodes[root], old_nodes[i]) == 0.0:
                     moved[i] = root
                     break
-                if parent < 0 and is_edge_free(
-                    nodes[root], old_nodes[i], resolution, chain, robot, obstacles
-                ):
+                if parent < 0 and is_free(space, nodes[root], old_nodes[i]):
                     parent = root
             if moved[i] >= 0 or parent < 0:
                 continue
         else:
             parent = moved[old_parents[i]]
-            if parent < 0 or not is_edge_free(
-                nodes[parent], old_nodes[i], resolution, chain, robot, obstacles
-            ):
+            if parent < 0 or not is_free(space, nodes[parent], old_nodes[i]):
                 continue
         if n >= nodes.shape[0] - 1:
             return n
@@ -68,14 +53,14 @@ def transplant(
     return n
 
 
-@kernel(void(EDGE_CHECK, float64, CHAIN, MAT, MAT, float64, OUT_CUBE, OUT_INTS, OUT_INTS))
-def join(is_edge_free, resolution, chain, robot, obstacles, step_size, tree_q, sizes, meeting):
+@kernel(void(SPACE, float64, OUT_CUBE, OUT_INTS, OUT_INTS))
+def join(space, step_size, tree_q, sizes, meeting):
     """Find two nodes of the two trees, within a step, that a free edge joins: `meeting`, or -1."""
     meeting[0] = meeting[1] = -1
     for b in range(sizes[1]):
         for a in range(sizes[N_START]):
-            if distance(tree_q[0, a], tree_q[1, b]) <= step_size and is_edge_free(
-                tree_q[0, a], tree_q[1, b], resolution, chain, robot, obstacles
+            if distance(tree_q[0, a], tree_q[1, b]) <= step_size and is_free(
+                space, tree_q[0, a], tree_q[1, b]
             ):
                 meeting[0], meeting[1] = a, b
                 return

@@ -77,7 +77,7 @@ def escape_figure(rows: Rows, n: int) -> Figure:
     ):
         _draw_map(axes, box_map)
         growths = scattered_growths(problem, SCATTERED[name], SEED)
-        paths = [growth.waypoints for growth in growths if growth.waypoints is not None]
+        paths = [growth.path.waypoints for growth in growths if growth.path is not None]
         for i, path in enumerate(paths):
             shade = i / max(1, len(paths) - 1)
             _draw_path(axes, path, (0.76, 0.1 + 0.6 * shade, 0.36 - 0.26 * shade), 1.6)
