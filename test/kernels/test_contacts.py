@@ -13,6 +13,7 @@ from rrth_planner.kernels.collision.edge_contacts import (
     edge_contacts,
     GAP,
     GRADIENT,
+    MULTIPLIER,
     SHARE,
     SPACING,
 )
@@ -151,11 +152,14 @@ def test_the_close_pairs_of_an_edge_are_found_with_their_slopes(case):
         step *= rng.choice([0.1, 0.6, 1.5]) / np.linalg.norm(step)
         q_to = np.clip(q_from + step, *arm.bounds)
         seam = (world.chain, world.robot, world.obstacles, contacts)
+        contacts[:] = np.nan
         n = edge_contacts(q_from, q_to, *seam)
         assert n < len(contacts)
         found = contacts[:n].copy()
         assert ((found[:, SHARE] >= 0.0) & (found[:, SHARE] <= 1.0)).all()
         assert (found[:, GAP] < CLOSE + 1e-3).all()
+        # Whoever reads it before the constraint was applied reads no force.
+        assert (found[:, MULTIPLIER] == 0.0).all()
         matched = []
         for row in found:
             q = q_from + row[SHARE] * (q_to - q_from)

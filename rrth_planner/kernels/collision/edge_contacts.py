@@ -104,7 +104,7 @@ def add_contact(q_from, q_to, spacing, ray_length, chain, boxes, pair, contacts,
             right = low + GOLDEN * (high - low)
             at_right = gap_at(q_from, q_to, right, ray_length, chain, boxes, pair, q)
     share = 0.5 * (low + high)
-    contacts[n, SHARE] = share
+    contacts[n, SHARE], contacts[n, MULTIPLIER] = share, 0.0
     contacts[n, GAP] = gap_at(q_from, q_to, share, ray_length, chain, boxes, pair, q)
     for i in range(q_from.shape[0]):
         here = q[i]
