@@ -18,15 +18,15 @@ from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
-# A channel remembers so many arms and scenes: more than any message holds.
-SENT_ONCE, REMEMBERED = (ArmModel, Scene), 64
+# What is sent once; a channel remembers so many of them, more than any message holds.
+SENT_ONCE, REMEMBERED = (ArmModel, Scene, MotionLimits, TreeOptions), 64
 # A process that has not ended by itself after this time is killed [s].
 LONGEST_END = 5.0
 WORKER = 'rrth_planner.pipeline.planning_worker'
@@ -215,8 +215,8 @@ class Channel:
     """
     One end of a pipe to another process.
 
-    Arms and scenes are sent once: much is derived from each, and kept for as long as it is the
-    same object. Both ends remember the last ones, by their identity at the sender.
+    What lasts from question to question is sent once, and remembered by its identity at the
+    sender: much is derived from arms and scenes, and kept for as long as they are the same object.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class Channel:
     """
 
     def __init__(self, line: Connection) -> None:
-        """Begin without arms and scenes."""
+        """Begin with nothing sent."""
         self.line = line
         self._sent: dict[int, Any] = {}
         self._received: dict[int, Any] = {}
@@ -258,7 +258,7 @@ class _Pickler(pickle.Pickler):
         self.news: dict[int, Any] = {}
 
     def persistent_id(self, part: Any) -> int | None:
-        if type(part) not in SENT_ONCE:
+        if not isinstance(part, SENT_ONCE):
             return None
         if id(part) not in self._sent:
             # Kept alive, so that nothing else can have its identity.
