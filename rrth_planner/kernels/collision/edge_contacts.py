@@ -9,7 +9,7 @@ from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM, MAX_GROUPS
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import D, LANES, MAX_DOF
-from rrth_planner.kernels.vectors import between, distance
+from rrth_planner.kernels.vectors import distance
 
 # A gap smaller than this counts as contact [m].
 CLOSE = 0.03
@@ -62,58 +62,56 @@ def bar_gaps(points, at, boxes, g, gaps):
         gaps[j] = max(gap, (abs(m0 * e1 - m1 * e0) - h0 * f1 - h1 * f0) * norm)
 
 
-@kernel(float64(OUT_VEC, float64, CHAIN, MAT, OUT_POOL))
-def gap_of(q, ray_length, chain, boxes, pair):
-    """Return the gap of a pair: bar, group and lane [m]."""
-    points, gaps = scratch.floats(ENDS_ROOM), scratch.floats(LANES)
+@kernel(float64(VEC, VEC, float64, float64, CHAIN, MAT, int64, int64, int64, OUT_VEC, OUT_VEC))
+def gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points):
+    """Return the gap of one bar and one box at a share of the edge [m]."""
+    for k in range(q_from.shape[0]):
+        q[k] = q_from[k] + share * (q_to[k] - q_from[k])
     chain(q, ray_length, points, 0)
-    bar_gaps(points, 4 * int64(pair[0]), boxes, int64(pair[1]), gaps)
-    return gaps[int64(pair[2])]
+    gaps = scratch.floats(LANES)
+    bar_gaps(points, 4 * bar, boxes, g, gaps)
+    return gaps[j]
 
 
-@kernel(float64(VEC, VEC, float64, float64, CHAIN, MAT, OUT_POOL, OUT_VEC))
-def gap_at(q_from, q_to, share, ray_length, chain, boxes, pair, q):
-    """Return the gap of a pair at a share of the edge [m], where q is."""
-    between(q_from, q_to, share, q)
-    return gap_of(q, ray_length, chain, boxes, pair)
-
-
-@kernel(int64(VEC, VEC, float64, float64, CHAIN, MAT, OUT_POOL, OUT_MAT, int64))
-def add_contact(q_from, q_to, spacing, ray_length, chain, boxes, pair, contacts, n):
+@kernel(int64(VEC, VEC, float64, float64, float64, CHAIN, MAT, OUT_POOL, OUT_MAT, int64))
+def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, contacts, n):
     """
-    Append the contact of one pair, at its least gap near its last sample; return the total.
+    Append the contact of one pair, at its least gap near a share of the edge; return the total.
 
-    pair (4,): bar, group, lane and sample; spacing: of the samples, as a share of the edge. The
-    minimum is found by golden section (Kiefer 1953), the gradient by differences.
+    The minimum is found by golden section (Kiefer 1953), the gradient by differences.
     """
     if n >= contacts.shape[0]:
         return n
-    q = scratch.floats(MAX_DOF)
-    share = pair[3] * spacing
+    q, points = scratch.floats(MAX_DOF), scratch.floats(ENDS_ROOM)
+    bar, g, j = int64(pair[0]), int64(pair[1]), int64(pair[2])
     low, high = max(0.0, share - spacing), min(1.0, share + spacing)
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_left = gap_at(q_from, q_to, left, ray_length, chain, boxes, pair, q)
-    at_right = gap_at(q_from, q_to, right, ray_length, chain, boxes, pair, q)
+    at_left = gap_at(q_from, q_to, left, ray_length, chain, boxes, bar, g, j, q, points)
+    at_right = gap_at(q_from, q_to, right, ray_length, chain, boxes, bar, g, j, q, points)
     for _ in range(N_GOLDEN):
         if at_left < at_right:
             high, right, at_right = right, left, at_left
             left = high - GOLDEN * (high - low)
-            at_left = gap_at(q_from, q_to, left, ray_length, chain, boxes, pair, q)
+            at_left = gap_at(q_from, q_to, left, ray_length, chain, boxes, bar, g, j, q, points)
         else:
             low, left, at_left = left, right, at_right
             right = low + GOLDEN * (high - low)
-            at_right = gap_at(q_from, q_to, right, ray_length, chain, boxes, pair, q)
+            at_right = gap_at(q_from, q_to, right, ray_length, chain, boxes, bar, g, j, q, points)
     share = 0.5 * (low + high)
     contacts[n, SHARE], contacts[n, MULTIPLIER] = share, 0.0
-    contacts[n, GAP] = gap_at(q_from, q_to, share, ray_length, chain, boxes, pair, q)
+    contacts[n, GAP] = gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points)
+    gaps = scratch.floats(LANES)
     for i in range(q_from.shape[0]):
         here = q[i]
         q[i] = here + STEP
-        ahead = gap_of(q, ray_length, chain, boxes, pair)
+        chain(q, ray_length, points, 0)
+        bar_gaps(points, 4 * bar, boxes, g, gaps)
+        ahead = gaps[j]
         q[i] = here - STEP
-        behind = gap_of(q, ray_length, chain, boxes, pair)
+        chain(q, ray_length, points, 0)
+        bar_gaps(points, 4 * bar, boxes, g, gaps)
         q[i] = here
-        contacts[n, GRADIENT + i] = (ahead - behind) / (2.0 * STEP)
+        contacts[n, GRADIENT + i] = (ahead - gaps[j]) / (2.0 * STEP)
     return n + 1
 
 
@@ -125,7 +123,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     contacts (capacity, 3 + dof): for each pair of bar and box, the local minima of their gap along
     the edge, the gap there [m], and its gradient by the joints [m/rad].
     """
-    n, n_pairs = 0, 0
+    dof, n, n_pairs = q_from.shape[0], 0, 0
     points, q = scratch.floats(ENDS_ROOM), scratch.floats(MAX_DOF)
     # Bar, group, lane and last sample of each pair that came close; its gap then; is it falling?
     pairs, gaps = scratch.ints(PAIRS_ROOM), scratch.floats(MAX_PAIRS)
@@ -135,7 +133,8 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     n_samples = int64(distance(q_from, q_to) / SPACING) + 2
     spacing = 1.0 / (n_samples - 1)
     for sample in range(n_samples):
-        between(q_from, q_to, sample * spacing, q)
+        for k in range(dof):
+            q[k] = q_from[k] + sample * spacing * (q_to[k] - q_from[k])
         n_bars = chain(q, ray_length, points, 0)
         for bar in range(n_bars):
             n_waiting, waiting[0] = 1, 0
@@ -166,9 +165,18 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                         pairs[4 * row], pairs[4 * row + 1], pairs[4 * row + 2] = bar, g, j
                         falling[row], gaps[row] = 1, math.inf
                     elif falling[row] and (pairs[4 * row + 3] < sample - 1 or gap > gaps[row]):
-                        pair = pairs[4 * row : 4 * row + 4]
+                        share = pairs[4 * row + 3] * spacing
                         n = add_contact(
-                            q_from, q_to, spacing, ray_length, chain, boxes, pair, contacts, n
+                            q_from,
+                            q_to,
+                            share,
+                            spacing,
+                            ray_length,
+                            chain,
+                            boxes,
+                            pairs[4 * row : 4 * row + 3],
+                            contacts,
+                            n,
                         )
                         falling[row] = 0
                     if gap < gaps[row] or pairs[4 * row + 3] < sample - 1:
@@ -176,8 +184,11 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                     gaps[row], pairs[4 * row + 3] = gap, sample
     for row in range(n_pairs):
         if falling[row]:
-            pair = pairs[4 * row : 4 * row + 4]
-            n = add_contact(q_from, q_to, spacing, ray_length, chain, boxes, pair, contacts, n)
+            share = pairs[4 * row + 3] * spacing
+            pair = pairs[4 * row : 4 * row + 3]
+            n = add_contact(
+                q_from, q_to, share, spacing, ray_length, chain, boxes, pair, contacts, n
+            )
     return n
 
 
