@@ -4,44 +4,31 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-import gc
 from multiprocessing.connection import Connection
 import os
 import pickle
-import select
 import sys
 import traceback
 from typing import Any
 
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import one_line
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Channel, Raised, STOP
 from rrth_planner.pipeline.request import PlanQuestion
-from rrth_planner.planning.options import TreeOptions
 
 
 def main() -> None:
     """Serve the connection of the given file descriptor until it is closed."""
     _lower_priority()
     channel, planner = Channel(Connection(int(sys.argv[1]))), InProcessPlanner()
-    # A hundred times as fast as the connection's own method, and asked as often while planning.
-    readable = select.poll()
-    readable.register(channel.line, select.POLLIN)
 
     def plan(question: PlanQuestion) -> MotionPlan:
         # Whatever comes meanwhile is a STOP, or the end of the owner.
-        return planner.plan(question, lambda: bool(readable.poll(0)))
-
-    def warm_up(arm: ArmModel, options: TreeOptions) -> None:
-        planner.warm_up(arm, options)
-        # The collector need not visit again what lives as long as the process.
-        gc.collect()
-        gc.freeze()
+        return planner.plan(question, lambda: channel.is_readable(0.0))
 
     work: dict[str, Callable[..., Any]] = {
-        'warm_up': warm_up,
+        'warm_up': planner.warm_up,
         'plan': plan,
         'violation_seen': planner.violation_seen,
     }
