@@ -91,7 +91,7 @@ def test_one_quiet_round_is_enough(node, spinning):
     with spinning(node):
         for k in range(1, 4):
             barrier.call(lambda: None)
-            # Before it was asked for, and in that round.
+            # After the round in which it was asked for, which may have begun before, and that one.
             assert len(looks) == 2 * k
 
 
@@ -106,7 +106,7 @@ def test_one_that_came_later_ends_the_waiting(node, spinning, monkeypatch, age, 
         with nullcontext() if is_news else pytest.raises(NodeIsBusyError):
             barrier.call(lambda: None)
     # An executor that handles only old messages is not waited for for ever.
-    assert (next(rounds) == 2) == is_news
+    assert (next(rounds) == 1) == is_news
 
 
 def test_cancelled_work_does_not_run(node, spinning, monkeypatch):
@@ -132,7 +132,6 @@ def test_a_round_that_was_asked_for_before_does_not_count(node, spinning, wait_u
         end, call = Event(), Event()
         executor.create_task(lambda: call.set() or end.wait(10.0))
         assert call.wait(10.0)
-        barrier._is_early_possible = True
         barrier._round.trigger()
         node.out.publish(Int32(data=1))
         assert node.out.wait_for_all_acked()
@@ -148,10 +147,7 @@ def test_a_wake_up_that_got_lost_is_made_up_for(node, spinning, monkeypatch):
     monkeypatch.setattr(barrier, '_round', lossy)
     with spinning(node):
         assert barrier.call(lambda: 1) == 1
-        assert len(tries) >= 2
-        # Each of them may still bring a round, which the next one is not taken in by.
-        assert barrier._is_early_possible
-        assert barrier.call(lambda: 2) == 2
+    assert len(tries) >= 2
 
 
 def test_nobody_waits_for_ever_for_an_executor_that_is_gone(node, monkeypatch):

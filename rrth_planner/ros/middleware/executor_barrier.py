@@ -42,8 +42,6 @@ class ExecutorBarrier:
         """Begin without work."""
         self._node, self._handled = node, handled
         self._task: _Task[Any] | None = None
-        # Whether a round may still come that was triggered for the task before.
-        self._is_early_possible = False
         self._round = node.create_guard_condition(self._on_round)
 
     def call(self, work: Callable[[], T]) -> T:
@@ -59,16 +57,15 @@ class ExecutorBarrier:
         if self._node.executor is None:
             # Callbacks that are called by hand have processed all messages.
             return work()
-        task = _Task(work, -1 if self._is_early_possible else self._handled()[0])
-        self._task, self._is_early_possible = task, False
+        task = _Task(work)
+        self._task = task
         end = time.monotonic() + LONGEST
         while True:
             self._round.trigger()
             try:
                 return task.future.result(AGAIN)
             except NotYet:
-                # Triggered again, in case a wake-up was lost.
-                self._is_early_possible = True
+                # In case a wake-up was lost.
                 if time.monotonic() > end and task.future.cancel():
                     raise NodeIsBusyError from None
             except CancelledError:
@@ -87,10 +84,10 @@ class ExecutorBarrier:
 
 
 class _Task(Generic[T]):
-    """Work to run once the node has caught up; n_handled: the count one round before, -1: open."""
+    """Work to run once the node has caught up, which takes one round at least to know."""
 
-    def __init__(self, work: Callable[[], T], n_handled: int) -> None:
-        self._work, self.begin, self.n_handled = work, time.time_ns(), n_handled
+    def __init__(self, work: Callable[[], T]) -> None:
+        self._work, self.begin, self.n_handled = work, time.time_ns(), -1
         self.future: Future[T] = Future()
 
     def run(self) -> None:
