@@ -159,7 +159,7 @@ class PlanningProcess:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         end.close()
-        self._is_busy = False
+        self._n_asked, self._is_busy = 0, False
         self._begin('warm_up', *self._warm_up)
 
     def _require_ready(self) -> None:
@@ -177,21 +177,24 @@ class PlanningProcess:
         return self._end(should_stop)
 
     def _begin(self, name: str, *arguments: Any) -> None:
-        self._is_busy = True
+        self._n_asked += 1
         # A dead process is detected while waiting for the answer.
         with suppress(OSError):
-            self._channel.send((name, arguments))
+            self._channel.send((self._n_asked, name, arguments))
+        self._is_busy = True
 
     def _end(self, should_stop: Callable[[], bool]) -> Any:
         """Return the answer to the last call, or raise its error."""
-        is_stopped = False
+        is_stopped, number, answer = False, 0, None
         try:
-            while not self._channel.is_readable(POLL_PERIOD):
-                if not is_stopped and should_stop():
-                    is_stopped = True
-                    self._channel.send(STOP)
-            answer = self._channel.receive()
-        except (EOFError, OSError) as problem:
+            # The answer to an earlier call, which nobody waited for, may come first.
+            while number != self._n_asked:
+                while not self._channel.is_readable(POLL_PERIOD):
+                    if not is_stopped and should_stop():
+                        is_stopped = True
+                        self._channel.send(STOP)
+                number, answer = self._channel.receive()
+        except Exception as problem:
             raise PlanningProcessError(self._restart('while working')) from problem
         self._is_busy = False
         if isinstance(answer, Raised):
@@ -241,6 +244,7 @@ class Channel:
         pickler.dump(value)
         # In one call: each one releases the interpreter, and waits for it again.
         self.line.send_bytes(pickle.dumps((pickler.news, out.getvalue()), protocol=5))
+        self._sent.update(pickler.news)
         _forget_first(self._sent)
 
     def is_readable(self, timeout: float) -> bool:
@@ -273,7 +277,7 @@ class _Pickler(pickle.Pickler):
             return None
         if id(part) not in self._sent:
             # Kept alive, so that nothing else can have its identity.
-            self._sent[id(part)] = self.news[id(part)] = part
+            self.news[id(part)] = part
         return id(part)
 
 

@@ -43,12 +43,12 @@ def serve(channel: Channel, work: Mapping[str, Callable[..., Any]]) -> None:
             if request is STOP:
                 # It came after the answer was sent.
                 continue
-            name, arguments = request
+            number, name, arguments = request
             try:
                 answer = work[name](*arguments)
             except Exception as problem:
                 answer = _portable(problem)
-            channel.send(answer)
+            channel.send((number, answer))
         except (EOFError, OSError):
             return
 

@@ -127,12 +127,39 @@ def test_a_stop_that_comes_after_the_answer_stops_nothing():
     thread = Thread(target=worker.serve, args=(theirs, {'double': lambda k: 2 * k}))
     thread.start()
     for k in range(3):
-        ours.send(('double', (k,)))
-        assert ours.receive() == 2 * k
+        ours.send((k, 'double', (k,)))
+        assert ours.receive() == (k, 2 * k)
         ours.send(STOP)
     ours.line.close()
     thread.join(LONGEST_WAIT)
     assert not thread.is_alive()
+
+
+def test_an_answer_that_nobody_waited_for_is_not_that_of_the_next_question(process):
+    begun = process.pid
+    os.kill(begun, signal.SIGKILL)
+    with pytest.raises(PlanningProcessError):
+        # It may die before or while it is asked.
+        while process.pid == begun:
+            process._begin('warm_up', *process._warm_up)
+            process._end(lambda: False)
+    # Its successor warms up, and is asked to do so again before anybody has waited for that.
+    process.warm_up(worlds.table_1_arm(), RRTHOptions(club_attempts=3))
+    here = in_process.InProcessPlanner()
+    for target in TARGETS:
+        assert process.plan(question(target)).target_distance == (
+            here.plan(question(target)).target_distance
+        )
+
+
+def test_what_cannot_be_sent_was_not_sent():
+    ours, theirs = map(Channel, Pipe())
+    arm = worlds.table_1_arm()
+    with pytest.raises(Exception, match='pickle'):
+        ours.send((arm, lambda: None))
+    ours.send(arm)
+    np.testing.assert_array_equal(theirs.receive().dh, arm.dh)
+    ours.line.close()
 
 
 def test_arms_and_scenes_are_sent_once():
@@ -211,8 +238,8 @@ def test_an_error_that_cannot_be_sent_becomes_a_sentence():
 
     ours, theirs = map(Channel, Pipe())
     Thread(target=worker.serve, args=(theirs, {'fail': fail}), daemon=True).start()
-    ours.send(('fail', ()))
-    raised = ours.receive()
+    ours.send((1, 'fail', ()))
+    _, raised = ours.receive()
     assert isinstance(raised.problem, RuntimeError)
     assert str(raised.problem) == 'LocalError: out of paper'
     ours.line.close()

@@ -65,6 +65,9 @@ class ExecutorBarrier:
             try:
                 return task.future.result(AGAIN)
             except NotYet:
+                if task.future.done():
+                    # It is the work that raised it.
+                    raise
                 # In case a wake-up was lost.
                 if time.monotonic() > end and task.future.cancel():
                     raise NodeIsBusyError from None
@@ -73,11 +76,10 @@ class ExecutorBarrier:
 
     def _on_round(self) -> None:
         task = self._task
-        if task is None:
+        if task is None or task.future.done():
             return
         before, (task.n_handled, came) = task.n_handled, self._handled()
         if came >= task.begin or task.n_handled == before:
-            self._task = None
             task.run()
         else:
             self._round.trigger()
