@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planner's node, called as a stranger would call it."""
 
+from dataclasses import replace
 import os
 import signal
 import subprocess
@@ -446,6 +447,24 @@ def test_whatever_goes_wrong_is_answered(start, monkeypatch, tmp_path):
     sentence = 'FAILURE (99999): planning failed unexpectedly: ZeroDivisionError: of a test; '
     (file,) = tmp_path.iterdir()
     assert message == f'{sentence}to replay it: ./run exec replay {file}'
+    assert not stranger.received['joint_trajectory']
+    assert stranger.answer().success
+
+
+def test_a_motion_that_begins_elsewhere_is_not_published(start, monkeypatch, tmp_path):
+    planner, stranger = start(incident_folder=str(tmp_path))
+    say_all(planner, stranger)
+    plan_question = in_process_planner.plan_question
+
+    def plan_from_elsewhere(question, should_stop):
+        q = question.q_start + [0.01, 0.0, 0.0, 0.0]
+        return plan_question(replace(question, q_start=q), should_stop)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(in_process_planner, 'plan_question', plan_from_elsewhere)
+        message = stranger.answer().message
+    assert message.startswith('FAILURE')
+    assert 'begins 0.0100 rad from the start that was asked for' in message
     assert not stranger.received['joint_trajectory']
     assert stranger.answer().success
 

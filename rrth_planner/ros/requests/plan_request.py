@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 import secrets
 
+import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.incident import disagreement_incident, Incident
+from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
@@ -18,7 +20,7 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.requests.handover import Handover, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
-from rrth_planner.ros.requests.revalidation import Revalidation
+from rrth_planner.ros.requests.revalidation import Revalidation, START_TOLERANCE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +113,12 @@ def plan_request(
             outcome = PlanOutcome(code, plan.sentence, plan, snapshot, handover)
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return outcome
+            gap = float(np.abs(plan.trajectory.positions[0] - question.q_start).max())
+            if not gap <= START_TOLERANCE:
+                raise RrthError(
+                    f'the planned motion begins {gap:.4f} rad from the start that was asked for, '
+                    f'expected at most {START_TOLERANCE:g} rad'
+                )
             if handover is not None:
                 if clock() > handover.time:
                     continue
