@@ -42,6 +42,12 @@ QUESTION = PlanQuestion(
 )
 
 
+@pytest.fixture(name='_compiled', scope='module', autouse=True)
+def _compile():
+    """Have all kernels compiled: a command says so where they are not."""
+    pipeline.warm_up(QUESTION.arm, QUESTION.options)
+
+
 def disagree(monkeypatch):
     """Have python-fcl find a violation in every motion."""
     monkeypatch.setattr(trajectory_validation, 'first_violation', lambda *_: TOUCH)

@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r'^```(\w*)\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r'-?\d+(\.\d+)?(e[+-]?\d+)?')
-COMPILING = re.compile(r'^\w+: compiling kernels, .*: takes .*\n', re.MULTILINE)
+COMPILING = re.compile(r'^(\w+: )?compiling kernels, .*: takes .*\n', re.MULTILINE)
 # Like ./run, but with the Python of the tests.
 RUN = """\
 #!/bin/sh
