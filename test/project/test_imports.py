@@ -34,24 +34,22 @@ MAY = {
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
-ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
+ROS = {'rclpy', 'tf2_ros', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
 LIBRARIES = {
     'kernels': {'numba'},
     'ros': {*ROS, 'tqdm'},
     'visualization': {'matplotlib', 'mpl_toolkits', 'viser'},
-    'reproduction': {'matplotlib', 'mpl_toolkits'},
-    'cli': {*ROS, 'matplotlib', 'viser', 'tqdm'},
+    'reproduction': {'matplotlib'},
+    'cli': {'rclpy', 'matplotlib', 'viser', 'tqdm'},
 }
 # What single modules import beyond that.
 OWN = {
-    'rrth_planner.collision.fcl_checker': {'fcl'},
     'rrth_planner.collision.fcl_objects': {'fcl'},
     'rrth_planner.io.resources': {'ament_index_python'},
     'rrth_planner.io.text_file': {'yaml'},
     'rrth_planner.io.urdf.chain': {'yourdfpy', 'trimesh'},
     'rrth_planner.reproduction.cluster': {'tqdm', 'distributed'},
     'rrth_planner.reproduction.row_store': {'pyarrow'},
-    'rrth_planner.reproduction.run': {'numba'},
     'rrth_planner.ros.client.recorder': {'mcap'},
     'rrth_planner.ros.client.recording_reader': {'mcap', 'mcap_ros2'},
     'rrth_planner.ros.messages.definitions': {'rosbags'},
@@ -64,7 +62,6 @@ FCL_USERS = {
     'rrth_planner.collision.fcl_checker',
     'rrth_planner.collision.trajectory_validation',
     'rrth_planner.collision.checker_comparison',
-    'rrth_planner.pipeline.collision_escape',
 }
 # Modules that import of the project below their top: the node says that it compiles before it
 # imports what has to be compiled, a command so too, and which libraries it misses before it
