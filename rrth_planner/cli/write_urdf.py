@@ -69,7 +69,12 @@ def urdf_of_file(
     radius: float = 0.015,
     base_frame: str = 'torso',
 ) -> str:
-    """Return the URDF of an arm's file, named as there; without files, those of the package."""
+    """
+    Return the URDF of an arm's file, named as there; without files, those of the package.
+
+    Bars that have no radius get the given one [m]. Raise RrthError where a file cannot be read, or
+    describes no arm or no settings.
+    """
     arm = load_arm(arm_file)
     name = load_yaml(arm_file or resource_path('config/arm.yaml')).get('name', 'arm')
     speeds = load_settings(arm.dof, settings_file).limits.velocity

@@ -19,11 +19,12 @@ from rrth_planner.model.trajectory import (
     Trajectory,
 )
 
-# A reading belongs to a motion that passes so close to it [rad], and so fast [rad/s].
+# An arm is on a motion that is, at some time, as near to its reading as this [rad, rad/s].
 SAME_POSITION, SAME_VELOCITY = 2e-3, 0.03
+# Spacing of the samples among which that time is sought first [s].
 SEARCH_SPACING = 1e-3
-# Tolerances where it hardly moves: [rad], and a share of its speed; slower, it has no direction
-# [rad/s].
+# The same for an arm that hardly moves: [rad], and as a share of its speed. An arm slower than
+# STILL has no direction [rad/s].
 SHARP_POSITION, SHARP_VELOCITY, STILL = 1e-4, 0.02, 1e-5
 # No arm executes a motion much faster than commanded.
 FASTEST_RATE = 1.05
@@ -31,13 +32,14 @@ FASTEST_RATE = 1.05
 SLOW, LATEST = 0.05, 0.05
 # An arm that is further from its whole motion, in one joint, does not execute it [rad].
 MAX_DEVIATION = 0.1
-# A motion is published no earlier before it begins; more means a clock that was set back [s].
+# Longest time from publishing a motion to its beginning; a longer one means that the clock was
+# set back [s].
 LONGEST_LEAD = 0.25
 # Spacing of the samples of a motion that an arm is located by [s].
 SPACING = 5e-3
 # Greatest deviation of an arm that is on time [rad].
 ON_TIME = 5e-4
-# For so long a motion has hardly left its start [s].
+# Until this time a motion has hardly left its start [s].
 BEGINNING = 0.05
 # Number of samples to decide whether it moves soon.
 N_SOON = 9
@@ -86,7 +88,7 @@ class ExecutingMotion:
         return at + now - taken if math.isfinite(at) else None
 
     def _place(self, q: Array, guess: float) -> float:
-        """Return the time of the nearest point, of several the one near a guess; NaN: none [s]."""
+        """Return when [s] the motion is nearest to q, if often, then near a guess; NaN: never."""
         motion = self.trajectory
         times = np.linspace(0.0, motion.duration, 2 + int(motion.duration / SPACING))
         gaps = positions_at(motion, times) - q
@@ -118,7 +120,7 @@ class ExecutingMotion:
         return bool((np.abs(sample(self.trajectory, since)[1]) > REST_SPEED).any())
 
     def near(self, guess: float, q: Array, same: float = math.inf) -> float:
-        """Return when, near a guess, the motion passes q; NaN if not within `same` [s, rad]."""
+        """Return when [s], near a guess, the motion passes q; NaN if not within `same` [rad]."""
         curves = piece_coefficients(self.trajectory)
         return float(time_on(curves, self.trajectory.times, guess, q, same, SLOW, LATEST))
 
@@ -148,6 +150,8 @@ def predict_start_state(
     ----------
     positions, velocities : ndarray, shape (dof,)
         Of the reading [rad, rad/s].
+    running : Trajectory or None
+        The last commanded motion.
     ahead : float
         From the reading on, >= 0 [s].
     known : tuple of float, optional
@@ -175,7 +179,11 @@ def predict_start_state(
 
 
 def sharp_phase_of(q: Array, v: Array, running: Trajectory) -> tuple[float, float] | None:
-    """Return `phase_of` of an arm that hardly moves, with tolerances that are tight enough."""
+    """
+    Return `phase_of` of an arm that hardly moves, with tolerances that are tight enough.
+
+    None also where it is too slow to have a direction, or faster than arms execute a motion.
+    """
     speed = float(np.linalg.norm(v))
     if speed < STILL:
         return None
@@ -192,7 +200,8 @@ def phase_of(
     """
     Return the time within a motion that the arm is at [s], and the rate of its execution.
 
-    None where the motion does not pass the reading within `same` [rad, rad/s].
+    q and v, shape (dof,), are a reading of the arm [rad, rad/s]; None where the motion does not
+    pass it within `same` [rad, rad/s].
     """
     n = max(2, int(running.duration / SEARCH_SPACING))
     times = np.linspace(0.0, running.duration, n)

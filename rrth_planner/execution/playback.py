@@ -21,7 +21,8 @@ EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
 # A motion that ends later than this is rejected [s].
 LONGEST_WAIT = 3600.0
-# By number of coefficients; and what differentiation multiplies them with.
+# Matrices to Bernstein form, by number of coefficients; and the factors that differentiation
+# brings down.
 _TO_BERNSTEIN = {size: to_bernstein(size - 1) for size in (4, 5, 6)}
 _POWERS = np.arange(1.0, 6.0)[:, None]
 
@@ -85,11 +86,10 @@ def at_present(playback: Playback, time: float) -> Playback:
 
 def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
     """
-    Return the motion of an arm that stops along its path from now on.
+    Return the motion of an arm that stops along its path from a time on, which is now [s].
 
-    The stop is `fast_stop.fast_stop`, with the same limits. An arm that comes to rest by itself as
-    soon does that; one that is stopping already continues. The time is now [s], and the limits of
-    the arm are by the clock.
+    It is the stop of `fast_stop.fast_stop`; the limits hold by the clock, at any time scale. An
+    arm that comes to rest by itself as soon continues, and so does one that is stopping already.
     """
     playback = at_present(playback, time)
     if playback.is_stopping or time >= playback.end_time:
@@ -115,7 +115,7 @@ def stop(playback: Playback, limits: MotionLimits, time: float) -> Playback:
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlaybackRules:
     """
-    Which motions the arm accepts, and how it moves; raises OptionsError for a value out of range.
+    Which motions the arm accepts, and how it moves.
 
     Parameters
     ----------
@@ -125,6 +125,11 @@ class PlaybackRules:
         Seconds of a motion that begins at rest per second of the clock, above 0 and up to 1 [-].
     limits : MotionLimits
         Of each joint; a stop keeps the jerk limit, a motion may have any jerk.
+
+    Raises
+    ------
+    OptionsError
+        A value out of its range.
 
     """
 

@@ -42,7 +42,7 @@ def write_incident(incident: Incident, folder: Path) -> Path:
     """
     Write an incident to a new file of a folder, and remove the oldest beyond a hundred.
 
-    Creates the folder if needed; the file is written atomically, or OSError is raised.
+    Creates the folder if needed, and writes the file atomically; raises OSError where it cannot.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stamp = ''.join(c for c in incident.time[:26] if c.isalnum())
@@ -74,7 +74,15 @@ def _remove_oldest(folder: Path, newest: Path) -> None:
 
 
 def incident_from_mapping(data: Any) -> Incident:
-    """Return the incident of a mapping; RrthError: an entry missing, unknown or out of range."""
+    """
+    Return the incident of a mapping.
+
+    Raises
+    ------
+    RrthError
+        An entry that is missing, unknown or out of its range.
+
+    """
     if isinstance(data, Mapping) and data.get('format') != FORMAT:
         raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
     given = _fields_of(data, Incident, 'incident', ('format',))
@@ -106,7 +114,11 @@ def _line(value: Any, name: str) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Return a value in the types of YAML; a dataclass as a mapping of its fields."""
+    """
+    Return a value in the types of YAML; a dataclass as a mapping of its fields.
+
+    Raise RecordError for options of no algorithm of `ALGORITHMS`.
+    """
     if isinstance(value, TreeOptions):
         names = {kind: name for name, kind in ALGORITHMS.items()}
         if type(value) not in names:
@@ -135,7 +147,7 @@ def _plain_fields(value: Any) -> dict[str, Any]:
 
 
 def _question(data: Any) -> PlanQuestion:
-    """Return the request that `plain` wrote, or raise RrthError."""
+    """Return the question that `plain` wrote, or raise RrthError."""
     given = _fields_of(data, PlanQuestion, 'question')
     arm = _arm(given['arm'])
     lengths = {name: number(given[name], name, 'm', RecordError) for name in LENGTHS}
@@ -171,7 +183,7 @@ def _scene(data: Any, name: str) -> Scene:
 
 
 def _trajectory(data: Any, name: str) -> Trajectory | None:
-    """Return the trajectory that `plain` wrote, None of nothing, or raise RrthError."""
+    """Return the trajectory that `plain` wrote, None for None, or raise RrthError."""
     return None if data is None else Trajectory(**_fields_of(data, Trajectory, name))
 
 

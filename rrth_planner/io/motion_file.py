@@ -96,7 +96,7 @@ def write_motion(motion: JointMotion, path: Path, comments: Sequence[str] = ()) 
 
 
 def read_motion(path: str | Path) -> JointMotion:
-    """Return the motion that `write_motion` wrote; RrthError: no file, or none of a motion."""
+    """Return the motion of a file by `write_motion`; raise RrthError where it holds none."""
     file = Path(path)
     check_suffix(file)
     text = read_text(file)

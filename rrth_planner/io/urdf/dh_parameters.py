@@ -15,7 +15,7 @@ MEETING = 1e-9
 
 def rows_of_axes(points: Array, directions: Array, x_0: Array) -> tuple[Array, Array, float]:
     """
-    Return the rows of a chain at rest, in Craig's convention; ModelError: not finite.
+    Return the rows of a chain at rest, in Craig's convention.
 
     Parameters
     ----------
@@ -36,6 +36,11 @@ def rows_of_axes(points: Array, directions: Array, x_0: Array) -> tuple[Array, A
     ray_lead : float
         How far the origin of the tool's row lies before the given point of the ray, on the ray
         [m]. A row without `d` can end only where the ray is nearest to the last axis.
+
+    Raises
+    ------
+    ModelError
+        Numbers that are not finite.
 
     """
     p = np.array(frozen_array(points, (None, 3), 'points of the axes', 'm', ModelError))

@@ -64,7 +64,15 @@ class ImportedArm:
 
 
 def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> ImportedArm:
-    """Return the arm of a chain, as in `ImportedArm`; ModelError: a radius or pose is none."""
+    """
+    Return the arm of a chain; T_base_link, shape (4, 4), and radius [m] as in `ImportedArm`.
+
+    Raises
+    ------
+    ModelError
+        A radius that is negative or not finite, or a pose that is none.
+
+    """
     if not 0.0 <= radius < np.inf:
         raise ModelError(f'radius: {radius}, expected a length >= 0 [m]')
     T_0, dh, ray_lead = rows_of_axes(chain.points, chain.directions, chain.x_first)

@@ -176,7 +176,7 @@ class PlannerClient(Node):
 
 
 class DemoClient(PlannerClient):
-    """The client of the demo, which also follows the arm."""
+    """The demo's client: it publishes body and target, requests motions, and follows the arm."""
 
     def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
         """Create publishers, subscriptions and the client of the planner."""

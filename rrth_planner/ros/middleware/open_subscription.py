@@ -48,10 +48,12 @@ def decoded(
 @dataclass(frozen=True, slots=True)
 class Arrival:
     """
-    When a message was sent and received [ns], and whether it is late.
+    When a message was sent, when it was received [ns], and whether it is late.
 
     Parameters
     ----------
+    sent : (int, int)
+        Source timestamp [ns] and sequence number.
     is_newer : callable or None
         Of a late message, which came after one that was sent later: whether another message was
         sent after it. None: the message is not late, as far as is known.
