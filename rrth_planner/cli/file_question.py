@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 def folded() -> list[float]:
-    """Return where the playback starts, (4,) [rad]."""
+    """Return where the packaged arm starts in the playback: folded, (4,) [rad]."""
     file = load_yaml(resource_path('config/playback.yaml'))
     return list(file['/**']['ros__parameters']['initial_positions'])
 
 
 def new_seed(seed: int) -> int:
-    """Return a seed, a new one for -1."""
+    """Return the seed; for -1 a new one."""
     return int(np.random.default_rng().integers(2**31)) if seed == -1 else seed
 
 
@@ -47,9 +47,9 @@ def question_of(
     seed: int,
 ) -> PlanQuestion:
     """
-    Return the question for a motion with some settings, but for their seed.
+    Return the question for a motion from q_start, (dof,) [rad], to a target, (3,) [m].
 
-    From q_start, shape (dof,) [rad], to a target, shape (3,) in the base frame [m].
+    Scene and target are in the base frame. The settings' own seed does not count, `seed` does.
     """
     return PlanQuestion(
         arm=arm,
@@ -66,7 +66,7 @@ def question_of(
 
 
 def plan_of(question: PlanQuestion, name: str) -> 'MotionPlan':
-    """Return the answer; the command of that name says so if the planner is compiled first."""
+    """Return the answer to a question; the named command says so if kernels must be compiled."""
     # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
     from rrth_planner.kernels.precompile import prepare_kernels
 

@@ -19,7 +19,7 @@ OUTPUT_CLOSED = 141
 
 
 def program(name: str) -> str:
-    """Return what a command is called: its name, or `rrth NAME` where `rrth` started it."""
+    """Return what users call a command: its name, or `rrth NAME` where `rrth` started it."""
     return f'rrth {name}' if Path(sys.argv[0]).stem == 'rrth' else name
 
 
@@ -53,7 +53,7 @@ def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True
 
 
 def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]) -> Array:
-    """Return the values of an option, one for each joint, (dof,) [rad or m], or raise."""
+    """Return an option's value for each joint, (dof,) [rad or m], or raise OptionsError."""
     n = len(joint_names)
     if len(given) != n:
         raise OptionsError(
@@ -64,12 +64,12 @@ def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]
 
 
 def run(name: str, action: Callable[[], int | None], failed: int) -> int:
-    """Run a command; return its exit code, which `failed` is where it raises an RrthError."""
+    """Run a command; return its exit code: `failed` where it raises RrthError or OSError."""
     try:
         code = action()
         sys.stdout.flush()
     except BrokenPipeError:
-        # Its reader, as `head`, has ended; Python must not fail to flush the rest at its end.
+        # The reader, `head` say, has ended; Python must not fail as it flushes the rest at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OUTPUT_CLOSED
     except (RrthError, OSError) as problem:

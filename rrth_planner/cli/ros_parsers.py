@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The parsers of commands whose own modules need ROS; these do not, so that --help needs none."""
+"""Parsers of the commands whose modules import ROS, kept apart so that --help works without it."""
 
 import argparse
 import math
@@ -63,7 +63,7 @@ example:    %(prog)s -o run.mcap --duration 30 --ros-args -r __ns:=/left
 
 
 def point_at() -> argparse.ArgumentParser:
-    """Return the parser of everything but the words for ROS."""
+    """Return the parser of all arguments but those of ROS."""
     command = command_parser('point_at', POINT_AT, POINT_AT_EPILOG)
     add = command.add_argument
     for axis, direction in (('x', 'forward'), ('y', 'left'), ('z', 'up')):

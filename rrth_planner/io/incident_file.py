@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Incidents as YAML files, to the bit: a folder keeps the last hundred."""
+"""Incidents as YAML files, every number to the bit; a folder keeps the last hundred."""
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Planning in a process of its own, with an interpreter of its own."""
+"""Planning in another process, with an interpreter of its own."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -86,15 +86,15 @@ class PlanningProcess:
     """
     A planner in a process of its own.
 
-    It starts at once, ends with this one in any case, and is restarted after it died: the question
-    that it died on raises PlanningProcessError. For one caller at a time.
+    It starts at once, ends with this process in any case, and is restarted where it has died: the
+    call that it died in raises PlanningProcessError. For one caller at a time.
 
     Parameters
     ----------
     arm, options
         The kernels are loaded for these.
     on_death : callable
-        Called with a sentence after it died.
+        Called with a sentence after the process has died.
 
     """
 
@@ -219,8 +219,9 @@ class Channel:
     """
     One end of a pipe to another process.
 
-    What lasts from question to question is sent once, and remembered by its identity at the
-    sender: much is derived from arms and scenes, and kept for as long as they are the same object.
+    What lasts from question to question, `SENT_ONCE`, is sent once, and then named by its identity
+    at the sender. So the receiver has the same object each time, and keeps what it derives from
+    it.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ class Channel:
         """
         Return whether a value or the end of the line is there, or comes within a time [s].
 
-        A hundred times as fast as the connection's own `poll`, and asked as often while planning.
+        A hundred times as fast as the connection's own `poll`: planning asks it often.
         """
         return bool(self._readable.poll(1e3 * timeout))
 
@@ -265,7 +266,7 @@ class Channel:
 
 
 class _Pickler(pickle.Pickler):
-    """Writes the identity of what is sent once; what was not sent yet is its news."""
+    """Writes identities of what is sent once; `news` are those objects that were not sent yet."""
 
     def __init__(self, out: io.BytesIO, sent: dict[int, Any]) -> None:
         super().__init__(out, protocol=5)

@@ -24,7 +24,8 @@ from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
-# A message from further ahead came before the clock was set back, at an unknown time [s].
+# A message that came further ahead of now than this came before the clock was set back: its age
+# is unknown [s].
 CLOCK_STEP = 0.1
 
 
@@ -42,7 +43,7 @@ class ArmHasMoved(RequestError):
 
 
 class Input(Generic[T]):
-    """The last good value of one topic; a rejected message changes nothing but the counts."""
+    """The last good value of one topic, when it was received [s], and the last rejection."""
 
     def __init__(self, topic: str, empty: T) -> None:
         """Begin with an empty value; the resolved name of the topic is for messages."""
@@ -87,7 +88,7 @@ class Input(Generic[T]):
         return max(0.0, now - self.received)
 
     def overdue(self, now: float, timeout: float) -> str:
-        """Return how old the last good message is, beyond a timeout [s]; empty: it is not."""
+        """Return, where the last good message is older than a timeout [s], how old; else ''."""
         age = self.age(now)
         return f'{age:.3f} s old, expected at most {timeout:g}' if 0.0 < timeout < age else ''
 
@@ -277,7 +278,7 @@ def _late(source: Input[Any], age: str, code: ErrorCode) -> RequestError:
 
 
 def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
-    """Return why an input is stale or rejected; empty: none is."""
+    """Return why body or joints are stale or rejected at a time [s]; empty: neither is."""
     if source.body.is_last_rejected:
         return f'the last body was rejected, {source.body.rejection}'
     if source.joint_rejection is not None:

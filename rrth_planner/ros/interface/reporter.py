@@ -17,12 +17,13 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
+# Diagnostics are published at least this often [s].
 PERIOD = 1.0
-# So many boxes are remembered as reported.
+# Number of expired boxes that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
-# Durations are counted in bins, so many a decade from the shortest on [s].
+# Durations are counted in bins: bins in a decade, decades, and where the first begins [s].
 BINS, DECADES, SHORTEST = 48, 8, 1e-6
 
 
@@ -44,7 +45,7 @@ class PlanReport:
     length : float
         Of the path [rad].
     clearance : float
-        Least one [m].
+        The least along the motion [m].
 
     """
 
@@ -70,13 +71,13 @@ class Figures:
         self._counts = [0] * (BINS * DECADES)
 
     def add(self, elapsed: float) -> None:
-        """Count once more."""
+        """Count one more, with its duration [s]."""
         self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
         at = math.ceil(BINS * math.log10(max(elapsed, SHORTEST) / SHORTEST))
         self._counts[min(at, len(self._counts) - 1)] += 1
 
     def quantile(self, share: float) -> float:
-        """Return what a share of all took at most, rounded up by no more than 5 % [s]."""
+        """Return what a share of the durations do not exceed, rounded up by at most 5 % [s]."""
         wanted, seen = share * self.n, 0
         for k, count in enumerate(self._counts):
             seen += count
@@ -99,7 +100,7 @@ class Reporter:
     """Publish `/diagnostics` every second and on change, and log each request once."""
 
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
-        """Advertise `/diagnostics`; `parameters` is to be kept up to date."""
+        """Advertise `/diagnostics`; the owner keeps `self.parameters` up to date."""
         self.parameters = parameters
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
@@ -108,7 +109,7 @@ class Reporter:
         self.monitor_state = ('no motion', '')
         self._remaining_motion_checks, self._stops_published = Figures(), Figures()
         self._n_incidents, self._last_incident = 0, ''
-        # Of what the threads of executor and worker count and publish.
+        # Held while the threads of executor and worker count and publish.
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
@@ -141,7 +142,7 @@ class Reporter:
         self._is_changed = True
 
     def publish(self) -> None:
-        """Publish the diagnostics of now, or, when the last are too recent, soon."""
+        """Publish the diagnostics now, or, where the last ones are too recent, soon."""
         self._is_changed = True
         self._publish_change()
 

@@ -31,7 +31,7 @@ from rrth_planner.ros.requests.plan_request import plan_request, PlanOutcome, re
 from rrth_planner.ros.requests.revalidation import Revalidation
 from trajectory_msgs.msg import JointTrajectory
 
-# Period of the work after a stop, and shortest one between motions shown [s].
+# Period of the work after a stop, and shortest time from one motion shown to the next [s].
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 # An arm may come to rest so much later than its commanded stop [s].
 LONGEST_SETTLING = 1.0
@@ -48,6 +48,7 @@ class Response:
     is_solved : bool
         Whether a motion was published.
     text : str
+        Code and sentence, as `error_codes.answer` writes them.
     tool_path : callable
         Returns the tool's path; empty where no motion was published.
     conclude : callable
@@ -80,7 +81,7 @@ class _Resumption:
     latest: float
 
     def is_due(self, joints: JointReading | None) -> bool:
-        """Return whether the arm is at rest since the end of its stop, or time is up."""
+        """Return whether the arm rests by a reading after the end of its stop, or time is up."""
         return time.monotonic() >= self.latest or (
             joints is not None
             and joints.received >= self.stopped
@@ -175,7 +176,7 @@ class PlanQueue:
         return len(ended)
 
     def close(self) -> None:
-        """End everything; nothing is published afterwards, and no request may follow."""
+        """End all work; nothing is published afterwards, and no request may follow."""
         self._is_closed = True
         self.cancel()
         self._monitor.close()
