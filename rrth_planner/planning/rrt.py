@@ -44,7 +44,7 @@ def search(
     world, n_goals, dof = problem.world, len(problem.q_goals), len(problem.q_start)
     budget = options.max_samples if budget is None else budget
     club = np.empty((0, dof)) if club is None else club
-    room = workspace(dof, room_for(options, n_goals, previous, budget))
+    room = workspace(dof, room_for(n_goals, previous, budget))
     drawn, stopped, bits = 0, None, random_state(rng)
     tree_q, parents, sizes = trees = room.tree_q[0], room.parents[0], room.sizes[0]
     settings = np.array(growth_settings(options))
@@ -92,7 +92,7 @@ def growth_settings(options: GrowthOptions) -> list[float]:
     ]
 
 
-def room_for(options: GrowthOptions, n_roots: int, previous: Sequence[Tree], budget: int) -> int:
+def room_for(n_roots: int, previous: Sequence[Tree], budget: int) -> int:
     """Return how many nodes a tree may come to have."""
     return min(2 * budget, MAX_NODES) + n_roots + sum(len(t.nodes) for t in previous) + 2
 

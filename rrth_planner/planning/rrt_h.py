@@ -44,7 +44,7 @@ def search(
         return PlanResult(status=stopped, path=None, is_reproducible=False)
     n_roots = min(len(problem.q_goals), rrt_h.MAX_ROOTS)
     budget = max(options.max_samples, options.club_budget)
-    room = workspace(len(problem.q_start), room_for(options, n_roots, previous, budget))
+    room = workspace(len(problem.q_start), room_for(n_roots, previous, budget))
     settings = _settings(options, deadline)
     given = (
         problem.world.space,
@@ -71,7 +71,7 @@ def search(
             break
         settings[rrt_h.UNTIL] = deadline.within(SLICE)
         rrt_h.advance(*given, bits, growth, *left)
-    return _result(problem, options, deadline, room, stopped, previous if is_straight else ())
+    return _result(options, deadline, room, stopped, previous if is_straight else ())
 
 
 def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
@@ -93,7 +93,6 @@ def _settings(options: RRTHOptions, deadline: Deadline) -> Array:
 
 
 def _result(
-    problem: PlanningProblem,
     options: RRTHOptions,
     deadline: Deadline,
     room: Workspace,

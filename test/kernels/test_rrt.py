@@ -31,7 +31,7 @@ def grow(world, q_start, q_goals, rng, budget, **options):
     """Return what one growth brought, and the room it grew in, which was filled with NaN."""
     problem = PlanningProblem(world=world, q_start=q_start, q_goals=q_goals)
     chosen = RRTOptions(**{'step_size': STEP, **options})
-    room = buffers.workspace(4, rrt.room_for(chosen, len(q_goals), (), budget))
+    room = buffers.workspace(4, rrt.room_for(len(q_goals), (), budget))
     room.tree_q[:] = np.nan
     never = Deadline(1000.0, lambda: False)
     return rrt.search(problem, chosen, rng, never, budget=budget), room
