@@ -107,7 +107,7 @@ class PlannerNode(Node):
             publishers,
             self._monitor,
             self._planner,
-            self._scene_monitor.body_progress,
+            self._scene_monitor.read_bodies,
         )
 
     def close(self) -> None:

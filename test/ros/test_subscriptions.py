@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Copies of messages: each counts once, and what was sent last stays last."""
 
-from functools import partial
-
 import pytest
 
 pytest.importorskip('rclpy')
@@ -170,7 +168,8 @@ def test_a_late_latched_target_does_not_override_a_newer_one():
     ]
     new, old = (serialize_message(target(x)) for x in (2.0, 1.0))
     for subscription in subscriptions:
-        subscription._on_live(new, {'source_timestamp': 200, 'publication_sequence_number': 1})
+        info = {'source_timestamp': 200, 'publication_sequence_number': 1}
+        subscription._on_copy(new, info, None)
         # Of another publisher, whose numbers begin at 1 as well.
         for _ in range(2):
             subscription._on_copy(
@@ -195,27 +194,6 @@ def test_a_late_body_changes_neither_age_nor_rejection():
     assert source.age(4.0) == 3.0
     assert source.accept(WearerBody, 4.0)
     assert not source.is_last_rejected
-
-
-@pytest.mark.usefixtures('ros_context')
-def test_progress_is_that_of_the_reader_that_matches_all_publishers():
-    node = Node('subscriber')
-    subscription = OpenSubscription(node, PointStamped, 'target', lambda *_: None)
-    data = serialize_message(target())
-    assert subscription.progress() == (0, 0)
-    # Copies too: they stand in the queues with the others.
-    for read, came, expected in (
-        (subscription._on_live, 500, 500),
-        (partial(subscription._on_copy, reader=RELIABLE), 600, 500),
-        (subscription._on_live, 700, 700),
-        # Of a middleware without that.
-        (subscription._on_live, 0, 0),
-    ):
-        n = subscription.progress()[0]
-        info = {'source_timestamp': 100, 'publication_sequence_number': 1}
-        read(data, {**info, 'received_timestamp': came})
-        assert subscription.progress() == (n + 1, expected)
-    node.destroy_node()
 
 
 def test_a_late_array_does_nothing_to_markers_that_newer_ones_have_edited():

@@ -170,10 +170,7 @@ class Wire:
         n = next(self.sent)
         subscription = self.subscriptions[name]
         info = {'source_timestamp': n, 'publication_sequence_number': n}
-        if is_reliable:
-            subscription._on_copy(data, info, 'reliable')
-        else:
-            subscription._on_live(data, info)
+        subscription._on_copy(data, info, 'reliable' if is_reliable else None)
         assert not self.complaints.errors
         if source.n_rejected > before[0]:
             assert source.n_rejected == before[0] + 1

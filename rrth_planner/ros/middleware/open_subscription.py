@@ -156,28 +156,30 @@ class OpenSubscription:
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_rejection, self._on_error = on_message, on_rejection, on_error
         self._decode, self._copies = decode, Copies(takes_late)
-        self._n_read = self._live_came = 0
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
         profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
             on_match = SubscriptionEventCallbacks(
                 matched=lambda _: self.match_publishers(), use_default_callbacks=False
             )
-            self._live = self._subscribe(profile, self._on_live, on_match)
+            self._live = self._subscribe(profile, None, on_match)
         except UnsupportedEventTypeError:
-            self._live = self._subscribe(profile, self._on_live, None)
+            self._live = self._subscribe(profile, None, None)
             self._timer = node.create_timer(
                 POLL_PERIOD, self.match_publishers, clock=Clock(clock_type=ClockType.STEADY_TIME)
             )
         self.topic_name = self._live.topic_name
 
-    def progress(self) -> tuple[int, int]:
-        """
-        Return the number of copies read, and the arrival of the last one [ns].
-
-        Of the reader that matches all publishers; 0 where its middleware does not say.
-        """
-        return self._n_read, self._live_came
+    def read_all(self) -> None:
+        """Process the messages that have been received; called by the thread that spins."""
+        for reader in (self._live, *self._reliable.values()):
+            # It holds no more; those that come meanwhile have their turn.
+            for _ in range(DEPTH):
+                with reader.handle:
+                    taken = reader.handle.take_message(self._msg_type, True)
+                if taken is None:
+                    break
+                reader.callback(*taken)
 
     def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
@@ -188,29 +190,26 @@ class OpenSubscription:
                 and qos.durability in (DurabilityPolicy.VOLATILE, DurabilityPolicy.TRANSIENT_LOCAL)
                 and qos.durability not in self._reliable
             ):
-                self._reliable[qos.durability] = self._subscribe(
-                    QoSProfile(
-                        depth=DEPTH, reliability=qos.reliability, durability=qos.durability
-                    ),
-                    partial(self._on_copy, reader=qos.durability),
-                    SubscriptionEventCallbacks(use_default_callbacks=False),
+                profile = QoSProfile(
+                    depth=DEPTH, reliability=qos.reliability, durability=qos.durability
                 )
+                events = SubscriptionEventCallbacks(use_default_callbacks=False)
+                self._reliable[qos.durability] = self._subscribe(profile, qos.durability, events)
 
     def _subscribe(
-        self, profile: QoSProfile, callback: Any, events: SubscriptionEventCallbacks | None
+        self,
+        profile: QoSProfile,
+        reader: DurabilityPolicy | None,
+        events: SubscriptionEventCallbacks | None,
     ) -> Subscription:
+        callback = partial(self._on_copy, reader=reader)
         # Raw, so that the copies that do not count are not even decoded.
         return self._node.create_subscription(
             self._msg_type, self._topic, callback, profile, event_callbacks=events, raw=True
         )
 
-    def _on_live(self, data: bytes, info: dict[str, Any]) -> None:
-        self._live_came = info.get('received_timestamp') or 0
-        self._on_copy(data, info, None)
-
     def _on_copy(self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None) -> None:
         """Take a copy of a message from a reader; None: the one that matches all publishers."""
-        self._n_read += 1
         sent = info['source_timestamp'], info['publication_sequence_number']
         # Not every middleware has the time of reception.
         received = info.get('received_timestamp') or time.time_ns()

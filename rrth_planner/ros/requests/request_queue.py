@@ -99,8 +99,8 @@ class PlanQueue:
         Its parameters, as they are when a request's turn begins, are those of the plan.
     monitor : ExecutionMonitor
         Monitors each published motion; its stops are checked again here, and replanned.
-    handled : callable
-        As in `ExecutorBarrier`, of the bodies.
+    read_bodies : callable
+        Processes the bodies received so far.
 
     """
 
@@ -112,12 +112,12 @@ class PlanQueue:
         publishers: PlanPublishers,
         monitor: ExecutionMonitor,
         planner: Planner,
-        handled: Callable[[], tuple[int, int]],
+        read_bodies: Callable[[], None],
     ) -> None:
         """Start with nothing to do."""
         self._node, self._inputs, self._reporter = node, inputs, reporter
         self._publishers, self._monitor, self._planner = publishers, monitor, planner
-        self._barrier = ExecutorBarrier(node, handled)
+        self._barrier = ExecutorBarrier(node, read_bodies)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None

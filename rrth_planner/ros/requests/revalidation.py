@@ -59,12 +59,13 @@ class Revalidation:
         """
         Return the violation that only the second checker finds, and in which scene.
 
-        It is asked only where the wearer has moved. Raise RequestError where the motion is no
-        longer valid.
+        It is asked only where the wearer has moved. Raise RequestError where the motion is then
+        no longer valid.
         """
-        scene = self.require_fit()
-        if _is_same(scene, self.snapshot.scene):
+        present = self.inputs.at(self.clock(), self.parameters, self.snapshot.goal)
+        if _is_same(present.scene, self.snapshot.scene):
             return None
+        scene = self.require_fit()
         parameters = self.parameters
         violation = planner.violation_seen(
             parameters.arm,
