@@ -4,35 +4,21 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
-import io
-from multiprocessing.connection import Connection, Pipe
-import os
-import pickle
-import select
-import signal
-import subprocess
-import sys
 from typing import Any, Protocol
 
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import MotionLimits, Trajectory
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.pipeline.channel import Channel, Raised, STOP
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
-# What is sent once; a channel remembers so many of them, more than any message holds.
-SENT_ONCE, REMEMBERED = (ArmModel, Scene, MotionLimits, TreeOptions), 64
-# A process that has not ended by itself after this time is killed [s].
-LONGEST_END = 5.0
-WORKER = 'rrth_planner.pipeline.planning_worker'
-# Sent while the process works, to cancel that.
-STOP = None
 
 
 class PlanningProcessError(RrthError):
@@ -41,14 +27,6 @@ class PlanningProcessError(RrthError):
 
 class PlanningTraceback(Exception):
     """The traceback in the planning process, as the cause of the same error here."""
-
-
-@dataclass(frozen=True, slots=True)
-class Raised:
-    """An error instead of an answer, with its traceback."""
-
-    problem: Exception
-    where: str
 
 
 class Planner(Protocol):
@@ -95,6 +73,8 @@ class PlanningProcess:
         The kernels are loaded for these.
     on_death : callable
         Called with a sentence after the process has died.
+    worker : WorkerProcess, optional
+        One that was started before.
 
     """
 
@@ -103,10 +83,11 @@ class PlanningProcess:
         arm: ArmModel,
         options: TreeOptions,
         on_death: Callable[[str], None] = lambda sentence: None,
+        worker: WorkerProcess | None = None,
     ) -> None:
         """Start it."""
         self._warm_up, self._on_death = (arm, options), on_death
-        self._start()
+        self._start(worker or WorkerProcess())
 
     def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
         """As of `Planner`."""
@@ -129,36 +110,15 @@ class PlanningProcess:
 
     def close(self) -> None:
         """End it."""
-        self._channel.line.close()
-        try:
-            self._process.wait(LONGEST_END)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._worker.end()
 
     @property
     def pid(self) -> int:
         """The number of the process."""
-        return self._process.pid
+        return self._worker.pid
 
-    def _start(self) -> None:
-        line, end = Pipe()
-        self._channel = Channel(line)
-        # Ctrl-C is sent to all processes of a terminal; this one, which inherits the signal mask,
-        # ends with its parent instead. In a session of its own it would be scheduled apart from
-        # its parent, and could starve.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            # Not by `multiprocessing`, which would import the main script again.
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', WORKER, str(end.fileno())],
-                stdin=subprocess.DEVNULL,
-                env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, sys.path))},
-                pass_fds=[end.fileno()],
-            )
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        end.close()
+    def _start(self, worker: WorkerProcess) -> None:
+        self._worker, self._channel = worker, Channel(worker.line)
         self._n_asked, self._is_busy = 0, False
         self._begin('warm_up', *self._warm_up)
 
@@ -170,7 +130,7 @@ class PlanningProcess:
     def _ask(
         self, name: str, *arguments: Any, should_stop: Callable[[], bool] = lambda: False
     ) -> Any:
-        if self._process.poll() is not None:
+        if not self._worker.is_alive():
             self._restart('while idle')
         self._require_ready()
         self._begin(name, *arguments)
@@ -203,97 +163,8 @@ class PlanningProcess:
 
     def _restart(self, when: str) -> str:
         """Replace a process that has died; return the sentence for the log."""
-        self._channel.line.close()
-        try:
-            code = self._process.wait(LONGEST_END)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            code = self._process.wait()
+        code = self._worker.end()
         sentence = f'the planning process ended with code {code} {when}; another one is started'
         self._on_death(sentence)
-        self._start()
+        self._start(WorkerProcess())
         return sentence
-
-
-class Channel:
-    """
-    One end of a pipe to another process.
-
-    What lasts from question to question, `SENT_ONCE`, is sent once, and then named by its identity
-    at the sender. So the receiver has the same object each time, and keeps what it derives from
-    it.
-
-    Parameters
-    ----------
-    line : Connection
-        It is written and read only here.
-
-    """
-
-    def __init__(self, line: Connection) -> None:
-        """Begin with nothing sent."""
-        self.line = line
-        self._readable = select.poll()
-        self._readable.register(line, select.POLLIN)
-        self._sent: dict[int, Any] = {}
-        self._received: dict[int, Any] = {}
-
-    def send(self, value: Any) -> None:
-        """Send a value."""
-        out = io.BytesIO()
-        pickler = _Pickler(out, self._sent)
-        pickler.dump(value)
-        # In one call: each one releases the interpreter, and waits for it again.
-        self.line.send_bytes(pickle.dumps((pickler.news, out.getvalue()), protocol=5))
-        self._sent.update(pickler.news)
-        _forget_first(self._sent)
-
-    def is_readable(self, timeout: float) -> bool:
-        """
-        Return whether a value or the end of the line is there, or comes within a time [s].
-
-        A hundred times as fast as the connection's own `poll`: planning asks it often.
-        """
-        return bool(self._readable.poll(1e3 * timeout))
-
-    def receive(self) -> Any:
-        """Return the next value; what was read-only is read-only."""
-        news, data = pickle.loads(self.line.recv_bytes())
-        self._received.update(news)
-        value = _Unpickler(data, self._received).load()
-        _forget_first(self._received)
-        return value
-
-
-class _Pickler(pickle.Pickler):
-    """Writes identities of what is sent once; `news` are those objects that were not sent yet."""
-
-    def __init__(self, out: io.BytesIO, sent: dict[int, Any]) -> None:
-        super().__init__(out, protocol=5)
-        self._sent = sent
-        self.news: dict[int, Any] = {}
-
-    def persistent_id(self, part: Any) -> int | None:
-        if not isinstance(part, SENT_ONCE):
-            return None
-        if id(part) not in self._sent:
-            # Kept alive, so that nothing else can have its identity.
-            self.news[id(part)] = part
-        return id(part)
-
-
-class _Unpickler(pickle.Unpickler):
-    """Reads what `_Pickler` writes."""
-
-    def __init__(self, data: bytes, received: dict[int, Any]) -> None:
-        super().__init__(io.BytesIO(data))
-        self._received = received
-
-    def persistent_load(self, identity: int) -> Any:
-        return self._received[identity]
-
-
-def _forget_first(parts: dict[int, Any]) -> None:
-    """Forget what was sent first, beyond what is remembered."""
-    while len(parts) > REMEMBERED:
-        del parts[next(iter(parts))]

@@ -1,38 +1,47 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The process that `PlanningProcess` starts: it plans for its parent, and ends with it."""
+"""What the process behind `PlanningProcess` does: it plans for its parent, and ends with it."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+import functools
 from multiprocessing.connection import Connection
 import os
 import pickle
 import sys
 import traceback
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
+from rrth_planner.kernels.jit import is_compiled
 from rrth_planner.model.errors import one_line
-from rrth_planner.pipeline.in_process_planner import InProcessPlanner
-from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.planning_process import Channel, Raised, STOP
-from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.pipeline.channel import Channel, Raised, STOP
+
+# Loading it compiles kernels that are not compiled yet.
+if TYPE_CHECKING:
+    from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 
 
 def main() -> None:
     """Serve the connection of the given file descriptor until it is closed."""
     _lower_priority()
-    channel, planner = Channel(Connection(int(sys.argv[1]))), InProcessPlanner()
-
-    def plan(question: PlanQuestion) -> MotionPlan:
-        # Whatever comes meanwhile is a STOP, or the end of the owner.
-        return planner.plan(question, lambda: channel.is_readable(0.0))
-
+    channel = Channel(Connection(int(sys.argv[1])))
+    if is_compiled():
+        _planner()
+    # Otherwise the owner compiles all kernels before it asks for anything.
     work: dict[str, Callable[..., Any]] = {
-        'warm_up': planner.warm_up,
-        'plan': plan,
-        'violation_seen': planner.violation_seen,
+        'warm_up': lambda *arguments: _planner().warm_up(*arguments),
+        # Whatever comes meanwhile is a STOP, or the end of the owner.
+        'plan': lambda question: _planner().plan(question, lambda: channel.is_readable(0.0)),
+        'violation_seen': lambda *arguments: _planner().violation_seen(*arguments),
     }
     serve(channel, work)
+
+
+@functools.cache
+def _planner() -> 'InProcessPlanner':
+    from rrth_planner.pipeline.in_process_planner import InProcessPlanner
+
+    return InProcessPlanner()
 
 
 def serve(channel: Channel, work: Mapping[str, Callable[..., Any]]) -> None:

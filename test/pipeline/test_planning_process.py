@@ -18,15 +18,14 @@ from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
+from rrth_planner.pipeline.channel import Channel, REMEMBERED, STOP
 from rrth_planner.pipeline.planning_process import (
-    Channel,
     PlanningProcess,
     PlanningProcessError,
     PlanningTraceback,
-    REMEMBERED,
-    STOP,
 )
 from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.planning.options import RRTHOptions
 import worlds
 
@@ -211,6 +210,25 @@ def test_one_that_has_died_is_replaced_before_it_is_asked(process, said):
     assert process.plan(question()).status is PlanStatus.SOLVED
     assert 'ended with code -9 while idle' in said[-1]
     assert process.pid != before
+
+
+def test_one_that_was_started_before_is_used():
+    early = WorkerProcess()
+    process = PlanningProcess(worlds.table_1_arm(), RRTHOptions(), worker=early)
+    assert process.pid == early.pid
+    assert process.plan(question()).status is PlanStatus.SOLVED
+    process.close()
+    assert not early.is_alive()
+
+
+def test_one_that_finds_nothing_compiled_leaves_that_to_its_owner(monkeypatch, tmp_path):
+    monkeypatch.setenv('RRTH_CACHE_DIR', str(tmp_path))
+    early = WorkerProcess()
+    # Its imports take less; compiling takes many times as long.
+    with pytest.raises(subprocess.TimeoutExpired):
+        early._process.wait(3.0)
+    assert early.end() == 0
+    assert not list(tmp_path.rglob('*.nbc'))
 
 
 def test_ctrl_c_does_not_end_it(process):

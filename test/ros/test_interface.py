@@ -24,7 +24,7 @@ from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 from samples import array, box, command, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

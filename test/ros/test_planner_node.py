@@ -42,7 +42,7 @@ from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # no
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
-from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests import request_queue  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 import samples  # noqa: E402

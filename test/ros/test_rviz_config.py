@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NODE, NAMESPACE = 'rrth_planner', '/in_rviz'

@@ -14,7 +14,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.ros.messages.frames import tf2_ros  # noqa: E402
-from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')

@@ -28,7 +28,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.model.errors import LONGEST_SENTENCE  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
-from rrth_planner.ros.planner_node import PlannerNode  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import MOST_BYTES, PlaybackNode  # noqa: E402
 from samples import array, box, FOLDED, JOINTS, joints, target, wearer  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

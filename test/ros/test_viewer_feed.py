@@ -19,7 +19,7 @@ from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.client.viewer_feed import following, SERVICE, ViewerFeed
 from rrth_planner.ros.middleware.qos import LATCHED
-from rrth_planner.ros.planner_node import PlannerNode
+from rrth_planner.ros.planner import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode
 from samples import wearer
 from std_srvs.srv import Trigger

@@ -1,0 +1,254 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The planner as a ROS 2 node: its services, start and shutdown."""
+
+from collections.abc import Callable
+import gc
+from importlib.util import find_spec
+import signal
+import sys
+from threading import Event
+import time
+import traceback
+from typing import Any, TYPE_CHECKING
+
+from geometry_msgs.msg import PointStamped, Pose
+from nav_msgs.srv import GetPlan
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
+from rrth_planner.pipeline.worker_process import WorkerProcess
+from rrth_planner.ros.interface.parameters import (
+    current_parameters,
+    declare_parameters,
+    PlannerParameters,
+)
+from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.middleware.qos import SERVICE
+from std_srvs.srv import Trigger
+
+# What has to be compiled, or takes long to load, is imported once the node exists: discovery goes
+# on meanwhile.
+if TYPE_CHECKING:
+    from rrth_planner.pipeline.planning_process import Planner
+
+NAME = 'rrth_planner'
+BEGIN = time.monotonic()
+# After so long a thread lets another one run [s].
+SWITCH_INTERVAL = 5e-4
+
+
+class PlannerNode(Node):
+    """Plan a motion that points the arm at a target, from the latest inputs, on request."""
+
+    def __init__(
+        self,
+        planner: 'Planner | None' = None,
+        worker: WorkerProcess | None = None,
+        **kwargs: Any,
+    ) -> None:
+        """
+        Subscribe, compile or load the planner, and only then offer the services.
+
+        Parameters
+        ----------
+        planner : Planner, optional
+            Without, a `PlanningProcess`, which ends with the node.
+        worker : WorkerProcess, optional
+            For that one, where it was started before.
+        kwargs
+            Of `rclpy.node.Node`.
+
+        Raises
+        ------
+        RrthError
+            A rejected parameter, an arm that cannot point, no python-fcl.
+
+        """
+        super().__init__(NAME, **kwargs)
+        parameters = declare_parameters(self)
+        self._compile()
+        from rrth_planner.pipeline.planning_process import PlanningProcess
+
+        # It loads in parallel to the node.
+        self._planner: Planner = planner or PlanningProcess(
+            parameters.arm, parameters.options, self._on_death, worker
+        )
+        try:
+            self._create_components(parameters)
+            self._planner.warm_up(parameters.arm, parameters.options)
+        except BaseException:
+            self._planner.close()
+            raise
+        self.add_post_set_parameters_callback(self._on_parameters)
+        group = ReentrantCallbackGroup()
+        for kind, name, callback in (
+            (Trigger, '~/plan', self._on_plan),
+            (GetPlan, '~/get_plan', self._on_get_plan),
+            (Trigger, '~/cancel', self._on_cancel),
+        ):
+            self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
+        self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
+
+    def _create_components(self, parameters: PlannerParameters) -> None:
+        """Create inputs, monitor and queue."""
+        from rrth_planner.ros.interface.inputs import Inputs
+        from rrth_planner.ros.interface.publishers import PlanPublishers
+        from rrth_planner.ros.interface.reporter import Reporter
+        from rrth_planner.ros.interface.scene_monitor import SceneMonitor
+        from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
+        from rrth_planner.ros.requests.request_queue import PlanQueue
+
+        inputs = Inputs(
+            *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
+        )
+        publishers, self._reporter = PlanPublishers(self), Reporter(self, inputs, parameters)
+        self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
+        self._scene_monitor = SceneMonitor(
+            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
+        )
+        self._queue = PlanQueue(
+            self,
+            inputs,
+            self._reporter,
+            publishers,
+            self._monitor,
+            self._planner,
+            self._scene_monitor.read_bodies,
+        )
+
+    def close(self) -> None:
+        """Stop an arm in motion; end the plan in progress, the queue, and the planning process."""
+        self._queue.close()
+
+    def fail(self, what: str) -> None:
+        """Stop an arm in motion after an unexpected error."""
+        self._monitor.fail(what, is_replanned=False)
+
+    def _compile(self) -> None:
+        """Compile all kernels, in processes of their own where there is a cache."""
+        from rrth_planner.kernels.precompile import prepare_kernels
+
+        if find_spec('fcl') is None:
+            raise ModelError(
+                'python-fcl: not installed, expected for the second check of every motion '
+                '(pip install python-fcl)'
+            )
+        prepare_kernels(self.get_logger().info)
+
+    def _on_death(self, sentence: str) -> None:
+        self.get_logger().error(sentence)
+
+    def _on_parameters(self, _: Any) -> None:
+        before = self._reporter.parameters
+        now = self._reporter.parameters = current_parameters(self, before.arm)
+        if type(now.options) is not type(before.options):
+            # Not within the time of the next plan; requests wait until it is done.
+            self._queue.prepare(lambda: self._planner.warm_up(now.arm, now.options))
+
+    async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        found = await self._queue.respond(None)
+        response.success, response.message = found.is_solved, found.text
+        return response
+
+    async def _on_get_plan(
+        self, request: GetPlan.Request, response: GetPlan.Response
+    ) -> GetPlan.Response:
+        try:
+            if request.start.header.frame_id:
+                raise MessageError(
+                    f'start: frame "{request.start.header.frame_id}", expected an empty start, '
+                    'since a plan begins where the arm is'
+                )
+            if request.start.pose != Pose():
+                raise MessageError(
+                    'start: a pose, expected an empty start (position 0, orientation 0, 0, 0, 1), '
+                    'since a plan begins where the arm is'
+                )
+            goal = self._scene_monitor.goal(
+                PointStamped(header=request.goal.header, point=request.goal.pose.position)
+            )
+        except MessageError as problem:
+            code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
+            self._reporter.reject(code, f'request of get_plan: {problem}')
+            return response
+        found = await self._queue.respond(goal)
+        response.plan = found.tool_path()
+        return response
+
+    def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        response.message = answer(ErrorCode.SUCCESS, f'requests cancelled: {self._queue.cancel()}')
+        return response
+
+
+def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> int:
+    """
+    Run the node until SIGINT or SIGTERM; return the exit code.
+
+    worker: for its planning process, where it was started before.
+    """
+    # ROS's own handlers take effect only once the node spins.
+    _on_signals(_exit_at_once)
+    node = None
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = PlannerNode(worker=worker)
+        _settle_interpreter()
+        is_shutting_down = Event()
+        # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
+        _on_signals(lambda *_: is_shutting_down.set())
+        _spin(node, is_shutting_down)
+    except KeyboardInterrupt:
+        pass
+    except (RrthError, ParameterException, RuntimeError) as problem:
+        if node is not None:
+            raise
+        get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
+        return 1
+    finally:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _spin(node: PlannerNode, is_shutting_down: Event) -> None:
+    """Run the node until a signal; an error in a callback stops the arm, not the node."""
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    # The timers of the node wake it up often enough to see the signal.
+    while rclpy.ok() and not is_shutting_down.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            return
+        except Exception as problem:
+            if not rclpy.ok():
+                return
+            node.get_logger().error(traceback.format_exc())
+            node.fail(one_line(f'{type(problem).__name__}: {problem}'))
+
+
+def _settle_interpreter() -> None:
+    """Shorten the pauses of garbage collector and thread switches."""
+    # Half a million objects of numba and ROS live as long as the node: the collector skips them.
+    gc.collect()
+    gc.freeze()
+    # Worker and executor share the interpreter; the default is 5 ms.
+    sys.setswitchinterval(SWITCH_INTERVAL)
+
+
+def _on_signals(handler: Callable[..., None]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+
+
+def _exit_at_once(*_: Any) -> None:
+    raise SystemExit(0)
