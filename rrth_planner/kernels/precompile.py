@@ -17,6 +17,7 @@ SHARES = (
         'collision.arm_clearance',
         'kinematics.generated_fk',
         'collision.trajectory_check',
+        'kinematics.goal_selection',
     ),
     (
         'trajectory.fast_stop',
@@ -25,7 +26,6 @@ SHARES = (
         'search.shortcut',
         'search.rrt',
         'search.rrt_h',
-        'kinematics.goal_selection',
     ),
 )
 
