@@ -124,7 +124,7 @@ def demo() -> argparse.ArgumentParser:
     add = command.add_argument
     add('--output', type=Path, default=Path('demo.png'), help='picture file (%(default)s)')
     add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')
-    add('--timeout', type=float, default=180.0, help='timeout of every wait [s] (%(default)s)')
+    add('--timeout', type=_positive, default=180.0, help='timeout of every wait [s] (%(default)s)')
     add('--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)')
     add(
         '--targets',

@@ -77,3 +77,9 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, arguments, words):
     assert ended.stderr.startswith('demo failed: ')
     assert len(ended.stderr.splitlines()) == 1
     assert words in ended.stderr
+
+
+def test_no_timeout_at_all_is_rejected(tmp_path):
+    ended = run('--output', tmp_path / 'motions.png', '--timeout', '0')
+    assert ended.returncode == 2
+    assert '--timeout: 0, expected a number > 0' in ended.stderr
