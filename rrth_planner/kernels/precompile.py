@@ -10,7 +10,7 @@ import sys
 
 from rrth_planner.kernels.jit import cache_folder, compiling_notice, is_compiled
 
-# What either process compiles, about as much each, the one what the other does not ask for soon.
+# What each of the two processes compiles: equal shares, and nothing that the other one needs soon.
 SHARES = (
     (
         'search.elastic_band',

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What planning process and owner send each other."""
+"""What the planning process and its owner send each other."""
 
 from dataclasses import dataclass
 import io

@@ -3,7 +3,7 @@
 """
 The process behind `PlanningProcess`.
 
-This imports nothing big: the process is started first, and loads in parallel to its owner.
+This module imports nothing big, so that the process starts first and loads while its owner does.
 """
 
 from multiprocessing.connection import Pipe

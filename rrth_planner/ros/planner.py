@@ -60,7 +60,7 @@ class PlannerNode(Node):
         planner : Planner, optional
             Without, a `PlanningProcess`, which ends with the node.
         worker : WorkerProcess, optional
-            For that one, where it was started before.
+            For that one, if it is started already.
         kwargs
             Of `rclpy.node.Node`.
 
@@ -119,7 +119,6 @@ class PlannerNode(Node):
             publishers,
             self._monitor,
             self._planner,
-            self._scene_monitor.read_bodies,
         )
 
     def close(self) -> None:
@@ -191,10 +190,8 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
     """
     Run the node until SIGINT or SIGTERM; return the exit code.
 
-    worker: for its planning process, where it was started before.
+    worker: for its planning process, if it is started already.
     """
-    # ROS's own handlers take effect only once the node spins.
-    _on_signals(_exit_at_once)
     node = None
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -248,7 +245,3 @@ def _settle_interpreter() -> None:
 def _on_signals(handler: Callable[..., None]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, handler)
-
-
-def _exit_at_once(*_: Any) -> None:
-    raise SystemExit(0)

@@ -63,11 +63,11 @@ FCL_USERS = {
     'rrth_planner.collision.trajectory_validation',
     'rrth_planner.collision.checker_comparison',
 }
-# Modules that import of the project below their top: the node's process starts another one before
-# it loads, which waits until kernels are compiled, the node says that it compiles before it
-# imports what has to be compiled, a command so too, and which libraries it misses before it
-# imports what needs them, what only one option of a command needs takes seconds to load, and a
-# playback needs kernels for stops only.
+# Modules that import parts of the project below their top. The executable of the node starts the
+# planning process before it loads the node; that process loads no kernels that are not compiled
+# yet. The node says that it compiles before it imports what has to be compiled, and so does a
+# command, which also says which libraries it misses before it imports what needs them. What only
+# one option of a command needs takes seconds to load. A playback needs kernels for stops only.
 LATE = {
     'rrth_planner.pipeline.planning_worker',
     'rrth_planner.ros.planner',

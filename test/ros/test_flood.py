@@ -31,8 +31,8 @@ TOPICS = {
     'joint_states': (JointState, samples.joints),
 }
 NODE = 'rrth_planner.ros.planner_node'
-# Requests without a flood, whose work is little for a clock that ticks a hundred times a second,
-# and under a flood. Of these, two may have been asked while the machine stood still.
+# The clock of processor time ticks only a hundred times a second, so many requests are counted
+# without a flood. Under a flood, two requests may meet a machine that stands still.
 N_QUIET, N_FLOODED, N_STILL = 100, 25, 2
 # So many times the work of a request without a flood may the node do until it answers one under
 # a flood, in the mean and the worst. By a clock, or in messages of the flood, it would be the

@@ -84,10 +84,6 @@ class SceneMonitor:
         if source is self._inputs.body:
             self._notify_body(source.value, time.time_ns())
 
-    def read_bodies(self) -> None:
-        """Process the bodies received so far, as `OpenSubscription.read_all`."""
-        self._subscriptions[0].read_all()
-
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)

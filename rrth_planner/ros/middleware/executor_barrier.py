@@ -3,18 +3,21 @@
 """Run something in a node's own thread once it has processed the messages received before."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, TimeoutError as NotYet
 import time
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 T = TypeVar('T')
 # Longest wait for a node [s].
 LONGEST = 1.0
 # After so long without a round it is triggered again [s].
 AGAIN = 0.02
+# After so long within a round what else the node has to do comes first [s].
+SLICE = 0.01
 
 
 class NodeIsBusyError(Exception):
@@ -25,20 +28,18 @@ class ExecutorBarrier:
     """
     Runs work in the thread that spins a node, after the messages received before.
 
-    An executor handles one message of each subscription in a round; the others are read here.
+    In a round an executor takes one message from each reader; the others are taken here.
 
     Parameters
     ----------
     node : Node
         Spun by a single-threaded executor in another thread.
-    read_all : callable
-        Processes the messages that have been received and not been processed yet.
 
     """
 
-    def __init__(self, node: Node, read_all: Callable[[], None]) -> None:
+    def __init__(self, node: Node) -> None:
         """Begin without work."""
-        self._node, self._read_all = node, read_all
+        self._node = node
         self._tasks: deque[Callable[[], None]] = deque()
         self._round = node.create_guard_condition(self._on_round)
 
@@ -56,15 +57,23 @@ class ExecutorBarrier:
             # Callbacks that are called by hand have processed all messages.
             return work()
         future: Future[T] = Future()
+        reading = self._reading()
 
         def run() -> None:
-            if not future.set_running_or_notify_cancel():
-                return
             try:
-                self._read_all()
-                future.set_result(work())
+                end = time.monotonic() + SLICE
+                for _ in reading:
+                    if future.cancelled():
+                        return
+                    if time.monotonic() > end:
+                        self._tasks.append(run)
+                        self._round.trigger()
+                        return
+                if future.set_running_or_notify_cancel():
+                    future.set_result(work())
             except BaseException as problem:
-                future.set_exception(problem)
+                if future.running() or future.set_running_or_notify_cancel():
+                    future.set_exception(problem)
 
         self._tasks.append(run)
         end = time.monotonic() + LONGEST
@@ -74,12 +83,32 @@ class ExecutorBarrier:
                 return future.result(AGAIN)
             except NotYet:
                 if future.done():
-                    # It is the work that raised it.
-                    raise
+                    # It may be the work that raised it.
+                    return future.result()
                 # In case a wake-up was lost.
                 if time.monotonic() > end and future.cancel():
                     raise NodeIsBusyError from None
 
     def _on_round(self) -> None:
-        while self._tasks:
+        for _ in range(len(self._tasks)):
             self._tasks.popleft()()
+
+    def _reading(self) -> Iterator[None]:
+        """Process the messages that the node's readers hold, one at each step."""
+        for reader in list(self._node.subscriptions):
+            # Those that come meanwhile are not among them.
+            for _ in range(max(1, reader.qos_profile.depth)):
+                message = _taken(reader)
+                if message is None:
+                    break
+                reader.callback(*message)
+                yield
+
+
+def _taken(reader: Subscription) -> tuple[Any, ...] | None:
+    """Return the next message that a reader holds, as its callback takes it."""
+    with reader.handle:
+        found: tuple[Any, ...] | None = reader.handle.take_message(reader.msg_type, reader.raw)
+    if found is None or reader._callback_type is Subscription.CallbackType.WithMessageInfo:
+        return found
+    return found[:1]

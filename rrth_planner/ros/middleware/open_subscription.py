@@ -170,17 +170,6 @@ class OpenSubscription:
             )
         self.topic_name = self._live.topic_name
 
-    def read_all(self) -> None:
-        """Process the messages that have been received; called by the thread that spins."""
-        for reader in (self._live, *self._reliable.values()):
-            # It holds no more; those that come meanwhile have their turn.
-            for _ in range(DEPTH):
-                with reader.handle:
-                    taken = reader.handle.take_message(self._msg_type, True)
-                if taken is None:
-                    break
-                reader.callback(*taken)
-
     def match_publishers(self) -> None:
         """Add the reliable readers that the present publishers can serve."""
         for info in self._node.get_publishers_info_by_topic(self.topic_name):

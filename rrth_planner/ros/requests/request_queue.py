@@ -99,8 +99,6 @@ class PlanQueue:
         Its parameters, as they are when a request's turn begins, are those of the plan.
     monitor : ExecutionMonitor
         Monitors each published motion; its stops are checked again here, and replanned.
-    read_bodies : callable
-        Processes the bodies received so far.
 
     """
 
@@ -112,12 +110,11 @@ class PlanQueue:
         publishers: PlanPublishers,
         monitor: ExecutionMonitor,
         planner: Planner,
-        read_bodies: Callable[[], None],
     ) -> None:
         """Start with nothing to do."""
         self._node, self._inputs, self._reporter = node, inputs, reporter
         self._publishers, self._monitor, self._planner = publishers, monitor, planner
-        self._barrier = ExecutorBarrier(node, read_bodies)
+        self._barrier = ExecutorBarrier(node)
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix='planner')
         self._open: set[_Ticket] = set()
         self._resumption: _Resumption | None = None

@@ -59,8 +59,8 @@ class Revalidation:
         """
         Return the violation that only the second checker finds, and in which scene.
 
-        It is asked only where the wearer has moved. Raise RequestError where the motion is then
-        no longer valid.
+        It is asked only where the wearer has moved. Raise RequestError where an input is stale or
+        rejected, or the motion is no longer valid for the moved wearer.
         """
         present = self.inputs.at(self.clock(), self.parameters, self.snapshot.goal)
         if _is_same(present.scene, self.snapshot.scene):
