@@ -25,12 +25,13 @@ MAY = {
     'timing': 'kernels model collision',
     'execution': 'kernels model collision timing',
     'pipeline': 'kernels model collision timing planning',
-    'io': 'model collision planning pipeline',
-    'visualization': 'model collision planning execution pipeline io',
-    'ros': 'kernels model collision planning timing execution pipeline io',
+    'wearer': 'model',
+    'io': 'model collision planning pipeline wearer',
+    'visualization': 'model collision planning execution pipeline wearer io',
+    'ros': 'kernels model collision planning timing execution pipeline wearer io',
     'reproduction': 'kernels model collision planning io visualization',
-    'cli': 'kernels model collision planning timing execution pipeline io visualization ros '
-    'reproduction',
+    'cli': 'kernels model collision planning timing execution pipeline wearer io visualization '
+    'ros reproduction',
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
