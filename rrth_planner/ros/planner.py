@@ -17,7 +17,7 @@ from nav_msgs.srv import GetPlan
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -29,6 +29,7 @@ from rrth_planner.ros.interface.parameters import (
     PlannerParameters,
 )
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.middleware.executor import OneThreadExecutor
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -218,7 +219,7 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
 
 def _spin(node: PlannerNode, is_shutting_down: Event) -> None:
     """Run the node until a signal; an error in a callback stops the arm, not the node."""
-    executor = SingleThreadedExecutor()
+    executor = OneThreadExecutor()
     executor.add_node(node)
     # The timers of the node wake it up often enough to see the signal.
     while rclpy.ok() and not is_shutting_down.is_set():

@@ -131,7 +131,11 @@ class ExecutionMonitor:
         parameters: PlannerParameters,
         publish: Callable[[], None],
     ) -> None:
-        """Publish a motion, and monitor it with the parameters of its plan."""
+        """
+        Publish a motion, and monitor it with the parameters of its plan.
+
+        It is checked with the next body: called in the node's own thread right after revalidation.
+        """
         with self._lock:
             if self._is_closed:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
@@ -144,14 +148,8 @@ class ExecutionMonitor:
                 self._tracker, self._parameters, self._goal, self._state = before
                 raise
             self.n_motions += 1
-
-            def check() -> None:
-                self._set_state(MonitorState.MONITORING, '')
-                # The body may have changed since the revalidation.
-                self._check_remaining_motion(self._inputs.body.value, time.time_ns())
-
             # From here on the arm moves: an error must stop it.
-            self._run_fail_safe(check)
+            self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
