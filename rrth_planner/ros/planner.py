@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planner as a ROS 2 node: its services, start and shutdown."""
 
-from collections.abc import Callable
 import gc
 from importlib.util import find_spec
 import signal
@@ -78,7 +77,7 @@ class PlannerNode(Node):
 
         # It loads in parallel to the node.
         self._planner: Planner = planner or PlanningProcess(
-            parameters.arm, parameters.options, self._on_death, worker
+            parameters.arm, parameters.options, self.get_logger().error, worker
         )
         try:
             self._create_components(parameters)
@@ -141,9 +140,6 @@ class PlannerNode(Node):
             )
         prepare_kernels(self.get_logger().info)
 
-    def _on_death(self, sentence: str) -> None:
-        self.get_logger().error(sentence)
-
     def _on_parameters(self, _: Any) -> None:
         before = self._reporter.parameters
         now = self._reporter.parameters = current_parameters(self, before.arm)
@@ -200,7 +196,8 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
         _settle_interpreter()
         is_shutting_down = Event()
         # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
-        _on_signals(lambda *_: is_shutting_down.set())
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: is_shutting_down.set())
         _spin(node, is_shutting_down)
     except KeyboardInterrupt:
         pass
@@ -241,8 +238,3 @@ def _settle_interpreter() -> None:
     gc.freeze()
     # Worker and executor share the interpreter; the default is 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL)
-
-
-def _on_signals(handler: Callable[..., None]) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)

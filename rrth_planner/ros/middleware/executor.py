@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An executor for a node that one thread spins."""
 
-from collections.abc import Callable
 from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
@@ -18,23 +17,22 @@ class OneThreadExecutor(SingleThreadedExecutor):
     threads may wait for; here there are none, and each time costs a round without work.
     """
 
-    def _make_handler(self, entity: Any, node: Node, take_from_wait_list: Callable) -> Task:
-        """Return the task that takes what an entity has, and calls its callback with it."""
+    def _make_handler(self, entity: Any, node: Node, take_from_wait_list: Any) -> Task:
         entity._executor_event = True
 
         async def handle() -> None:
-            is_begun = not self._is_shutdown and entity.callback_group.beginning_execution(entity)
-            try:
-                call = take_from_wait_list(entity) if is_begun else None
-            finally:
-                # From here on the entity is waited for again.
+            if self._is_shutdown or not entity.callback_group.beginning_execution(entity):
                 entity._executor_event = False
+                return
             try:
+                try:
+                    call = take_from_wait_list(entity)
+                finally:
+                    entity._executor_event = False
                 if call is not None:
                     await call()
             finally:
-                if is_begun:
-                    entity.callback_group.ending_execution(entity)
+                entity.callback_group.ending_execution(entity)
 
         task = Task(handle, executor=self)
         with self._tasks_lock:

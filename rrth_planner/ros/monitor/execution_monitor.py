@@ -186,7 +186,6 @@ class ExecutionMonitor:
 
         Parameters
         ----------
-        why : str
         is_replanned : bool
             Whether to plan again once the arm is at rest: not after an error, which would recur.
 
@@ -213,12 +212,8 @@ class ExecutionMonitor:
         if self.running is None:
             return
         now = self._now()
-        phase = self._phase(now)
-        if phase is None or self._state is not MonitorState.MONITORING:
-            return
-        why = stale_input(self._inputs, self._reporter.parameters, now)
-        if why:
-            self.fail(why)
+        phase = self._monitored_phase(now)
+        if phase is None:
             return
         scene = scene_of(body.at(now))
         if self._holds(is_remaining_free, self.running, phase, scene):
@@ -263,12 +258,17 @@ class ExecutionMonitor:
         now = self._now()
         self._repeat_stop(now)
         self._check_previous_motion()
+        self._monitored_phase(now)
+
+    def _monitored_phase(self, now: float) -> float | None:
+        """Return the time within a monitored motion [s]; stop the arm where an input is stale."""
         phase = self._phase(now)
         if phase is None or self._state is not MonitorState.MONITORING:
-            return
+            return None
         why = stale_input(self._inputs, self._reporter.parameters, now)
         if why:
             self.fail(why)
+        return None if why else phase
 
     def _repeat_stop(self, now: float) -> None:
         """Publish the stop again where the arm does not execute it."""
