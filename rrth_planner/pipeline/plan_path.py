@@ -38,7 +38,6 @@ def find_path(
 
     Parameters
     ----------
-    question : PlanQuestion
     world : World
         Its boxes grown by the margin.
     q_start : ndarray, shape (dof,)

@@ -26,7 +26,6 @@ class PlanQuestion:
         From 0 to 1e4 [m].
     seed : int
         >= 0.
-    moving : StartState or None
     escape_depth : float
         From 0 to 1e4 [m].
 

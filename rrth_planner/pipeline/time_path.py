@@ -44,7 +44,6 @@ def time_path(
 
     Parameters
     ----------
-    question : PlanQuestion
     world : World
         Its boxes grown by the margin.
     path : Path

@@ -35,7 +35,6 @@ def report(
     ----------
     rows : Rows
         Of one campaign.
-    extent : Extent
     command, machine : str
         What wrote it, on what.
     pictures : mapping

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planner as a ROS 2 node: its services, start and shutdown."""
 
-from collections.abc import Callable
 import gc
 from importlib.util import find_spec
 import signal
@@ -17,7 +16,7 @@ from nav_msgs.srv import GetPlan
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -29,6 +28,7 @@ from rrth_planner.ros.interface.parameters import (
     PlannerParameters,
 )
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.middleware.executor import OneThreadExecutor
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -77,7 +77,7 @@ class PlannerNode(Node):
 
         # It loads in parallel to the node.
         self._planner: Planner = planner or PlanningProcess(
-            parameters.arm, parameters.options, self._on_death, worker
+            parameters.arm, parameters.options, self.get_logger().error, worker
         )
         try:
             self._create_components(parameters)
@@ -140,9 +140,6 @@ class PlannerNode(Node):
             )
         prepare_kernels(self.get_logger().info)
 
-    def _on_death(self, sentence: str) -> None:
-        self.get_logger().error(sentence)
-
     def _on_parameters(self, _: Any) -> None:
         before = self._reporter.parameters
         now = self._reporter.parameters = current_parameters(self, before.arm)
@@ -199,7 +196,8 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
         _settle_interpreter()
         is_shutting_down = Event()
         # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
-        _on_signals(lambda *_: is_shutting_down.set())
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: is_shutting_down.set())
         _spin(node, is_shutting_down)
     except KeyboardInterrupt:
         pass
@@ -218,7 +216,7 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
 
 def _spin(node: PlannerNode, is_shutting_down: Event) -> None:
     """Run the node until a signal; an error in a callback stops the arm, not the node."""
-    executor = SingleThreadedExecutor()
+    executor = OneThreadExecutor()
     executor.add_node(node)
     # The timers of the node wake it up often enough to see the signal.
     while rclpy.ok() and not is_shutting_down.is_set():
@@ -240,8 +238,3 @@ def _settle_interpreter() -> None:
     gc.freeze()
     # Worker and executor share the interpreter; the default is 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL)
-
-
-def _on_signals(handler: Callable[..., None]) -> None:
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, handler)

@@ -18,8 +18,7 @@ from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -127,16 +126,6 @@ def test_an_arm_that_has_not_begun_is_held(monitored):
     monitored.see(monitored.hand(0.6, 0.0))
     ((stop, _),) = monitored.published
     assert np.abs(stop.positions - monitored.motion.positions[0]).max() < 5e-3
-
-
-def test_a_motion_that_begins_is_checked_against_the_body_of_then(monitored):
-    hand = monitored.hand(0.6, 0.0)
-    # It came after the last check of the motion, while none was monitored.
-    for boxes, n_stops in (([FAR], 0), ([FAR, hand], 1)):
-        parts = tuple(((box.name, 0), BodyPart((box,))) for box in boxes)
-        monitored.inputs.body.value = WearerBody(parts)
-        monitored.begin()
-        assert len(monitored.published) == n_stops
 
 
 def test_a_motion_is_monitored_before_its_handover(monitored):

@@ -49,9 +49,9 @@ def test_the_feed_shows_what_the_nodes_say_and_asks_for_the_newest_target():
 
                 def is_answered():
                     # A busy machine may not plan in time for an arm that moves.
-                    if not feed.is_asking and feed.said.startswith('TIMED_OUT'):
+                    if not feed._is_asking and feed.said.startswith('TIMED_OUT'):
                         feed.ask()
-                    return not feed.is_asking
+                    return not feed._is_asking
 
                 wait_until(is_answered)
                 # The motion that is shown is the one that the arm follows to its end.
@@ -102,16 +102,16 @@ def test_a_planner_that_ends_while_it_is_asked_leaves_the_next_one_to_be_asked()
         with spinning(first):
             feed.ask()
             wait_until(lambda: first.n_asked)
-            assert feed.is_asking
+            assert feed._is_asking
         first.destroy_node()
-        wait_until(lambda: not feed.is_asking)
+        wait_until(lambda: not feed._is_asking)
         assert 'ended without an answer' in feed.said
         assert f'waiting for {feed.resolve_topic_name("body_boxes")}' in feed.said
         second = Planner(does_answer=True)
         with spinning(second):
             feed.ask()
             wait_until(lambda: feed.said.startswith('SUCCESS'))
-            wait_until(lambda: not feed.is_asking)
+            wait_until(lambda: not feed._is_asking)
         second.destroy_node()
 
 
@@ -121,7 +121,7 @@ def test_a_failed_request_is_reported_and_the_next_one_is_made(ros_context):
     future = Future()
     future.set_exception(RuntimeError('no way\nout'))
     feed._on_answer(future)
-    assert not feed.is_asking
+    assert not feed._is_asking
     assert feed.said.startswith('no answer of the planner: no way out')
     feed.destroy_node()
 
@@ -153,7 +153,7 @@ def test_no_target_is_lost_between_two_threads(ros_context):
         feed.asker = asker = Thread(target=feed.ask, args=(TARGETS[1],))
         feed._on_timer()
         asker.join()
-        assert feed.is_asking
+        assert feed._is_asking
         np.testing.assert_array_equal(feed._newest, TARGETS[1])
     feed.destroy_node()
     planner.destroy_node()

@@ -108,12 +108,6 @@ class ViewerFeed(Node):
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
         return '; '.join(filter(None, (self._answer, waiting))) or 'drag the target, or press Plan'
 
-    @property
-    def is_asking(self) -> bool:
-        """Whether an answer is still to come."""
-        with self._lock:
-            return self._is_wanted or self._is_asking
-
     def ask(self, target: Array | None = None) -> None:
         """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
         # Not published at once: a request would overtake queued targets.

@@ -131,7 +131,11 @@ class ExecutionMonitor:
         parameters: PlannerParameters,
         publish: Callable[[], None],
     ) -> None:
-        """Publish a motion, and monitor it with the parameters of its plan."""
+        """
+        Publish a motion, and monitor it with the parameters of its plan.
+
+        It is checked with the next body: called in the node's own thread right after revalidation.
+        """
         with self._lock:
             if self._is_closed:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
@@ -144,14 +148,8 @@ class ExecutionMonitor:
                 self._tracker, self._parameters, self._goal, self._state = before
                 raise
             self.n_motions += 1
-
-            def check() -> None:
-                self._set_state(MonitorState.MONITORING, '')
-                # The body may have changed since the revalidation.
-                self._check_remaining_motion(self._inputs.body.value, time.time_ns())
-
             # From here on the arm moves: an error must stop it.
-            self._run_fail_safe(check)
+            self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
@@ -188,7 +186,6 @@ class ExecutionMonitor:
 
         Parameters
         ----------
-        why : str
         is_replanned : bool
             Whether to plan again once the arm is at rest: not after an error, which would recur.
 
@@ -215,12 +212,8 @@ class ExecutionMonitor:
         if self.running is None:
             return
         now = self._now()
-        phase = self._phase(now)
-        if phase is None or self._state is not MonitorState.MONITORING:
-            return
-        why = stale_input(self._inputs, self._reporter.parameters, now)
-        if why:
-            self.fail(why)
+        phase = self._monitored_phase(now)
+        if phase is None:
             return
         scene = scene_of(body.at(now))
         if self._holds(is_remaining_free, self.running, phase, scene):
@@ -265,12 +258,17 @@ class ExecutionMonitor:
         now = self._now()
         self._repeat_stop(now)
         self._check_previous_motion()
+        self._monitored_phase(now)
+
+    def _monitored_phase(self, now: float) -> float | None:
+        """Return the time within a monitored motion [s]; stop the arm where an input is stale."""
         phase = self._phase(now)
         if phase is None or self._state is not MonitorState.MONITORING:
-            return
+            return None
         why = stale_input(self._inputs, self._reporter.parameters, now)
         if why:
             self.fail(why)
+        return None if why else phase
 
     def _repeat_stop(self, now: float) -> None:
         """Publish the stop again where the arm does not execute it."""

@@ -30,10 +30,6 @@ class PlanOutcome:
 
     Parameters
     ----------
-    sentence : str
-    plan : MotionPlan or None
-    snapshot : InputSnapshot or None
-    handover : Handover or None
     incident : Incident or None
         To be written to a file, which the answer names.
 
