@@ -40,12 +40,14 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
+        self.ages = []
         # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
             parameters=replace(parameters or declare_parameters(node), replan=False),
             monitor_state=('', ''),
             publish_soon=lambda: None,
+            body_used=self.ages.append,
             remaining_motion_checked=lambda took: self.said.append('free'),
             stop_published=lambda took: self.said.append('stopped') or self.took.append(took),
         )
@@ -79,12 +81,12 @@ class Monitored:
     def read(self, q, v):
         """Let joint states come."""
         reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
-        self.inputs.joints.value, self.inputs.joints.received = reading, self.now
+        self.inputs.joints.value, self.inputs.joints.measured = reading, self.now
 
     def see(self, *boxes, expires=float('inf')):
         """Let a body come."""
         parts = tuple(((box.name, 0), BodyPart((box,), expires)) for box in boxes)
-        self.inputs.body.value, self.inputs.body.received = WearerBody(parts), self.now
+        self.inputs.body.value, self.inputs.body.measured = WearerBody(parts), self.now
         self.monitor.on_body(self.inputs.body.value, 0)
 
     def hand(self, ahead, away, motion=None):

@@ -310,7 +310,7 @@ def test_the_summary_of_diagnostics_is_what_is_worst(start):
     assert summary(11.5, ErrorCode.FAILURE, 'it broke') == broken
 
 
-def test_only_so_many_expired_boxes_are_remembered_as_named(start, monkeypatch):
+def test_only_so_many_lost_parts_are_remembered_as_named(start, monkeypatch):
     monkeypatch.setattr(reporter, 'MOST_NAMED', 3)
     planner, _ = start()
     source = inputs_of(planner).body
@@ -318,7 +318,7 @@ def test_only_so_many_expired_boxes_are_remembered_as_named(start, monkeypatch):
         hat = samples.box('hat', k)
         hat.lifetime.nanosec = 1
         source.value = WearerBody().apply(samples.array(hat), 0.0, 'torso')
-        planner._reporter._warn_of_expired(1.0)
+        planner._reporter._warn_of_lost(1.0)
         named = planner._reporter._named
         assert ('hat', k) in named
         assert len(named) <= 5

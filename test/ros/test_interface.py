@@ -17,11 +17,13 @@ from rclpy.clock import ROSClock  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from rclpy.time import Time as RosTime  # noqa: E402
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
+from rrth_planner.ros.interface import scene_monitor  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
@@ -103,15 +105,15 @@ def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_
         strangers[0].say('joint_states', joints())
         strangers[0].say('target', target(*points[0]))
         all_inputs = [inputs_of(p) for p in planners]
-        wait_until(lambda: all_inputs[0].target.received is not None)
-        wait_until(lambda: all_inputs[0].joints.received is not None)
-        wait_until(lambda: all(inputs.body.received is not None for inputs in all_inputs))
+        wait_until(lambda: all_inputs[0].target.measured is not None)
+        wait_until(lambda: all_inputs[0].joints.measured is not None)
+        wait_until(lambda: all(inputs.body.measured is not None for inputs in all_inputs))
         assert strangers[0].answer().success
         assert 'no target yet on /b/target' in strangers[1].answer().message
         strangers[1].say('joint_states', joints())
         strangers[1].say('target', target(*points[1]))
-        wait_until(lambda: all_inputs[1].joints.received is not None)
-        wait_until(lambda: all_inputs[1].target.received is not None)
+        wait_until(lambda: all_inputs[1].joints.measured is not None)
+        wait_until(lambda: all_inputs[1].target.measured is not None)
         assert strangers[1].answer().success
         wait_until(lambda: all(s.received['joint_trajectory'] for s in strangers))
     for stranger, point in zip(strangers, points, strict=True):
@@ -133,11 +135,14 @@ class FakeBuffer:
 
     def __init__(self, *, node):
         self.node, self.listener = node, None
+        # The newest transform that came [ns]; it moves forward by a metre each second.
+        self.newest = 0
 
     def lookup_transform(self, target_frame, source_frame, time):
-        """Return the latest transform: a metre forward, turned about z by 90 degrees."""
+        """Return a transform: a metre forward, turned about z by 90 degrees."""
         assert target_frame == 'torso'
-        assert time.nanoseconds == 0
+        if source_frame == 'camera' and time.nanoseconds > self.newest:
+            raise FakeTransformError('would require extrapolation into the future')
         if source_frame == 'broken':
             return TransformStamped()
         if source_frame != 'camera':
@@ -147,6 +152,12 @@ class FakeBuffer:
         r = stamped.transform.rotation
         r.z = r.w = float(np.sqrt(0.5))
         return stamped
+
+    def get_latest_common_time(self, target_frame, source_frame):
+        """Return when the newest transform was."""
+        if source_frame != 'camera':
+            raise FakeTransformError('unknown')
+        return RosTime(nanoseconds=self.newest)
 
 
 class FakeListener:
@@ -186,6 +197,35 @@ def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     assert message.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
     assert 'frame "gone", expected a frame that TF can transform to "torso": ' in message
     assert message.isprintable()
+
+
+@pytest.mark.usefixtures('tf')
+def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypatch):
+    monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 1e6)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
+    buffer = planner._scene_monitor._frames._buffer
+    now = planner.get_clock().now()
+    hat = box('hat', center=(0.0, 1.0, 0.7), size=(0.3, 0.2, 0.1), frame='camera')
+    hat.header.stamp = now.to_msg()
+    out = stranger.publishers['body_boxes']
+    out.publish(array(hat))
+    out.publish(array(command(Marker.DELETE, 'hat'), box('pack', center=(-1.0, 0.0, -1.0))))
+    stranger.wait_until(lambda: len(waiting) == 2)
+    n_good, n_boxes = body.n_good, body.value.n_boxes
+    buffer.newest = now.nanoseconds
+    stranger.wait_until(lambda: body.n_good == n_good + 2)
+    assert not waiting
+    assert body.value.n_boxes == n_boxes + 1
+    assert not body.value.without(['pack'])
+    # One whose frame never comes is rejected.
+    monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 0.0)
+    buffer.newest -= 10**9
+    out.publish(array(hat))
+    stranger.wait_until(lambda: body.is_last_rejected)
+    assert 'extrapolation into the future' in str(body.rejection)
+    assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message')
 
 
 @pytest.fixture(name='clock')
@@ -245,7 +285,8 @@ def say_inputs(stranger, inputs, wait_until, now):
     """Publish all inputs again and wait until they are received at a time [s]."""
     for name, msg in (('body_boxes', wearer()), ('target', target()), ('joint_states', joints())):
         stranger.publishers[name].publish(msg)
-    wait_until(lambda: all(abs(source.received - now) < 1e-6 for source in inputs.all.values()))
+    # A body without stamp counts as measured `body_latency` before.
+    wait_until(lambda: all(abs(source.measured - now) < 0.04 for source in inputs.all.values()))
 
 
 def test_a_handover_works_while_simulated_time_stands_still(start, clock, wait_until):

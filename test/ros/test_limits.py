@@ -27,7 +27,8 @@ from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, InputSnapshot, RequestError  # noqa: E402
-from rrth_planner.ros.messages.body import MOST_EXPIRED, scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages import body as body_module  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import joint_reading
@@ -162,19 +163,28 @@ def test_long_names_of_a_motion_are_named_in_short():
     assert rejection(joint_trajectory_from_msg, msg, JOINTS).startswith('joint_names: ')
 
 
-def test_the_last_of_many_that_have_expired_are_kept():
-    hats = [box('hat', k) for k in range(MOST_EXPIRED + 20)]
-    for hat in hats:
-        hat.lifetime.nanosec = 1
+def test_the_last_of_many_lost_parts_are_kept(monkeypatch):
+    monkeypatch.setattr(body_module, 'MOST_BOXES', 50)
+    hats = [box('hat', k) for k in range(50)]
+    pile = cube_list(20)
+    for marker in (*hats, pile):
+        marker.lifetime.nanosec = 1
     body = WearerBody().apply(array(*hats), 0.0, 'torso').at(1.0)
-    assert [key for key, _ in body.expired] == [('hat', 20 + k) for k in range(MOST_EXPIRED)]
+    body = body.apply(array(pile), 1.0, 'torso').at(2.0)
+    assert [key for key, _ in body.lost] == [('hat', 20 + k) for k in range(30)] + [('torso', 0)]
+    assert len(scene_of(body).boxes) == 50
 
 
-def test_what_has_expired_is_kept_by_its_first_box_only():
+def test_a_message_names_only_some_lost_parts_each_by_its_first_box():
     hats = cube_list(1000)
     hats.lifetime.nanosec = 1
     body = WearerBody().apply(array(hats), 0.0, 'torso').at(1.0)
-    assert [b.name for _, part in body.expired for b in part.boxes] == ['torso/0[0]']
+    assert body.lost_names() == '"torso/0[0]"'
+    many = [box('hat', k) for k in range(100)]
+    for hat in many:
+        hat.lifetime.nanosec = 1
+    names = WearerBody().apply(array(*many), 0.0, 'torso').at(1.0).lost_names().split(', ')
+    assert names == [f'"hat/{k}"' for k in range(100 - body_module.MOST_NAMED, 100)]
 
 
 def test_a_box_of_next_to_no_size_is_an_obstacle_and_huge_numbers_are_rejected():

@@ -28,6 +28,7 @@ from rrth_planner.ros.messages.error_codes import (  # noqa: E402
 from rrth_planner.ros.messages.frames import FrameError
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import configuration_from_msg, has_joint_of
+from rrth_planner.ros.messages.marker_edits import measured_at, read_edits
 from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_from_msg,
     joint_trajectory_to_msg,
@@ -94,8 +95,56 @@ def test_a_lifetime_counts_from_reception_and_is_renewed():
     marker.lifetime.nanosec = 500_000_000
     body = body_of(marker, box('head'), now=10.0)
     assert names(body.at(10.4)) == ['torso/0', 'head/0']
-    assert names(body.at(10.5)) == ['head/0']
+    # A lost part stays where it was last seen.
+    assert names(body.at(10.5)) == ['head/0', 'torso/0']
+    assert body.at(10.5).lost_names() == '"torso/0"'
+    assert not body.at(10.4).lost_names()
     assert names(body.apply(array(marker), 10.4, 'torso').at(10.8)) == ['torso/0', 'head/0']
+
+
+def measured(marker, stamp):
+    """Return a marker that was measured at a time [s]."""
+    marker.header.stamp.sec, rest = divmod(round(stamp * 10**9), 10**9)
+    marker.header.stamp.nanosec = rest
+    return marker
+
+
+def test_the_oldest_stamp_of_its_boxes_is_when_a_body_was_measured():
+    markers = [
+        command(Marker.DELETEALL),
+        measured(box(), 9.5),
+        measured(box('head'), 9.75),
+        box('hat'),
+    ]
+    edits = read_edits(array(*markers), 10.0, 'torso', latency=0.125)
+    assert [e.part.measured for e in edits if e.part is not None] == [9.5, 9.75, 9.875]
+    assert measured_at(edits, 10.0) == 9.5
+    assert measured_at(edits[:1], 7.0) == 7.0
+    assert measured_at((), 7.0) == 7.0
+
+
+def test_a_stamp_from_the_future_is_rejected_in_one_sentence():
+    assert body_of(measured(box(), 10.05), now=10.0).n_boxes == 1
+    with pytest.raises(MessageError) as caught:
+        body_of(measured(box(), 11.5), now=10.0)
+    assert str(caught.value) == (
+        'marker 0 ("torso/0"): header.stamp: 1.500 s in the future, expected at most 0.1 (by the '
+        'same clock as the planner: see use_sim_time)'
+    )
+
+
+def test_the_frame_of_a_marker_is_looked_up_at_its_stamp():
+    asked = []
+
+    def lookup(frame, stamp):
+        asked.append((frame, stamp))
+        return np.eye(4)
+
+    markers = [measured(box(frame='camera'), 9.5), box('head', frame='camera')]
+    read_edits(array(*markers, measured(box('hat', frame='camera'), 9.5)), 10.0, 'torso', lookup)
+    assert asked == [('camera', 9_500_000_000), ('camera', 0)]
+    goal_from_msg(measured(target(1.0, 0.0, 0.0, 'camera'), 2.5), 'torso', lookup)
+    assert asked[-1] == ('camera', 2_500_000_000)
 
 
 def test_an_invisible_box_is_an_obstacle():
@@ -114,11 +163,11 @@ def test_an_empty_frame_is_the_base_frame_and_delete_needs_none():
 def test_a_known_frame_is_transformed():
     T = pose_matrix([1.0, 2.0, 3.0], [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
     body = WearerBody().apply(
-        array(box(center=(1.0, 0.0, 0.0), frame='camera')), 0.0, 'torso', lambda _: T
+        array(box(center=(1.0, 0.0, 0.0), frame='camera')), 0.0, 'torso', lambda frame, stamp: T
     )
     np.testing.assert_allclose(scene_of(body).boxes[0].center, [1.0, 3.0, 3.0], atol=1e-12)
     np.testing.assert_allclose(scene_of(body).boxes[0].rotation, T[:3, :3], atol=1e-12)
-    goal = goal_from_msg(target(1.0, 0.0, 0.0, 'camera'), 'torso', lambda _: T)
+    goal = goal_from_msg(target(1.0, 0.0, 0.0, 'camera'), 'torso', lambda frame, stamp: T)
     np.testing.assert_allclose(goal.target, [1.0, 3.0, 3.0], atol=1e-12)
 
 

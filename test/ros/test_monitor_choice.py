@@ -18,7 +18,8 @@ from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
-from rrth_planner.ros.messages.body import scene_of  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -264,13 +265,13 @@ def test_a_clock_that_is_set_back_does_not_move_the_stop(monitored, back):
     [
         ({'body_timeout': 0.2}, 'body_timeout'),
         ({'joint_timeout': 0.05}, 'joint_timeout'),
-        ({}, 'expired'),
+        ({'keep_lost': 0.0}, 'lost'),
     ],
 )
 @pytest.mark.parametrize('arm', ARMS)
 def test_a_stale_input_stops_the_arm(monitored, setting, why, arm):
     monitored.reporter.parameters = replace(monitored.reporter.parameters, **setting)
-    monitored.see(FAR, expires=monitored.now + (0.1 if why == 'expired' else 10.0))
+    monitored.see(FAR, expires=monitored.now + (0.1 if why == 'lost' else 10.0))
     monitored.read(*ARMS[arm](*monitored.on_time(PHASE)))
     monitored.monitor._on_timer()
     assert monitored.published == []
@@ -280,6 +281,46 @@ def test_a_stale_input_stops_the_arm(monitored, setting, why, arm):
     monitored.monitor._on_timer()
     assert len(monitored.published) == 1
     assert why in monitored.reporter.monitor_state[1]
+
+
+def test_a_lost_part_stays_where_it_was_until_the_arm_stops(monitored):
+    monitored.reporter.parameters = replace(monitored.reporter.parameters, keep_lost=0.4)
+    pack = Box('pack', np.array([-2.0, 0.0, 0.0]), np.full(3, 0.1), np.eye(3))
+    monitored.see(FAR, pack, expires=monitored.now + 0.1)
+    for waited in (0.2, 0.4):
+        monitored.now = 100.0 + PHASE + waited
+        monitored.read(*monitored.on_time(PHASE + waited))
+        # The rest of the body is seen on.
+        present = tuple(((FAR.name, k), BodyPart((FAR,))) for k in range(2))
+        body = WearerBody(present, monitored.inputs.body.value.at(monitored.now).lost[-1:])
+        monitored.inputs.body.value, monitored.inputs.body.measured = body, monitored.now
+        monitored.monitor.on_body(body, 0)
+        assert monitored.published == []
+    monitored.now += 0.2
+    monitored.read(*monitored.on_time(PHASE + 0.6))
+    monitored.monitor._on_timer()
+    assert len(monitored.published) == 1
+    assert 'has lost parts: "pack"' in monitored.reporter.monitor_state[1]
+
+
+def test_an_arm_is_not_driven_into_a_part_that_is_lost(monitored):
+    # It is lost in the way of the motion: gone from the messages, but not from the scene.
+    hand = monitored.hand(0.6, 0.0)
+    lost = WearerBody(
+        (((FAR.name, 0), BodyPart((FAR,))),), ((('hand', 0), BodyPart((hand,), 100.0)),)
+    )
+    monitored.inputs.body.value, monitored.inputs.body.measured = lost, monitored.now
+    monitored.monitor.on_body(lost, 0)
+    assert len(monitored.published) == 1
+    assert 'not proven free' in monitored.reporter.monitor_state[1]
+
+
+def test_the_age_of_the_body_is_counted_at_each_decision(monitored):
+    monitored.ages.clear()
+    monitored.see(FAR)
+    monitored.inputs.body.measured = monitored.now - 0.05
+    monitored.monitor.on_body(monitored.inputs.body.value, 0)
+    assert monitored.ages == pytest.approx([0.0, 0.05])
 
 
 @pytest.mark.parametrize('late', [0.0, 0.004, 0.03, 0.09])

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from nav_msgs.msg import Path  # noqa: E402
 from nav_msgs.srv import GetPlan  # noqa: E402
+from rclpy.duration import Duration  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import (  # noqa: E402
@@ -152,7 +154,7 @@ def say_all(planner, stranger, but=(), **messages):
     inputs = inputs_of(planner)
     of_topic = dict(zip(TOPICS, (inputs.body, inputs.target, inputs.joints), strict=True))
     stranger.wait_until(
-        lambda: all(of_topic[n].received is not None or of_topic[n].rejection for n in topics)
+        lambda: all(of_topic[n].measured is not None or of_topic[n].rejection for n in topics)
     )
 
 
@@ -953,20 +955,48 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
     pack.lifetime.nanosec = 10**8
     body.markers.append(pack)
     say_all(planner, stranger, body_boxes=body)
-    stranger.wait_until(lambda: stranger.value('expired boxes') == 'a pack')
+    stranger.wait_until(lambda: stranger.value('lost parts') == '"a pack"')
     stranger.wait_until(lambda: any('lifetime of "a pack"' in line for line in warnings))
     for _ in range(2):
         message = stranger.answer().message
         assert message.startswith('SENSOR_INFO_STALE (-24): the body on'), message
-        assert 'has expired parts: ' in message, message
+        assert 'has lost parts: ' in message, message
         assert '"a pack"' in message
     assert sum('lifetime of "a pack"' in line for line in warnings) == 1
     assert not stranger.received['joint_trajectory']
     gone = box('pack')
     gone.action = Marker.DELETE
     stranger.publishers['body_boxes'].publish(array(gone))
-    stranger.wait_until(lambda: not stranger.value('expired boxes'))
+    stranger.wait_until(lambda: not stranger.value('lost parts'))
     assert stranger.answer().success
+
+
+@pytest.mark.parametrize('age', [1.0, 3600.0])
+def test_a_body_that_was_measured_long_ago_is_stale_however_new_the_message(start, age):
+    planner, stranger = start(body_timeout=0.2)
+    body = wearer()
+    measured = planner.get_clock().now() - Duration(seconds=age)
+    for marker in body.markers:
+        marker.header.stamp = measured.to_msg()
+    say_all(planner, stranger, body_boxes=body)
+    message = stranger.answer().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the last good message on'), message
+    found = re.search(r'is ([0-9.]+) s old, expected at most 0.2 s \(body_timeout\)', message)
+    assert age <= float(found.group(1)) < age + 60.0
+    assert not stranger.received['joint_trajectory']
+
+
+def test_a_body_without_a_required_box_is_rejected_until_it_comes(start):
+    planner, stranger = start(required_boxes=['hat', 'torso'])
+    say_all(planner, stranger)
+    message = stranger.answer().message
+    assert message.startswith('UNABLE_TO_AQUIRE_SENSOR_DATA (-5): the body on'), message
+    assert 'has no box hat, expected each of required_boxes' in message
+    assert not stranger.received['joint_trajectory']
+    stranger.publishers['body_boxes'].publish(array(box('hat', center=(-1.0, 0.0, -1.0))))
+    stranger.wait_until(lambda: not inputs_of(planner).body.value.without(['hat']))
+    assert stranger.answer().success
+    stranger.wait_until(lambda: stranger.value('age of body at decisions').startswith('1, last '))
 
 
 def test_diagnostics_bear_the_name_of_the_node_and_keep_to_10_hz(start):
@@ -1005,7 +1035,7 @@ def test_publishers_of_every_quality_are_received_once(start, profile):
     if profile is not LATCHED:
         for name, (_, make) in TOPICS.items():
             stranger.publishers[name].publish(make())
-    stranger.wait_until(lambda: all(i.received is not None for i in inputs.all.values()))
+    stranger.wait_until(lambda: all(i.measured is not None for i in inputs.all.values()))
     if profile is not BEST_EFFORT:
         # What the best-effort reader misses comes by another one.
         subscriptions = planner._scene_monitor._subscriptions
@@ -1022,7 +1052,7 @@ def test_what_was_latched_before_the_start_is_received(start, spinning, wait_unt
         publisher.publish(make())
     planner = PlannerNode(InProcessPlanner(), namespace='/latched')
     with spinning(early), spinning(planner):
-        wait_until(lambda: all(i.received is not None for i in inputs_of(planner).all.values()))
+        wait_until(lambda: all(i.measured is not None for i in inputs_of(planner).all.values()))
     planner.close()
     planner.destroy_node()
     early.destroy_node()

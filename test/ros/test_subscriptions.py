@@ -236,18 +236,18 @@ def test_what_an_order_remembers_is_bounded(monkeypatch):
     assert names(body) == {'torso/0'}
 
 
-def test_what_has_expired_is_remembered_until_it_is_deleted_or_added_again():
+def test_what_is_lost_is_remembered_until_it_is_deleted_or_added_again():
     hat = box('hat')
     hat.lifetime.sec = 1
     order = MarkerOrder()
     body = applied(order, WearerBody(), 100, hat, box('torso'))
-    assert [key for key, _ in body.at(2.0).expired] == [('hat', 0)]
-    assert not body.at(0.5).expired
+    assert [key for key, _ in body.at(2.0).lost] == [('hat', 0)]
+    assert not body.at(0.5).lost
     later = applied(order, body, 200, box('head'), now=2.0)
-    assert [key for key, _ in later.expired] == [('hat', 0)]
-    assert not applied(order, later, 300, box('hat'), now=3.0).expired
-    assert not applied(order, later, 300, command(Marker.DELETE, 'hat'), now=3.0).expired
-    assert not applied(order, later, 300, command(Marker.DELETEALL), now=3.0).expired
+    assert [key for key, _ in later.lost] == [('hat', 0)]
+    assert not applied(order, later, 300, box('hat'), now=3.0).lost
+    assert not applied(order, later, 300, command(Marker.DELETE, 'hat'), now=3.0).lost
+    assert not applied(order, later, 300, command(Marker.DELETEALL), now=3.0).lost
 
 
 def test_without_velocities_the_change_of_the_positions_counts():

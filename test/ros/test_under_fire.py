@@ -165,7 +165,7 @@ class Wire:
     def say(self, name, msg, is_reliable=False):
         """Return whether a message was taken."""
         source = self.inputs.all[name]
-        before = (source.n_rejected, source.value, source.received)
+        before = (source.n_rejected, source.value, source.measured)
         data = msg if isinstance(msg, bytes) else serialize_message(msg)
         n = next(self.sent)
         subscription = self.subscriptions[name]
@@ -174,7 +174,7 @@ class Wire:
         assert not self.complaints.errors
         if source.n_rejected > before[0]:
             assert source.n_rejected == before[0] + 1
-            assert (source.value, source.received) == before[1:]
+            assert (source.value, source.measured) == before[1:]
             assert is_a_sentence(str(source.rejection))
             return False
         return True

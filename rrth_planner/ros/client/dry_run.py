@@ -33,10 +33,10 @@ def plan_without_moving(
         *(client.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
     )
     scene_monitor = SceneMonitor(client, parameters, inputs)
-    client.wait_for(lambda: inputs.joints.received is not None, inputs.joints.topic)
+    client.wait_for(lambda: inputs.joints.measured is not None, inputs.joints.topic)
     if body is None:
         client.wait_for(
-            lambda: inputs.body.received is not None or inputs.body.rejection is not None,
+            lambda: inputs.body.measured is not None or inputs.body.rejection is not None,
             f'a body on {inputs.body.topic}, and none is given by --body',
         )
     planner = InProcessPlanner()

@@ -24,8 +24,8 @@ from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
-# A message that came further ahead of now than this came before the clock was set back: its age
-# is unknown [s].
+# A message measured further ahead of now than this came before the clock was set back: its age is
+# unknown [s].
 CLOCK_STEP = 0.1
 
 
@@ -43,20 +43,20 @@ class ArmHasMoved(RequestError):
 
 
 class Input(Generic[T]):
-    """The last good value of one topic, when it was received [s], and the last rejection."""
+    """The last good value of one topic, when it was measured [s], and the last rejection."""
 
     def __init__(self, topic: str, empty: T) -> None:
         """Begin with an empty value; the resolved name of the topic is for messages."""
         self.topic = topic
         self.value = empty
-        self.received: float | None = None
+        self.measured: float | None = None
         self.n_good, self.n_rejected = 0, 0
         self.rejection: MessageError | None = None
         self.is_last_rejected = False
 
-    def accept(self, read: Callable[[], T], now: float, is_news: bool = True) -> bool:
+    def accept(self, read: Callable[[], T], measured: float, is_news: bool = True) -> bool:
         """
-        Take what `read` returns, received at a time [s]; return False where that raises.
+        Take what `read` returns, measured at a time [s]; return False where that raises.
 
         is_news: False where a newer message came before; then the age does not change, and a
         rejection of the newer one stands.
@@ -71,8 +71,8 @@ class Input(Generic[T]):
             self._reject(MessageError(f'it could not be read: {what}'))
             raise
         self.n_good += 1
-        if is_news or self.received is None:
-            self.received = now
+        if is_news or self.measured is None:
+            self.measured = measured
         if is_news:
             self.is_last_rejected = False
         return not self.is_last_rejected
@@ -82,10 +82,10 @@ class Input(Generic[T]):
         self.rejection, self.is_last_rejected = problem, True
 
     def age(self, now: float) -> float:
-        """Return the time since the last good message; inf before it, or where unknown [s]."""
-        if self.received is None or now < self.received - CLOCK_STEP:
+        """Return the age of the last good message; inf before it, or where unknown [s]."""
+        if self.measured is None or now < self.measured - CLOCK_STEP:
             return float('inf')
-        return max(0.0, now - self.received)
+        return max(0.0, now - self.measured)
 
     def overdue(self, now: float, timeout: float) -> str:
         """Return, where the last good message is older than a timeout [s], how old; else ''."""
@@ -207,43 +207,67 @@ class Inputs:
             Something is missing, too old (`parameters` have the timeouts) or rejected.
 
         """
-        scene = self._scene(now, parameters.body_timeout)
+        body = self.body_at(now, parameters)
         goal = self._goal() if goal is None else goal
-        rejection = self.joint_rejection
-        if rejection is not None:
-            # Earlier positions say nothing about the present ones.
-            raise _rejected(self.joints, rejection, ErrorCode.ROBOT_STATE_STALE)
-        joints = _require(
-            self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
-        )
-        late = self.joints.overdue(now, parameters.joint_timeout)
-        if late:
-            raise _late(self.joints, f'{late} s (joint_timeout)', ErrorCode.ROBOT_STATE_STALE)
-        return InputSnapshot(scene, goal, joints)
+        return InputSnapshot(scene_of(body), goal, self._joints_at(now, parameters.joint_timeout))
 
-    def _scene(self, now: float, timeout: float) -> Scene:
+    def body_at(
+        self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0
+    ) -> WearerBody:
+        """
+        Return the present body [s], or raise RequestError where it is stale, rejected or partial.
+
+        keep_lost: how long a lost part may stay where it was [s].
+        """
         source, code = self.body, ErrorCode.SENSOR_INFO_STALE
         _require(source, 'body', 'a visualization_msgs/MarkerArray with the wearer')
         if source.is_last_rejected:
             # An earlier body says nothing about the present one.
             raise _rejected(source, source.rejection, code)
         body = source.value.at(now)
-        if body.expired:
+        lost = body.lost_names(now - keep_lost) if body.lost else ''
+        if lost:
             raise RequestError(
                 code,
-                f'the body on {source.topic} has expired parts: {body.expired_names}; expected '
-                'each of them again, or its DELETE',
+                f'the body on {source.topic} has lost parts: {lost}; expected each of them again, '
+                'or its DELETE',
             )
-        if body.n_boxes == 0:
+        if body.n_boxes == 0 and not body.lost:
             raise RequestError(
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
                 f'the body on {source.topic} is empty: every box was deleted; expected at '
                 'least one box of the wearer',
             )
-        late = source.overdue(now, timeout)
+        wanted = parameters.required_boxes
+        missing = body.without(wanted) if wanted else ()
+        if missing:
+            raise RequestError(
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA,
+                f'the body on {source.topic} has no box {", ".join(missing)}, expected each of '
+                'required_boxes',
+            )
+        late = source.overdue(now, parameters.body_timeout)
         if late:
             raise _late(source, f'{late} s (body_timeout)', code)
-        return scene_of(body)
+        return body
+
+    def require_fresh(self, now: float, parameters: PlannerParameters) -> WearerBody:
+        """Return the present body [s] for a motion in progress; raise RequestError if stale."""
+        self._joints_at(now, parameters.joint_timeout)
+        return self.body_at(now, parameters, parameters.keep_lost)
+
+    def _joints_at(self, now: float, timeout: float) -> JointReading:
+        rejection = self.joint_rejection
+        if rejection is not None:
+            # Earlier positions say nothing about the present ones.
+            raise _rejected(self.joints, rejection, ErrorCode.ROBOT_STATE_STALE)
+        joints: JointReading = _require(
+            self.joints, 'joint positions', 'a sensor_msgs/JointState with every joint'
+        )
+        late = self.joints.overdue(now, timeout)
+        if late:
+            raise _late(self.joints, f'{late} s (joint_timeout)', ErrorCode.ROBOT_STATE_STALE)
+        return joints
 
     def _goal(self) -> PointingGoal:
         rejection = self.target.rejection
@@ -255,7 +279,7 @@ class Inputs:
 
 
 def _require(source: Input[Any], what: str, expected: str) -> Any:
-    if source.received is not None:
+    if source.measured is not None:
         return source.value
     if source.rejection is None:
         raise RequestError(
@@ -275,21 +299,3 @@ def _rejected(source: Input[Any], why: MessageError | None, code: ErrorCode) -> 
 
 def _late(source: Input[Any], age: str, code: ErrorCode) -> RequestError:
     return RequestError(code, f'the last good message on {source.topic} is {age}')
-
-
-def stale_input(source: Inputs, parameters: PlannerParameters, now: float) -> str:
-    """Return why body or joints are stale or rejected at a time [s]; empty: neither is."""
-    if source.body.is_last_rejected:
-        return f'the last body was rejected, {source.body.rejection}'
-    if source.joint_rejection is not None:
-        return f'the last joint positions were rejected, {source.joint_rejection}'
-    body = source.body.value.at(now)
-    if body.expired:
-        return f'the body has expired parts: {body.expired_names}'
-    if not body.n_boxes:
-        return 'the body is empty'
-    late = source.body.overdue(now, parameters.body_timeout)
-    if late:
-        return f'the body is {late} s (body_timeout)'
-    late = source.joints.overdue(now, parameters.joint_timeout)
-    return f'the last joint positions are {late} s (joint_timeout)' if late else ''

@@ -23,7 +23,7 @@ from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reje
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
-LONGEST_TIMEOUT = 86400.0
+LONGEST_TIMEOUT, LONGEST_LATENCY = 86400.0, 10.0
 
 
 def declared(dof: int) -> tuple[Setting, ...]:
@@ -33,6 +33,8 @@ def declared(dof: int) -> tuple[Setting, ...]:
     timeout = (0.0, LONGEST_TIMEOUT)
     ray = 'length of the pointing ray kept clear in motion'
     escape = 'greatest penetration depth, margin included, to escape from; 0: none'
+    latency = 'age at reception of a body without stamp'
+    lost = 'time that a lost part of the body stays where it was before the arm stops'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
         Setting('base_frame', 'torso', 'frame id', 'frame of the wearer', is_read_only=True),
@@ -47,6 +49,9 @@ def declared(dof: int) -> tuple[Setting, ...]:
         ),
         Setting('max_jerk', [40.0] * dof, 'rad/s^3', f'greatest jerk {each}', *limit),
         Setting('body_timeout', 0.0, 's', 'an older body is rejected; 0: never', *timeout),
+        Setting('body_latency', 0.03, 's', latency, 0.0, LONGEST_LATENCY, is_read_only=True),
+        Setting('keep_lost', 2.0, 's', lost, *timeout),
+        Setting('required_boxes', [''], 'names', 'a body without one of these is rejected'),
         Setting('incident_folder', '', 'path', folder),
         Setting('replan', True, '-', 'plan again after a fail-safe stop'),
         Setting(
@@ -65,6 +70,10 @@ class PlannerParameters(PlanSettings):
     ----------
     body_timeout, joint_timeout : float
         [s]; 0: never.
+    body_latency, keep_lost : float
+        [s].
+    required_boxes : tuple of str
+        Names of boxes, or of namespaces.
     incident_folder : str
         Empty: a folder of the ROS logs.
 
@@ -74,6 +83,9 @@ class PlannerParameters(PlanSettings):
     base_frame: str
     body_timeout: float
     joint_timeout: float
+    body_latency: float
+    keep_lost: float
+    required_boxes: tuple[str, ...]
     replan: bool
     incident_folder: str
 
@@ -91,9 +103,14 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     settings = settings_from_values(values, arm.dof)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
-    own = ('base_frame', 'body_timeout', 'joint_timeout', 'replan', 'incident_folder')
+    own = (
+        *('base_frame', 'body_timeout', 'joint_timeout', 'body_latency', 'keep_lost', 'replan'),
+        'incident_folder',
+    )
     return PlannerParameters(
         arm=arm,
+        # ROS has no type for an empty array.
+        required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )

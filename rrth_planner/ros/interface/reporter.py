@@ -19,7 +19,7 @@ from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
 # Diagnostics are published at least this often [s].
 PERIOD = 1.0
-# Number of expired boxes that are remembered as reported.
+# Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
@@ -73,8 +73,8 @@ class Figures:
     def add(self, elapsed: float) -> None:
         """Count one more, with its duration [s]."""
         self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
-        at = math.ceil(BINS * math.log10(max(elapsed, SHORTEST) / SHORTEST))
-        self._counts[min(at, len(self._counts) - 1)] += 1
+        ratio = min(max(elapsed / SHORTEST, 1.0), 10.0**DECADES)
+        self._counts[min(math.ceil(BINS * math.log10(ratio)), len(self._counts) - 1)] += 1
 
     def quantile(self, share: float) -> float:
         """Return what a share of the durations do not exceed, rounded up by at most 5 % [s]."""
@@ -108,6 +108,7 @@ class Reporter:
         # The state of the monitor, and its reason.
         self.monitor_state = ('no motion', '')
         self._remaining_motion_checks, self._stops_published = Figures(), Figures()
+        self._body_ages = Figures()
         self._n_incidents, self._last_incident = 0, ''
         # Held while the threads of executor and worker count and publish.
         self._lock = Lock()
@@ -130,6 +131,11 @@ class Reporter:
         """Count a fail-safe stop, and how long after the body's arrival it was published [s]."""
         with self._lock:
             self._stops_published.add(elapsed)
+
+    def body_used(self, age: float) -> None:
+        """Count a decision, to publish a motion or to go on with one, by the body's age [s]."""
+        with self._lock:
+            self._body_ages.add(age)
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -154,7 +160,7 @@ class Reporter:
         with self._lock:
             self._published, self._is_changed = time.monotonic(), False
             now = self._node.get_clock().now()
-            self._warn_of_expired(now.nanoseconds * 1e-9)
+            self._warn_of_lost(now.nanoseconds * 1e-9)
             msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
             msg.header.stamp = now.to_msg()
             self._publisher.publish(msg)
@@ -175,9 +181,10 @@ class Reporter:
             'path length [rad]': f'{report.length:.4f}',
             'least clearance [m]': f'{report.clearance:.4f}',
             'boxes': body.n_boxes,
-            'expired boxes': ', '.join(box.name for _, part in body.expired for box in part.boxes),
+            'lost parts': body.lost_names(),
             'monitor': monitor,
             'last stop': reason,
+            'age of body at decisions': self._body_ages,
             'remaining motion checks': self._remaining_motion_checks,
             'fail-safe stops': self._stops_published,
             'incidents': self._n_incidents,
@@ -198,17 +205,17 @@ class Reporter:
         status.values = [KeyValue(key=k, value=one_line(str(v))) for k, v in values.items()]
         return status
 
-    def _warn_of_expired(self, now: float) -> None:
-        """Log each expired box once."""
-        expired = self._inputs.body.value.at(now).expired
-        new = [(key, part) for key, part in expired if key not in self._named]
+    def _warn_of_lost(self, now: float) -> None:
+        """Log each lost part once."""
+        lost = self._inputs.body.value.at(now).lost
+        new = [(key, part) for key, part in lost if key not in self._named]
         if new:
             if len(self._named) > MOST_NAMED:
-                self._named = {key for key, _ in expired}
+                self._named = {key for key, _ in lost}
             self._named.update(key for key, _ in new)
-            names = WearerBody(expired=tuple(new)).expired_names
+            names = WearerBody(lost=tuple(new)).lost_names()
             self._node.get_logger().warning(
-                f'{self._inputs.body.topic}: lifetime of {names} expired: no motion until '
+                f'{self._inputs.body.topic}: lifetime of {names} expired: no new motion until '
                 'published again or deleted'
             )
 
@@ -247,12 +254,12 @@ def summary(
         return DiagnosticStatus.ERROR, answer(report.code, report.sentence)
     timeouts = ((inputs.body, parameters.body_timeout), (inputs.joints, parameters.joint_timeout))
     for topic, timeout in timeouts:
-        if timeout > 0.0 and topic.received is not None and topic.age(now) > timeout:
+        if timeout > 0.0 and topic.measured is not None and topic.age(now) > timeout:
             return DiagnosticStatus.STALE, f'{topic.topic} is {topic.age(now):.3f} s old'
     rejected = [topic for topic in inputs.all.values() if topic.is_last_rejected]
     if rejected:
         return DiagnosticStatus.WARN, f'{rejected[0].topic} rejected: {rejected[0].rejection}'
-    missing = [topic.topic for topic in inputs.all.values() if topic.received is None]
+    missing = [topic.topic for topic in inputs.all.values() if topic.measured is None]
     if missing:
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
     if report.code not in (None, ErrorCode.SUCCESS):

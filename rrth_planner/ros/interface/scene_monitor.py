@@ -2,23 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subscriptions that keep the inputs of the planner up to date."""
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from functools import partial
 import time
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
-from rrth_planner.model.errors import MessageError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.definitions import fast_decoder
-from rrth_planner.ros.messages.frames import Frames
+from rrth_planner.ros.messages.frames import FrameIsLateError, Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
-from rrth_planner.ros.messages.marker_edits import read_edits
+from rrth_planner.ros.messages.marker_edits import Edit, measured_at, read_edits
 from rrth_planner.ros.messages.marker_order import MarkerOrder
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from sensor_msgs.msg import JointState
@@ -26,6 +27,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 # Rejections of one topic are warned about at most this often [s].
 WARNING_PERIOD = 5.0
+# A body waits so long for its frame, which may come later than itself; period of that [s].
+LONGEST_WAIT, WAIT_PERIOD = 0.2, 0.005
+# So many bodies wait at most.
+MOST_WAITING = 100
 
 
 class SceneMonitor:
@@ -35,7 +40,7 @@ class SceneMonitor:
     Parameters
     ----------
     parameters : PlannerParameters
-        For the constant ones: the arm and the base frame.
+        For the constant ones: the arm, the base frame and `body_latency`.
     on_change : callable, optional
         Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
@@ -57,12 +62,17 @@ class SceneMonitor:
         """Subscribe."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
-        self._base_frame = parameters.base_frame
+        self._base_frame, self._latency = parameters.base_frame, parameters.body_latency
         self._on_change, self._notify_body = on_change, on_body
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
         self._order = MarkerOrder()
+        # Bodies in frames whose poses are not known yet, and since when they wait [s].
+        self._waiting: deque[tuple[MarkerArray, Arrival, float]] = deque()
+        if self._frames.is_available:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
         # The monitor waits for bodies.
         fast: dict[str, Any] = {'decode': fast_decoder(MarkerArray), 'takes_late': True}
         self._subscriptions = [
@@ -76,7 +86,7 @@ class SceneMonitor:
             )
         ]
 
-    def _reject(self, source: Input[Any], problem: MessageError) -> None:
+    def _reject(self, source: Input[Any], problem: Exception) -> None:
         def read() -> Any:
             raise problem
 
@@ -89,16 +99,40 @@ class SceneMonitor:
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
     def _on_body(self, msg: MarkerArray, arrival: Arrival) -> None:
-        now, body = self._now(), self._inputs.body
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
-            self._warn_of_empty_frame(body)
+            self._warn_of_empty_frame(self._inputs.body)
+        self._waiting.append((msg, arrival, time.monotonic()))
+        self._read_waiting()
+
+    def _read_waiting(self) -> None:
+        """Read the bodies in their order, until one has to wait for its frame."""
+        while self._waiting:
+            msg, arrival, since = self._waiting.popleft()
+            waited = time.monotonic() - since
+            try:
+                edits = read_edits(
+                    msg, self._now(), self._base_frame, self._frames.lookup, self._latency
+                )
+            except Exception as problem:
+                may_wait = waited < LONGEST_WAIT and len(self._waiting) < MOST_WAITING
+                if isinstance(problem, FrameIsLateError) and may_wait:
+                    self._waiting.appendleft((msg, arrival, since))
+                    return
+                self._reject(self._inputs.body, problem)
+            else:
+                # The wait for its frame is no delay of this node.
+                read = time.time_ns() if waited > WAIT_PERIOD else arrival.received
+                self._take_body(edits, arrival, read)
+
+    def _take_body(self, edits: Sequence[Edit], arrival: Arrival, arrived: int) -> None:
+        now, body = self._now(), self._inputs.body
 
         def read() -> WearerBody:
-            edits = read_edits(msg, now, self._base_frame, self._frames.lookup)
             return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
 
-        self._take(body, read, now, is_news=arrival.is_newer is None)
-        self._notify_body(body.value, arrival.received)
+        measured = measured_at(edits, now - self._latency)
+        self._take(body, read, measured, is_news=arrival.is_newer is None)
+        self._notify_body(body.value, arrived)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:
@@ -115,10 +149,10 @@ class SceneMonitor:
             self._inputs.joint_rejection = source.rejection if source.is_last_rejected else None
 
     def _take(
-        self, source: Input[Any], read: Callable[[], Any], now: float, is_news: bool = True
+        self, source: Input[Any], read: Callable[[], Any], measured: float, is_news: bool = True
     ) -> None:
-        was_good = source.received is not None and not source.is_last_rejected
-        is_good = source.accept(read, now, is_news)
+        was_good = source.measured is not None and not source.is_last_rejected
+        is_good = source.accept(read, measured, is_news)
         if not is_good:
             self._warn(source, 'rejected', f' rejected: {source.rejection}', WARNING_PERIOD)
         if is_good != was_good:

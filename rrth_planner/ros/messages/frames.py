@@ -16,17 +16,22 @@ try:
 except ImportError:  # not among the wheels: only the base frame is known then
     tf2_ros = None
 
-# The pose of a frame in the base frame, shape (4, 4) [m], or FrameError.
-Lookup = Callable[[str], Array]
+# The pose of a frame in the base frame at a time [ns], 0 for the latest one; shape (4, 4) [m], or
+# FrameError.
+Lookup = Callable[[str, int], Array]
 
 
 class FrameError(MessageError):
     """A frame that cannot be transformed to the base frame."""
 
 
-def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
+class FrameIsLateError(FrameError):
+    """A frame whose pose at that time is not known yet."""
+
+
+def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None, stamp: int = 0) -> Array:
     """
-    Return the pose of a message's frame in the base frame, shape (4, 4) [m].
+    Return the pose of a message's frame in the base frame at its stamp [ns], shape (4, 4) [m].
 
     An empty frame stands for the base frame; without `lookup` any other one is a FrameError.
     """
@@ -34,7 +39,7 @@ def pose_in_base(frame: str, base_frame: str, lookup: Lookup | None) -> Array:
         return np.eye(4)
     if lookup is None:
         raise FrameError(f'frame "{frame}", expected "{base_frame}" or an empty frame')
-    return lookup(frame)
+    return lookup(frame, stamp)
 
 
 class Frames:
@@ -48,19 +53,35 @@ class Frames:
             self._buffer = tf2_ros.Buffer(node=node)
             self._listener = tf2_ros.TransformListener(self._buffer, node)
 
-    def lookup(self, frame: str) -> Array:
-        """Return the latest pose of a frame in the base frame (`Lookup`), or raise FrameError."""
+    @property
+    def is_available(self) -> bool:
+        """Whether tf2_ros is installed."""
+        return self._buffer is not None
+
+    def lookup(self, frame: str, stamp: int) -> Array:
+        """Return the pose of a frame in the base frame at a time (`Lookup`)."""
         if self._buffer is None:
             raise FrameError(
                 f'frame "{frame}", expected "{self._base_frame}" or an empty frame: '
                 'tf2_ros is not installed, so no other frame is known'
             )
         try:
-            stamped = self._buffer.lookup_transform(self._base_frame, frame, Time())
+            stamped = self._buffer.lookup_transform(
+                self._base_frame, frame, Time(nanoseconds=stamp)
+            )
         except tf2_ros.TransformException as problem:
-            raise FrameError(
+            raise (FrameIsLateError if self._is_late(frame, stamp) else FrameError)(
                 f'frame "{frame}", expected a frame that TF can transform to '
                 f'"{self._base_frame}": {problem}'
             ) from problem
         t, r = stamped.transform.translation, stamped.transform.rotation
         return pose_matrix((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))
+
+    def _is_late(self, frame: str, stamp: int) -> bool:
+        """Return whether a frame is known, but not yet at a time [ns]."""
+        assert self._buffer is not None
+        try:
+            newest = self._buffer.get_latest_common_time(self._base_frame, frame)
+        except tf2_ros.TransformException:
+            return False
+        return bool(newest.nanoseconds < stamp)

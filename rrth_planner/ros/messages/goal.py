@@ -6,7 +6,7 @@ from geometry_msgs.msg import PointStamped
 import numpy as np
 from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.ros.messages.fields import triple_of
+from rrth_planner.ros.messages.fields import nanoseconds_of, triple_of
 from rrth_planner.ros.messages.frames import Lookup, pose_in_base
 
 
@@ -23,7 +23,8 @@ def goal_from_msg(
 
     """
     point = np.array(triple_of(msg.point, 'point'))
-    T = pose_in_base(msg.header.frame_id, base_frame, lookup)
+    stamp = nanoseconds_of(msg.header.stamp)
+    T = pose_in_base(msg.header.frame_id, base_frame, lookup, stamp)
     try:
         # What overflows is infinite, which a goal rejects.
         with np.errstate(over='ignore', invalid='ignore'):

@@ -16,7 +16,13 @@ from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import MessageError, one_line, SceneError
 from rrth_planner.model.scene import Box
-from rrth_planner.ros.messages.fields import seconds_of, triple_of, unit_quaternion_of
+from rrth_planner.ros.messages.fields import (
+    NANOSECONDS,
+    nanoseconds_of,
+    seconds_of,
+    triple_of,
+    unit_quaternion_of,
+)
 from rrth_planner.ros.messages.frames import Lookup, pose_in_base
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -24,6 +30,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 MOST_BOXES = 10000
 # A body is kept, and so are its names [characters].
 LONGEST_NAMESPACE = 256
+# Clocks may differ by so much [s].
+MOST_AHEAD = 0.1
 
 Key = tuple[str, int]
 
@@ -38,12 +46,15 @@ class BodyPart:
     boxes : tuple of Box
         In the base frame.
     expires : float
-        When they vanish [s, the clock of `now`]; inf: never.
+        When they are lost [s, the clock of `now`]; inf: never.
+    measured : float
+        When they were measured [s].
 
     """
 
     boxes: tuple[Box, ...]
     expires: float = math.inf
+    measured: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,8 +66,17 @@ class Edit:
     part: BodyPart | None = None
 
 
+def measured_at(edits: Sequence[Edit], default: float) -> float:
+    """Return the oldest measurement of the boxes of an array; without boxes the default [s]."""
+    return min((e.part.measured for e in edits if e.part is not None), default=default)
+
+
 def read_edits(
-    msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
+    msg: MarkerArray,
+    now: float,
+    base_frame: str,
+    lookup: Lookup | None = None,
+    latency: float = 0.0,
 ) -> tuple[Edit, ...]:
     """
     Return the edits of an array, in its order.
@@ -68,20 +88,22 @@ def read_edits(
     base_frame : str
         Frame of the boxes; an empty frame of a marker is taken as it.
     lookup : callable, optional
-        frame -> its pose in the base frame, shape (4, 4) [m]; without, no other is known.
+        As `frames.Lookup`; without, no other frame is known.
+    latency : float
+        Age at reception of markers without a stamp [s].
 
     Raises
     ------
     MessageError
-        A bad marker; a FrameError when its frame is the reason.
+        A bad marker, or one from the future; a FrameError when its frame is the reason.
 
     """
     reading = _Reading(base_frame, lookup)
-    # Of each marker: when it expires, and where its boxes end among all.
-    expires, ends = [], [0]
+    # Of each marker: when it was measured and expires, and where its boxes end among all.
+    times, ends = [], [0]
     for index, marker in enumerate(msg.markers):
         try:
-            expires.append(_read(marker, now, reading))
+            times.append(_read(marker, now, latency, reading))
         except MessageError as problem:
             raise type(problem)(f'{_label(index, marker)}: {problem}') from problem
         ends.append(len(reading.rows))
@@ -97,8 +119,8 @@ def read_edits(
         index = bisect_right(ends, first_bad(numbers, FARTHEST)) - 1
         raise MessageError(f'{_label(index, msg.markers[index])}: {problem}') from problem
     return tuple(
-        Edit(m.action, (m.ns, m.id), None if then is None else BodyPart(boxes[begin:end], then))
-        for m, then, (begin, end) in zip(msg.markers, expires, pairwise(ends), strict=True)
+        Edit(m.action, (m.ns, m.id), None if then is None else BodyPart(boxes[begin:end], *then))
+        for m, then, (begin, end) in zip(msg.markers, times, pairwise(ends), strict=True)
     )
 
 
@@ -118,14 +140,15 @@ class _Reading:
         self.rows: list[tuple[float, ...]] = []
         self.which: list[int] = []
         self.frames: list[Array] = []
-        self._known: dict[str, int] = {}
+        self._known: dict[tuple[str, int], int] = {}
 
-    def frame(self, name: str) -> int:
-        """Return the number of a frame, or raise FrameError."""
-        if name not in self._known:
-            self.frames.append(pose_in_base(name, self._base_frame, self._lookup))
-            self._known[name] = len(self.frames) - 1
-        return self._known[name]
+    def frame(self, name: str, stamp: int) -> int:
+        """Return the number of a frame at a time [ns], or raise FrameError."""
+        key = name, stamp
+        if key not in self._known:
+            self.frames.append(pose_in_base(name, self._base_frame, self._lookup, stamp))
+            self._known[key] = len(self.frames) - 1
+        return self._known[key]
 
     def add(self, name: str, row: tuple[float, ...], frame: int) -> None:
         """Add a box in a frame."""
@@ -134,8 +157,10 @@ class _Reading:
         self.which.append(frame)
 
 
-def _read(marker: Any, now: float, reading: _Reading) -> float | None:
-    """Read the boxes of a marker; return when they expire [s], or None where it adds none."""
+def _read(
+    marker: Any, now: float, latency: float, reading: _Reading
+) -> tuple[float, float] | None:
+    """Read the boxes of a marker; return when they expire and were measured [s]; None: no box."""
     if len(marker.ns) > LONGEST_NAMESPACE:
         raise MessageError(
             f'ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
@@ -159,7 +184,14 @@ def _read(marker: Any, now: float, reading: _Reading) -> float | None:
     lifetime = seconds_of(marker.lifetime)
     if lifetime < 0.0:
         raise MessageError(f'lifetime: {lifetime}, expected 0 (for ever) or more [s]')
-    frame, name = reading.frame(marker.header.frame_id), marker_name(marker)
+    stamp = nanoseconds_of(marker.header.stamp)
+    measured = stamp / NANOSECONDS if stamp else now - latency
+    if measured - now > MOST_AHEAD:
+        raise MessageError(
+            f'header.stamp: {measured - now:.3f} s in the future, expected at most {MOST_AHEAD:g} '
+            '(by the same clock as the planner: see use_sim_time)'
+        )
+    frame, name = reading.frame(marker.header.frame_id, stamp), marker_name(marker)
     if marker.type == Marker.CUBE:
         reading.add(name, (*row, 0.0, 0.0, 0.0), frame)
     else:
@@ -169,7 +201,7 @@ def _read(marker: Any, now: float, reading: _Reading) -> float | None:
             )
         for k, point in enumerate(marker.points):
             reading.add(f'{name}[{k}]', row + triple_of(point, f'points[{k}]'), frame)
-    return now + lifetime if lifetime > 0.0 else math.inf
+    return now + lifetime if lifetime > 0.0 else math.inf, measured
 
 
 def _label(index: int, marker: Any) -> str:

@@ -65,7 +65,7 @@ class MarkerOrder:
         self, body: WearerBody, edits: Sequence[Edit], is_newer: Callable[[Stamp], bool]
     ) -> Iterator[Edit]:
         """Yield the edits of a late array to markers that have no newer edit."""
-        keys = [key for key, _ in (*body.parts, *body.expired)]
+        keys = [key for key, _ in (*body.parts, *body.lost)]
         for edit in edits:
             if edit.action == Marker.DELETEALL:
                 of_all = [key for key in keys if edit.key[0] in ('', key[0])]

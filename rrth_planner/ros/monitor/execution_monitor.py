@@ -26,7 +26,7 @@ from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.inputs import Inputs, RequestError, stale_input
+from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
@@ -215,6 +215,7 @@ class ExecutionMonitor:
         phase = self._monitored_phase(now)
         if phase is None:
             return
+        self._reporter.body_used(self._inputs.body.age(now))
         scene = scene_of(body.at(now))
         if self._holds(is_remaining_free, self.running, phase, scene):
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
@@ -265,10 +266,12 @@ class ExecutionMonitor:
         phase = self._phase(now)
         if phase is None or self._state is not MonitorState.MONITORING:
             return None
-        why = stale_input(self._inputs, self._reporter.parameters, now)
-        if why:
-            self.fail(why)
-        return None if why else phase
+        try:
+            self._inputs.require_fresh(now, self._reporter.parameters)
+        except RequestError as problem:
+            self.fail(str(problem))
+            return None
+        return phase
 
     def _repeat_stop(self, now: float) -> None:
         """Publish the stop again where the arm does not execute it."""

@@ -302,6 +302,7 @@ class PlanQueue:
             return False
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
+        self._reporter.body_used(self._inputs.body.age(self._now()))
         # From here on the request cannot be cancelled.
         self._open.discard(ticket)
         monitor.begin(
