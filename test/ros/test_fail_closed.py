@@ -17,7 +17,7 @@ from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
-from rrth_planner.ros.interface.inputs import Input  # noqa: E402
+from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
@@ -152,13 +152,13 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 
 def places():
     """Return what the monitor calls, as (owner, name)."""
-    names = 'scene_of stale_input is_remaining_free escapes_by_continuing fast_stop arm_world'
+    names = 'scene_of is_remaining_free escapes_by_continuing fast_stop arm_world'
     found = [(execution_monitor, name) for name in names.split()]
     found += [
         (execution_tracker, name)
         for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
     ]
-    for owner in (ExecutionMonitor, ExecutionTracker, Input, WearerBody, ExecutingMotion):
+    for owner in (ExecutionMonitor, ExecutionTracker, Inputs, Input, WearerBody, ExecutingMotion):
         found += [
             (owner, name)
             for name, value in vars(owner).items()
@@ -220,7 +220,9 @@ def test_a_rejected_body_stops_the_arm_with_the_reason(monitored):
     arm.monitor.on_body(arm.inputs.body.value, 0)
     assert len(arm.published) == 1
     assert arm.reporter.monitor_state[0] == 'stopping'
-    assert 'the last body was rejected, marker 3 ("shoe")' in arm.reporter.monitor_state[1]
+    assert (
+        'the last message on body was rejected: marker 3 ("shoe")' in arm.reporter.monitor_state[1]
+    )
 
 
 def test_joint_positions_that_are_rejected_stop_the_arm(monitored):
@@ -228,7 +230,9 @@ def test_joint_positions_that_are_rejected_stop_the_arm(monitored):
     arm.inputs.joint_rejection = MessageError('position: nan')
     arm.monitor._on_timer()
     assert len(arm.published) == 1
-    assert 'the last joint positions were rejected, position: nan' in arm.reporter.monitor_state[1]
+    assert (
+        'the last message on joints was rejected: position: nan' in arm.reporter.monitor_state[1]
+    )
 
 
 @pytest.mark.parametrize(('late', 'n_stops'), [(0.049, 0), (0.051, 1)])
