@@ -50,7 +50,7 @@ class Following(Input):
         return JointReading(q, self._pace * v, now, now, float('inf'))
 
     value = property(lambda self: self.at(self._clock()), lambda self, _: None)
-    received = property(lambda self: self._clock(), lambda self, _: None)
+    measured = property(lambda self: self._clock(), lambda self, _: None)
 
 
 class Clock:

@@ -34,11 +34,12 @@ from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
-from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
+from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
@@ -46,6 +47,7 @@ from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa
 from rrth_planner.ros.monitor.execution_monitor import Stop  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests import request_queue  # noqa: E402
+from rrth_planner.ros.requests.plan_request import PlanOutcome  # noqa: E402
 from rrth_planner.ros.requests.revalidation import Revalidation  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -299,6 +301,62 @@ def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(start
         assert not values[[0, -1]].any()
 
 
+@pytest.fixture(name='one_try')
+def _one_try(monkeypatch):
+    """Have a request planned once, however wearer and arm move."""
+    monkeypatch.setattr(PlanOutcome, 'may_change', False)
+
+
+def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs, plan_motion, plans = inputs_of(planner), in_process_planner.plan_question, []
+
+    def plan_while_a_hand_comes(*args, **kwargs):
+        plan, body = plan_motion(*args, **kwargs), inputs.body.value
+        plans.append(plan)
+        if len(plans) == 1:
+            middle = positions_at(plan.trajectory, [0.5 * plan.trajectory.duration])[0]
+            T = tool_pose(load_arm(), middle)
+            hand = box('hand', 0, T[:3, 3] + 0.4 * T[:3, 2], (0.05, 0.05, 0.05))
+            stranger.publishers['body_boxes'].publish(array(hand))
+            wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_a_hand_comes)
+    assert stranger.answer().success
+    assert len(plans) == 2
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    (msg,) = stranger.received['joint_trajectory']
+    found = joint_trajectory_from_msg(msg, JOINTS)
+    np.testing.assert_array_equal(found.positions, plans[1].trajectory.positions)
+
+
+def test_a_wearer_who_always_moves_into_the_motion_is_reported_after_the_time_limit(
+    start, monkeypatch, wait_until
+):
+    planner, stranger = start(time_limit=0.5)
+    say_all(planner, stranger)
+    inputs, plan_motion, n = inputs_of(planner), in_process_planner.plan_question, []
+
+    def plan_while_the_wearer_moves(question, *args):
+        # Each motion is planned round the wearer, and invalid for the fence that comes.
+        plan, body = plan_motion(replace(question, scene=open_scene), *args), inputs.body.value
+        fence = fenced()
+        fence.markers[-1].pose.position.z += 1e-4 * len(n)
+        n.append(1)
+        stranger.publishers['body_boxes'].publish(fence)
+        wait_until(lambda: inputs.body.value is not body)
+        return plan
+
+    open_scene = scene_of(inputs.body.value)
+    monkeypatch.setattr(in_process_planner, 'plan_question', plan_while_the_wearer_moves)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
+    assert len(n) > 1
+    assert not stranger.received['joint_trajectory']
+
+
 def test_deeper_than_escape_depth_is_rejected(start):
     planner, stranger = start(escape_depth=0.01)
     say_all(planner, stranger, body_boxes=leaned())
@@ -312,6 +370,7 @@ def test_deeper_than_escape_depth_is_rejected(start):
     assert stranger.answer().success
 
 
+@pytest.mark.usefixtures('one_try')
 def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait_until):
     planner, stranger = start()
     say_all(planner, stranger, body_boxes=leaned())
@@ -332,6 +391,7 @@ def test_an_escape_is_revalidated_when_the_wearer_moved(start, monkeypatch, wait
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): the wearer')
 
 
+@pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize(('depth', 'answer'), [(0.05, 'SUCCESS'), (0.028, 'MOTION_PLAN_INVAL')])
 def test_no_escape_is_published_once_the_arm_is_too_deep(
     start, monkeypatch, wait_until, depth, answer
@@ -351,6 +411,7 @@ def test_no_escape_is_published_once_the_arm_is_too_deep(
     assert stranger.answer().message.startswith(answer)
 
 
+@pytest.mark.usefixtures('one_try')
 def test_both_checkers_check_an_escape_when_the_wearer_moved(
     start, monkeypatch, wait_until, tmp_path
 ):
@@ -471,6 +532,7 @@ def test_a_motion_that_begins_elsewhere_is_not_published(start, monkeypatch, tmp
     assert stranger.answer().success
 
 
+@pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize(
     ('topic', 'msg', 'sentence'),
     [
@@ -528,6 +590,7 @@ def test_velocities_that_are_no_numbers_are_rejected(start):
     assert stranger.answer().success
 
 
+@pytest.mark.usefixtures('one_try')
 def test_there_is_no_handover_of_an_arm_above_its_limits(start):
     planner, stranger = start()
     say_all(planner, stranger, joint_states=joints(velocity=[0.0, 1.7, 0.0, 0.0]))
@@ -553,6 +616,7 @@ def test_nothing_is_published_when_the_arm_begins_to_move(start, monkeypatch, wa
     assert not stranger.received['joint_trajectory']
 
 
+@pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize(
     ('owner', 'step', 'topic', 'msg', 'answer'),
     [
@@ -606,6 +670,7 @@ def test_what_came_but_was_not_read_yet_counts(
     assert not stranger.received['joint_trajectory']
 
 
+@pytest.mark.usefixtures('one_try')
 @pytest.mark.parametrize('is_in_the_way', [True, False])
 def test_a_body_that_comes_while_a_motion_is_checked_is_checked_too(
     start, monkeypatch, wait_until, is_in_the_way

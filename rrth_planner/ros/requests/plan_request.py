@@ -43,6 +43,17 @@ class PlanOutcome:
     incident: Incident | None = None
 
     @property
+    def may_change(self) -> bool:
+        """Whether the same request may be solved soon: wearer or arm have moved, or move on."""
+        if self.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
+            return True
+        is_start = self.code in (
+            ErrorCode.START_STATE_IN_COLLISION,
+            ErrorCode.START_STATE_INVALID,
+        )
+        return is_start and self.handover is not None
+
+    @property
     def trajectory(self) -> Trajectory | None:
         """The motion to publish; None unless the request succeeded."""
         if self.plan is None or self.code is not ErrorCode.SUCCESS:

@@ -35,6 +35,8 @@ from trajectory_msgs.msg import JointTrajectory
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 # An arm may come to rest so much later than its commanded stop [s].
 LONGEST_SETTLING = 1.0
+# A request whose motion became invalid is planned again after this time [s].
+AGAIN = 0.005
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -192,42 +194,13 @@ class PlanQueue:
 
         The request is settled as soon as its motion is published, in the node's own thread.
         """
-        parameters, monitor = self._reporter.parameters, self._monitor
-        n_stops, running = monitor.n_stops, monitor.running
+        parameters = self._reporter.parameters
 
-        def publish(outcome: PlanOutcome, revalidation: Revalidation) -> bool:
-            assert outcome.trajectory is not None
-            start = 0.0 if outcome.handover is None else outcome.handover.time
-            msg = self._publishers.motion(outcome.trajectory, parameters, start)
-
-            def publish_now() -> bool:
-                is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
-                if is_published:
-                    settle(self._response(outcome, parameters, begin))
-                return is_published
-
-            try:
-                # In the node's own thread, once all received messages are processed.
-                return self._barrier.call(publish_now)
-            except NodeIsBusyError:
-                require_not_cancelled(lambda: ticket.is_cancelled)
-                raise RequestError(
-                    ErrorCode.SENSOR_INFO_STALE,
-                    'the node is busy: bodies received while the motion was planned are not '
-                    'processed yet',
-                ) from None
+        def settle_published(outcome: PlanOutcome) -> None:
+            settle(self._response(outcome, parameters, begin))
 
         try:
-            outcome = plan_request(
-                self._inputs,
-                parameters,
-                self._now,
-                self._planner,
-                lambda: ticket.is_cancelled,
-                publish,
-                goal,
-                running,
-            )
+            outcome = self._plan(goal, ticket, parameters, settle_published)
             if outcome.trajectory is not None:
                 return
             if ticket.is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
@@ -243,6 +216,60 @@ class PlanQueue:
             outcome = replace(outcome, sentence=outcome.sentence + noted)
             self._reporter.incident(file)
         settle(self._response(outcome, parameters, begin))
+
+    def _plan(
+        self,
+        goal: PointingGoal | None,
+        ticket: _Ticket,
+        parameters: PlannerParameters,
+        settle_published: Callable[[PlanOutcome], None],
+    ) -> PlanOutcome:
+        """
+        Return the outcome of a request, planned again while the wearer moves into its motions.
+
+        After `time_limit` the last outcome stands.
+        """
+        monitor, end = self._monitor, time.monotonic() + parameters.options.time_limit
+        while True:
+            n_stops, running = monitor.n_stops, monitor.running
+
+            def publish(
+                outcome: PlanOutcome, revalidation: Revalidation, n_stops: int = n_stops
+            ) -> bool:
+                assert outcome.trajectory is not None
+                start = 0.0 if outcome.handover is None else outcome.handover.time
+                msg = self._publishers.motion(outcome.trajectory, parameters, start)
+
+                def publish_now() -> bool:
+                    is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
+                    if is_published:
+                        settle_published(outcome)
+                    return is_published
+
+                try:
+                    # In the node's own thread, once all received messages are processed.
+                    return self._barrier.call(publish_now)
+                except NodeIsBusyError:
+                    require_not_cancelled(lambda: ticket.is_cancelled)
+                    raise RequestError(
+                        ErrorCode.SENSOR_INFO_STALE,
+                        'the node is busy: bodies received while the motion was planned are not '
+                        'processed yet',
+                    ) from None
+
+            outcome = plan_request(
+                self._inputs,
+                parameters,
+                self._now,
+                self._planner,
+                lambda: ticket.is_cancelled,
+                publish,
+                goal,
+                running,
+            )
+            if not outcome.may_change or ticket.is_cancelled or time.monotonic() >= end:
+                return outcome
+            time.sleep(AGAIN)
 
     def _response(
         self, outcome: PlanOutcome, parameters: PlannerParameters, begin: float
