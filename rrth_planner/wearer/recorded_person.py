@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
-from rrth_planner.model.arrays import Array
+from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import printable, RecordError
 from rrth_planner.wearer.posture import Posture
 
@@ -36,7 +36,7 @@ class RecordedPerson:
     ------
     RecordError
         Arrays of other shapes, no frame, a name that comes twice or is not printable, another
-        rate.
+        rate, a number beyond 1e4.
 
     """
 
@@ -63,6 +63,8 @@ class RecordedPerson:
             array = np.array(value, dtype=np.float64)
             if array.shape != shape:
                 raise RecordError(f'{field}: shape {array.shape}, expected {shape}')
+            if (np.abs(array) > FARTHEST).any():
+                raise RecordError(f'{field}: beyond {FARTHEST:g} in places, expected at most that')
             array.setflags(write=False)
             object.__setattr__(self, field, array)
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 BARE = """
 import contextlib, io, sys
 MISSING = ('rclpy', 'geometry_msgs', 'matplotlib', 'viser', 'mcap', 'mcap_ros2', 'yourdfpy',
-           'trimesh', 'tqdm', 'distributed', 'pyarrow', 'rosbags', 'playwright')
+           'trimesh', 'pybvh', 'c3d', 'tqdm', 'distributed', 'pyarrow', 'rosbags', 'playwright')
 for name in MISSING:
     sys.modules[name] = None
 sys.argv[0] = '/usr/bin/rrth'

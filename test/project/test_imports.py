@@ -46,6 +46,7 @@ LIBRARIES = {
 # What single modules import beyond that.
 OWN = {
     'rrth_planner.collision.fcl_objects': {'fcl'},
+    'rrth_planner.io.motion_capture_file': {'pybvh', 'c3d'},
     'rrth_planner.io.resources': {'ament_index_python'},
     'rrth_planner.io.text_file': {'yaml'},
     'rrth_planner.io.urdf.chain': {'yourdfpy', 'trimesh'},
