@@ -74,6 +74,7 @@ executables = [
     'replay = rrth_planner.cli.replay:main',
     'reproduce = rrth_planner.cli.reproduce:main',
     'viewer = rrth_planner.cli.viewer:main',
+    'wearer = rrth_planner.cli.wearer:main',
     'write_urdf = rrth_planner.cli.write_urdf:main',
 ]
 

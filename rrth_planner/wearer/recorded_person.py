@@ -76,7 +76,7 @@ class RecordedPerson:
 
 def posture_at(person: RecordedPerson, time: float) -> Posture:
     """
-    Return the posture at a time [s] from the first frame; past the end he is played to and fro.
+    Return the posture at a time [s] from the first frame, on and on.
 
     Past its last frame a recording is played backwards, and then forwards again: nowhere does he
     jump, and whoever moves backwards in time is as fast. Between two frames positions are

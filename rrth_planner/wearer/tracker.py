@@ -20,7 +20,7 @@ class Tracker:
     ----------
     fps : float
         Measurements per second, > 0 [1/s].
-    speed : float
+    rate : float
         How fast the person moves: 1 as recorded, 0 not at all.
     latency : float
         From a measurement until it is published, >= 0 [s].
@@ -39,7 +39,7 @@ class Tracker:
     """
 
     fps: float = 60.0
-    speed: float = 1.0
+    rate: float = 1.0
     latency: float = 0.0
     drop: float = 0.0
     noise: float = 0.0
@@ -49,7 +49,7 @@ class Tracker:
         """Validate."""
         for name, is_good, expected in (
             ('fps', 0.0 < self.fps < math.inf, 'a number > 0 [1/s]'),
-            ('speed', 0.0 <= self.speed < math.inf, 'a number >= 0'),
+            ('rate', 0.0 <= self.rate < math.inf, 'a number >= 0'),
             ('latency', 0.0 <= self.latency < math.inf, 'a time >= 0 [s]'),
             ('drop', 0.0 <= self.drop < 1.0, 'a share from 0 to below 1'),
             ('noise', 0.0 <= self.noise < math.inf, 'a length >= 0 [m]'),
@@ -65,7 +65,7 @@ def measurement(tracker: Tracker, person: RecordedPerson, number: int) -> Postur
     rng = np.random.default_rng((tracker.seed, number))
     if rng.random() < tracker.drop:
         return None
-    posture = posture_at(person, tracker.speed * number / tracker.fps)
+    posture = posture_at(person, tracker.rate * number / tracker.fps)
     if tracker.noise == 0.0:
         return posture
     noise = rng.normal(scale=tracker.noise, size=posture.positions.shape)

@@ -48,6 +48,7 @@ for arguments, needed, extras in (
     (['planner_node'], [ROS], 'ros'),
     (['playback_node', '--ros-args', '-h'], [ROS], 'ros'),
     (['point_at', '1', '0', '0'], [ROS, 'tqdm'], 'ros,tools'),
+    (['wearer'], [ROS], 'ros'),
     (['record'], [ROS, 'mcap', 'tqdm'], 'ros,tools'),
     (['demo'], [ROS, 'matplotlib'], 'ros'),
     (['viewer'], ['viser'], 'tools'),

@@ -35,7 +35,7 @@ MAY = {
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
-ROS = {'rclpy', 'tf2_ros', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
+ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
 LIBRARIES = {
     'kernels': {'numba'},
     'ros': {*ROS, 'tqdm'},

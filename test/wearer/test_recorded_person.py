@@ -81,7 +81,7 @@ def test_half_a_turn_apart_the_nearer_rotation_is_taken():
 
 @settings(deadline=None)
 @given(st.integers(0, 2**31), st.floats(0.0, 50.0), st.floats(1e-4, 0.05))
-def test_played_to_and_fro_nothing_jumps(seed, time, step):
+def test_played_forwards_and_backwards_nothing_jumps(seed, time, step):
     person = person_of(seed)
     before, after = posture_at(person, time), posture_at(person, time + step)
     fastest = np.linalg.norm(np.diff(person.positions, axis=0), axis=2).max() * RATE

@@ -17,12 +17,12 @@ PERSON = RecordedPerson(
 )
 
 
-@pytest.mark.parametrize('speed', [0.0, 0.5, 2.0])
-def test_without_faults_every_measurement_is_the_posture_of_its_time(speed):
-    tracker = Tracker(fps=40.0, speed=speed)
+@pytest.mark.parametrize('rate', [0.0, 0.5, 2.0])
+def test_without_faults_every_measurement_is_the_posture_of_its_time(rate):
+    tracker = Tracker(fps=40.0, rate=rate)
     for number in range(90):
         measured = measurement(tracker, PERSON, number)
-        expected = posture_at(PERSON, speed * number / 40.0)
+        expected = posture_at(PERSON, rate * number / 40.0)
         np.testing.assert_array_equal(measured.positions, expected.positions)
         np.testing.assert_array_equal(measured.rotations, expected.rotations)
 
@@ -76,7 +76,7 @@ def test_a_measurement_is_published_once_its_latency_has_passed(fps, latency, nu
     [
         ({'fps': 0.0}, r'fps: 0.0, expected a number > 0 \[1/s\]'),
         ({'fps': float('nan')}, 'fps: nan'),
-        ({'speed': -1.0}, 'speed: -1.0, expected a number >= 0'),
+        ({'rate': -1.0}, 'rate: -1.0, expected a number >= 0'),
         ({'latency': float('inf')}, r'latency: inf, expected a time >= 0 \[s\]'),
         ({'drop': 1.0}, 'drop: 1.0, expected a share from 0 to below 1'),
         ({'noise': -0.1}, r'noise: -0.1, expected a length >= 0 \[m\]'),
