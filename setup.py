@@ -19,7 +19,7 @@ from setuptools import find_packages, setup
 ROOT = os.path.dirname(os.path.realpath(__file__))
 # What is beside the code, by folder.
 FILES = {
-    'config': ['*.yaml', '*.xml', 'examples/*', 'maps/*.yaml'],
+    'config': ['*.yaml', '*.xml', 'examples/*', 'maps/*.yaml', 'people/*'],
     'msg_examples': ['*.yaml'],
     'rviz': ['*.rviz'],
     'urdf': ['*.urdf'],
@@ -74,6 +74,7 @@ executables = [
     'replay = rrth_planner.cli.replay:main',
     'reproduce = rrth_planner.cli.reproduce:main',
     'viewer = rrth_planner.cli.viewer:main',
+    'wearer = rrth_planner.cli.wearer:main',
     'write_urdf = rrth_planner.cli.write_urdf:main',
 ]
 

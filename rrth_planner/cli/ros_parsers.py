@@ -49,6 +49,18 @@ the ray from the target [m] (null if unknown).
 --no-move publishes neither body nor target. It plans in its own process with the planner's
 parameters, from the present joint positions, and with the body of --body or the one received on
 body_boxes (whose publisher must be latched, or repeat it)."""
+WEARER = """\
+Publish a recorded person as the wearer until Ctrl-C, played forwards and backwards, as a tracker
+would: boxes on body_boxes, or what trackers publish. Without FILE he is the one that comes along,
+at construction work. Names are relative; namespaces and remaps go after --ros-args.
+"""
+WEARER_EPILOG = """\
+examples:
+  %(prog)s                                  construction work, at 60 Hz
+  %(prog)s --rate 0.5 --latency 0.05        half as fast, every body 50 ms late
+  %(prog)s walk.bvh --begin 0.1 --skeleton cmu_bvh
+  %(prog)s --as markers --drop 0.1 --noise 0.01
+"""
 RECORD = """\
 Record a run of the nodes in an MCAP file until Ctrl-C: every message once, serialized as received,
 from reliable, best-effort and latched publishers. Foxglove opens the file, `plot recording` draws
@@ -118,6 +130,49 @@ def record() -> argparse.ArgumentParser:
     return command
 
 
+def wearer() -> argparse.ArgumentParser:
+    """Return the parser of all arguments but those of ROS."""
+    command = command_parser('wearer', WEARER, WEARER_EPILOG)
+    add = command.add_argument
+    add('file', type=Path, nargs='?', metavar='FILE', help='a recording: .bvh, .c3d or .csv')
+    add(
+        '--as',
+        dest='form',
+        choices=('boxes', 'markers', 'poses'),
+        default='boxes',
+        help='boxes on body_boxes (default), SPHERE markers on markers, or a PoseArray on poses',
+    )
+    for name, text, default in (
+        ('rate', 'speed of the motion; 1: as recorded, 0: he stands', 1.0),
+        ('fps', 'measurements per second [1/s]', 60.0),
+        ('latency', 'from a measurement until it is published, with the old stamp [s]', 0.0),
+        ('drop', 'share of the measurements that are lost, 0 to below 1', 0.0),
+        ('noise', 'standard deviation of each coordinate of the points [m]', 0.0),
+        ('begin', 'start of what is played; 0.1 leaves out a T-pose at the start [s]', 0.0),
+    ):
+        add(
+            f'--{name}',
+            type=_finite,
+            default=default,
+            metavar='X',
+            help=f'{text} (%(default)g)',
+        )
+    add('--end', type=_finite, metavar='X', help='end of what is played [s]')
+    add('--seed', type=int, default=0, help='of noise and losses (%(default)s)')
+    add(
+        '--skeleton',
+        default='cmu_bvh',
+        metavar='NAME',
+        help='what makes boxes of the points: one of config/skeletons, or a file (%(default)s)',
+    )
+    add(
+        '--unit',
+        choices=('m', 'cm', 'mm'),
+        help="of a BVH's lengths (guessed by the size of the skeleton)",
+    )
+    return command
+
+
 def demo() -> argparse.ArgumentParser:
     """Return the parser of all arguments."""
     command = command_parser('demo', 'Plan and play motions around a wearer, check and draw them.')
@@ -138,6 +193,10 @@ def demo() -> argparse.ArgumentParser:
 
 def _coordinate(text: str) -> float:
     return _number(text, 'a coordinate, a finite number [m]')
+
+
+def _finite(text: str) -> float:
+    return _number(text, 'a finite number')
 
 
 def _positive(text: str) -> float:

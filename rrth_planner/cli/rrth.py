@@ -58,6 +58,7 @@ COMMANDS = {
     'point_at': Command(
         'point the arm and wait until it has arrived', 'cli.point_at', (ROS, 'tqdm'), 'ros,tools'
     ),
+    'wearer': Command('publish a recorded person as the wearer', 'cli.wearer', (ROS,), 'ros'),
     'record': Command(
         'record a run of the nodes in an MCAP file',
         'cli.record',

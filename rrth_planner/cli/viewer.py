@@ -17,15 +17,23 @@ from rrth_planner.cli.file_question import question_of
 from rrth_planner.cli.program import add_files, add_target, interrupt_on_signals, program, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
+from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.settings import load_settings
+from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.io.wearer_file import load_body, WEARER_HELP
 from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.examples import example_target, start_of
 from rrth_planner.visualization.viewer.screenshot import save_picture
+from rrth_planner.wearer.body_boxes import body_boxes
+from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
+from rrth_planner.wearer.skeleton import Skeleton
 
 ROS_ARGS = '--ros-args'
 PORT = 8081
+# A picture is taken after so long beside a person [s].
+SHOWN = 4.0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -81,6 +89,20 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         default=None,
         help='open the page in the browser (default: if there is a display)',
     )
+    add(
+        '--person',
+        nargs='?',
+        const='',
+        metavar='FILE',
+        help='the wearer moves as a recorded person (.bvh, .c3d, .csv), and the arm plans round '
+        'him; without FILE one who comes along',
+    )
+    add(
+        '--skeleton',
+        default='cmu_bvh',
+        metavar='NAME',
+        help='what makes boxes of that recording (%(default)s)',
+    )
     add('--live', action='store_true', help='show the running nodes instead of planning')
     add_files(parser, screenshot='save a picture of the page with the arm at the goal, and exit')
     return parser.parse_args(arguments)
@@ -99,13 +121,25 @@ def _run_planning(options: argparse.Namespace) -> None:
         changes[name] = parse_yaml(value, f'--set {name}')
     settings = load_settings(arm.dof, options.settings, **changes)
     target = example_target('front') if options.target is None else options.target
-    scene, q_start = load_body(options.body), start_of(arm)
+    person, skeleton = None, None
+    if options.person is None:
+        scene = load_body(options.body)
+    else:
+        if options.body:
+            raise OptionsError('--person: given with --body, expected one of them')
+        person = load_person(options.person or None, say=partial(say, 'viewer'))
+        skeleton = load_skeleton(options.skeleton)
+        scene, _ = body_boxes(skeleton, posture_at(person, 0.0))
+    q_start = start_of(arm)
     question = question_of(arm, scene, q_start, target, settings, max(0, settings.seed))
     prepare_kernels(partial(say, 'viewer'))
     from rrth_planner.pipeline.plan_motion import warm_up
     from rrth_planner.visualization.viewer.page import ViewerPage
 
     warm_up(question.arm, question.options)
+    if person is not None and skeleton is not None:
+        _run_person(options, question, person, skeleton)
+        return
     with _served(options) as (server, url):
         page = ViewerPage(server, question)
         try:
@@ -120,13 +154,35 @@ def _run_planning(options: argparse.Namespace) -> None:
             page.model.close()
 
 
+def _run_person(
+    options: argparse.Namespace,
+    question: PlanQuestion,
+    person: RecordedPerson,
+    skeleton: Skeleton,
+) -> None:
+    """Serve the page of a recorded person."""
+    from rrth_planner.visualization.viewer.person_page import PersonPage
+
+    with _served(options) as (server, url):
+        page = PersonPage(server, question, person, skeleton)
+        try:
+            if options.screenshot is None:
+                page.run()
+            else:
+                page.run_for(SHOWN)
+                save_picture(url, options.screenshot)
+        finally:
+            page.model.close()
+
+
 def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
     """Serve the page that follows the nodes."""
     require('ros,tools', ROS)
-    if options.screenshot or options.body or options.target or options.set:
+    is_own = options.body or options.target or options.set or options.person is not None
+    if options.screenshot or is_own:
         raise OptionsError(
-            '--live: given with --screenshot, --body, --target or --set, expected without: the '
-            'nodes determine what is shown'
+            '--live: given with --screenshot, --body, --person, --target or --set, expected '
+            'without: the nodes determine what is shown'
         )
     from rrth_planner.ros.client.viewer_feed import following
     from rrth_planner.visualization.viewer.live_page import LivePage

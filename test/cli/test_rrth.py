@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 BARE = """
 import contextlib, io, sys
 MISSING = ('rclpy', 'geometry_msgs', 'matplotlib', 'viser', 'mcap', 'mcap_ros2', 'yourdfpy',
-           'trimesh', 'tqdm', 'distributed', 'pyarrow', 'rosbags', 'playwright')
+           'trimesh', 'pybvh', 'c3d', 'tqdm', 'distributed', 'pyarrow', 'rosbags', 'playwright')
 for name in MISSING:
     sys.modules[name] = None
 sys.argv[0] = '/usr/bin/rrth'
@@ -48,6 +48,7 @@ for arguments, needed, extras in (
     (['planner_node'], [ROS], 'ros'),
     (['playback_node', '--ros-args', '-h'], [ROS], 'ros'),
     (['point_at', '1', '0', '0'], [ROS, 'tqdm'], 'ros,tools'),
+    (['wearer'], [ROS], 'ros'),
     (['record'], [ROS, 'mcap', 'tqdm'], 'ros,tools'),
     (['demo'], [ROS, 'matplotlib'], 'ros'),
     (['viewer'], ['viser'], 'tools'),

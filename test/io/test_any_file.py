@@ -11,15 +11,19 @@ import warnings
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from recordings import bvh_text, write_c3d
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.incident_file import incident_to_yaml, read_incident
 from rrth_planner.io.map_file import load_map
+from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.motion_file import read_motion, write_motion
+from rrth_planner.io.person_file import write_person
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.text_file import load_yaml, parse_yaml, to_yaml
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
+from rrth_planner.wearer.recorded_person import excerpt
 from test_incident import disagreement
 from test_motion_file import random_motion
 from worlds import examples
@@ -63,6 +67,19 @@ def read_message(path):
     return body_from_file(path, 'torso')
 
 
+def recording(folder, suffix):
+    """Return a recorded person, as other programs write one, or as he is written here."""
+    pytest.importorskip({'.bvh': 'pybvh', '.c3d': 'c3d', '.csv': 'yaml'}[suffix])
+    file = folder / f'written{suffix}'
+    if suffix == '.bvh':
+        file.write_text(bvh_text()[0])
+    elif suffix == '.c3d':
+        write_c3d(file, ('a', 'b'), np.ones((9, 2, 3)), lost=[(3, 1)])
+    else:
+        write_person(excerpt(load_person(), 0.0, 0.2), file)
+    return [file.read_bytes()]
+
+
 BODIES = ('config/body.yaml', 'msg_examples/body.yaml', 'msg_examples/body_bad.yaml')
 # What reads a file, the end of its name, and files that it reads.
 READERS = {
@@ -75,6 +92,10 @@ READERS = {
     'motion': (read_motion, '.yaml', lambda folder: motion(folder, '.yaml')),
     'table': (read_motion, '.csv', lambda folder: motion(folder, '.csv')),
     'chain': (read_chain, '.urdf', lambda _: shipped('config/examples/chest_arm.urdf')),
+    **{
+        name: (load_person, suffix, functools.partial(recording, suffix=suffix))
+        for name, suffix in (('bvh', '.bvh'), ('c3d', '.c3d'), ('person', '.csv'))
+    },
     'messages': (read_message, '.yaml', lambda _: shipped(*BODIES)),
 }
 NUMBER = re.compile(rb'(?<![\w.])-?\d+(\.\d+)?(e-?\d+)?')

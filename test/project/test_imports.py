@@ -35,7 +35,7 @@ MAY = {
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
-ROS = {'rclpy', 'tf2_ros', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
+ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
 LIBRARIES = {
     'kernels': {'numba'},
     'ros': {*ROS, 'tqdm'},
@@ -46,6 +46,7 @@ LIBRARIES = {
 # What single modules import beyond that.
 OWN = {
     'rrth_planner.collision.fcl_objects': {'fcl'},
+    'rrth_planner.io.motion_capture_file': {'pybvh', 'c3d'},
     'rrth_planner.io.resources': {'ament_index_python'},
     'rrth_planner.io.text_file': {'yaml'},
     'rrth_planner.io.urdf.chain': {'yourdfpy', 'trimesh'},

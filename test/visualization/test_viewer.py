@@ -15,8 +15,10 @@ pytest.importorskip('viser')
 
 from rrth_planner.cli.viewer import _served, main
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
+from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
@@ -32,8 +34,11 @@ from rrth_planner.visualization.viewer.examples import (
     TARGETS,
 )
 from rrth_planner.visualization.viewer.panel import response_html
+from rrth_planner.visualization.viewer.person_page import PersonPage
 from rrth_planner.visualization.viewer.planning_worker import ViewerModel
 from rrth_planner.visualization.viewer.player import Player
+from rrth_planner.wearer.body_boxes import body_boxes
+from rrth_planner.wearer.recorded_person import excerpt, posture_at
 
 WAIT = 120.0
 ARM = load_arm()
@@ -149,6 +154,10 @@ def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
         (['--set', 'margin="1"'], "margin: '1', expected a number [m]"),
         (['--set', 'margin=*a'], '--set margin: line 1: '),
         (['--target', 'nan', '0', '0'], 'target'),
+        (['--person', 'none.bvh'], 'file none.bvh: No such file'),
+        (['--person', '--body', str(file)], '--person: given with --body'),
+        (['--person', '--skeleton', 'mediapipe'], 'base: '),
+        (['--person', '--live'], '--live: given with'),
         (['--body', str(file)], 'markers: 5, expected a list'),
     ):
         assert main([*arguments, '--no-open']) == 1
@@ -267,3 +276,51 @@ def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):
     monkeypatch.setattr(screenshot, 'find_browser', lambda: None)
     with pytest.raises(OptionsError, match='no browser found'):
         screenshot.save_picture('http://127.0.0.1:9', tmp_path / 'a.png')
+
+
+@pytest.fixture(name='person_page')
+def _person_page():
+    """Give what makes the page of a recorded person; the server and the threads end afterwards."""
+    made, skeleton = [], load_skeleton('cmu_bvh')
+    with _served(Namespace(host='127.0.0.1', port=0, open=False, screenshot=None)) as (server, _):
+
+        def make(person):
+            scene, _ = body_boxes(skeleton, posture_at(person, 0.0))
+            made.append(PersonPage(server, replace(question(), scene=scene), person, skeleton))
+            return made[-1]
+
+        yield make
+        for page in made:
+            page.model.close()
+
+
+def drawn_for(page, begin, span):
+    """Draw 30 frames a second for a span [s], and wait for each plan; give the time of each."""
+    for now in np.arange(begin, begin + span, 1.0 / 30.0):
+        page.draw(now)
+        page.model.wait(page.asked, WAIT)
+        yield now
+
+
+def test_beside_a_person_the_arm_aims_where_the_target_is_dragged(person_page):
+    page = person_page(excerpt(load_person(), 0.0, 0.0))
+    begin = 0.0
+    for name in ('front', 'left'):
+        target = example_target(name)
+        page.aim(target)
+        *_, begin = drawn_for(page, begin, 8.0)
+        assert pointing_error(ARM, page.positions_at(begin), target) < 1e-6
+
+
+def test_beside_a_person_who_moves_boxes_are_drawn_where_he_is_and_the_arm_plans_again(
+    person_page,
+):
+    person = load_person()
+    page, skeleton = person_page(person), load_skeleton('cmu_bvh')
+    numbers = set()
+    for now in drawn_for(page, 0.0, 9.0):
+        scene, _ = body_boxes(skeleton, posture_at(person, now))
+        drawn = np.array([handle.position for handle in page.view.body])
+        np.testing.assert_allclose(drawn, [box.center for box in scene.boxes], atol=1e-9)
+        numbers.add(page.model.response.number)
+    assert len(numbers) > 2

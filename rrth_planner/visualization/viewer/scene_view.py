@@ -29,6 +29,8 @@ TREES: tuple[Color, Color] = ((59, 111, 182), (200, 60, 140))
 FIRST, SHORT, TIMED = (224, 123, 0), (20, 140, 80), (123, 63, 160)
 # Thinnest bar, and the ray [m].
 BAR_RADIUS, RAY_RADIUS = 0.014, 0.005
+# Boxes whose sizes differ by less are drawn alike [m].
+SAME_SIZE = 1e-3
 # A ray closer to the target than this meets it [m].
 AIMED = 5e-3
 # The camera at first: behind the wearer, to the right [m].
@@ -89,6 +91,12 @@ class SceneView:
         )
         server.scene.add_icosphere('/target/ball', 0.035, TARGET)
         self._drawn: dict[str, list[Any]] = {}
+        self._names: list[str] = []
+
+    @property
+    def body(self) -> list[Any]:
+        """The wearer's boxes as they are drawn."""
+        return self._drawn.get('body', [])
 
     def show_body(self, scene: Scene, margin: float) -> None:
         """Draw the wearer's boxes, each in a shell of the margin [m]."""
@@ -103,6 +111,20 @@ class SceneView:
             shells.append(add(f'/margin/{k}', SHELL, box.size + 2.0 * margin, **unlit, **place))
         self._replace('body', boxes)
         self._replace('margin', shells)
+
+    def move_body(self, scene: Scene, margin: float) -> None:
+        """Draw the wearer's boxes as `show_body` does, moving those that are drawn already."""
+        names = [box.name for box in scene.boxes]
+        if names != self._names:
+            self._names = names
+            self.show_body(scene, margin)
+            return
+        for box, *handles in zip(scene.boxes, self.body, self._drawn['margin'], strict=True):
+            quaternion = wxyz(box.rotation)
+            for handle, size in zip(handles, (box.size, box.size + 2.0 * margin), strict=True):
+                handle.position, handle.wxyz = box.center, quaternion
+                if np.abs(np.asarray(handle.dimensions) - size).max() > SAME_SIZE:
+                    handle.dimensions = tuple(size.tolist())
 
     def show_configuration(self, q: Array, target: Array | None) -> None:
         """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""

@@ -1,0 +1,83 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The command `wearer`: a recorded person is published as a tracker would."""
+
+import argparse
+from collections.abc import Sequence
+from contextlib import ExitStack
+import signal
+import sys
+from threading import Event
+import time
+
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from rrth_planner.cli.program import run, say
+from rrth_planner.cli.ros_parsers import wearer
+from rrth_planner.io.motion_capture_file import load_person
+from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.model.errors import OptionsError, SceneError
+from rrth_planner.ros.client.person_publisher import PersonPublisher
+from rrth_planner.wearer.body_boxes import body_boxes
+from rrth_planner.wearer.recorded_person import excerpt, posture_at, RecordedPerson
+from rrth_planner.wearer.tracker import measurement, newest_number, publishing_time, Tracker
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Publish until a signal, and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = wearer().parse_args(remove_ros_args(['wearer', *given])[1:])
+    return run('wearer', lambda: _publish(options, given), 1)
+
+
+def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
+    tracker = Tracker(
+        fps=options.fps,
+        rate=options.rate,
+        latency=options.latency,
+        drop=options.drop,
+        noise=options.noise,
+        seed=options.seed,
+    )
+    person = load_person(options.file, unit=options.unit, say=lambda words: say('wearer', words))
+    person = excerpt(person, options.begin, options.end)
+    skeleton = load_skeleton(options.skeleton)
+    if options.form == 'boxes':
+        # A skeleton of another tracker is named at once.
+        try:
+            _, missing = body_boxes(skeleton, posture_at(person, 0.0))
+        except SceneError as problem:
+            raise OptionsError(f'--skeleton {options.skeleton}: {problem}') from problem
+        if missing:
+            say('wearer', f'no {", ".join(missing)}: their points are not in the recording')
+    stopped = Event()
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: stopped.set())
+    with ExitStack() as stack:
+        rclpy.init(args=list(given), signal_handler_options=SignalHandlerOptions.NO)
+        stack.callback(rclpy.try_shutdown)
+        node = PersonPublisher(skeleton, options.form)
+        stack.callback(node.destroy_node)
+        print(
+            f'publishing {person.duration:.2f} s of a person, forwards and backwards, on '
+            f'{node.publisher.topic_name}; Ctrl-C ends it',
+            flush=True,
+        )
+        _publish_until(stopped, node, tracker, person)
+
+
+def _publish_until(
+    stopped: Event, node: PersonPublisher, tracker: Tracker, person: RecordedPerson
+) -> None:
+    """Publish each measurement when it is due; a busy machine skips those that are outdated."""
+    begin, number = time.monotonic(), -1
+    while not stopped.wait(publishing_time(tracker, number + 1) - (time.monotonic() - begin)):
+        number = newest_number(tracker, time.monotonic() - begin)
+        posture = measurement(tracker, person, number) if number >= 0 else None
+        if posture is not None:
+            node.publish(posture, time.monotonic() - begin - number / tracker.fps)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

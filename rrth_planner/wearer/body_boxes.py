@@ -1,0 +1,284 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Boxes round a wearer of whom a tracker sees points or frames."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import SceneError
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.wearer.posture import Posture
+from rrth_planner.wearer.skeleton import AXES, BASE, Direction, FrameBase, JointBase, Skeleton
+
+Indices = NDArray[np.intp]
+
+# A point further from the tracker's origin is lost [m].
+FARTHEST_POINT = 1e3
+# Joints closer than this say no direction: a tracker has mixed them up [m].
+CLOSEST = 0.01
+# No joint of an adult is further from the next one: more than the longest thigh [m].
+LONGEST_BONE = 0.5
+# How a limb hangs that is turned least, and its left: of all directions, those that are opposite,
+# up and back, are the least common, and close to them its box may turn round the limb suddenly.
+HANGING = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
+LEFT = np.array([0.0, 1.0, 0.0])
+# The axes in which a box is kept whose own are unknown.
+BASE_AXES = (Direction('up', BASE, 'up'), Direction('left', BASE, 'left'))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layout:
+    """
+    A skeleton as indices into the points of a posture.
+
+    Rows of joints come first, then the origin of the base frame and a point 1 m along each of its
+    axes. Shorter lists repeat their first entry.
+    """
+
+    points: Indices
+    weights: Array
+    offset_joints: Indices
+    offset_points: Indices
+    offsets: Array
+    base_point: int
+    base_origin: int
+    base_ends: Indices
+    base_order: Indices
+    base_signs: Array
+    part_joints: Indices
+    ends: Indices
+    is_limb: NDArray[np.bool_]
+    order: Indices
+    signs: Array
+    margins: Array
+    reaches: Array
+
+
+def body_boxes(skeleton: Skeleton, posture: Posture) -> tuple[Scene, tuple[str, ...]]:
+    """
+    Return the boxes round a wearer in his base frame, and the names of the parts that are lost.
+
+    Each part is a box turned as its directions say, round its joints and its margins beyond them.
+    Where joints that say a direction are in one place, it is a cube as wide as the longest bone of
+    an adult either way, which contains the part however it is turned.
+
+    Parameters
+    ----------
+    posture : Posture
+        In any frame; of frames of which offsets or the base are taken, with rotations.
+
+    Returns
+    -------
+    Scene
+        A box for each part of which all joints are seen, in the order of the skeleton.
+    tuple of str
+        The parts of which a point is lost, missing, or further than 1 km from the origin.
+
+    Raises
+    ------
+    SceneError
+        The points or the frame of the base are lost.
+
+    """
+    layout, joints = _joints(skeleton, posture)
+    rotation, origin = _base(skeleton, layout, joints, posture)
+    in_base = np.empty((len(joints) + 4, 3))
+    np.matmul(joints - origin, rotation, out=in_base[:-4])
+    in_base[-4] = 0.0
+    in_base[-3:] = np.eye(3)
+    rows = _rows(layout, in_base)
+    is_seen = np.isfinite(rows.sum(axis=1)).tolist()
+    rows.setflags(write=False)
+    names = [part.name for part in skeleton.parts]
+    boxes = tuple(
+        Box.of_row(name, row) for name, row, seen in zip(names, rows, is_seen, strict=True) if seen
+    )
+    missing = tuple(name for name, seen in zip(names, is_seen, strict=True) if not seen)
+    return Scene(boxes), missing
+
+
+def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
+    """
+    Return the pose of the base frame in the frame of a tracker, (4, 4).
+
+    Raises
+    ------
+    SceneError
+        The points or the frame of the base are lost.
+
+    """
+    layout, joints = _joints(skeleton, posture)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = _base(skeleton, layout, joints, posture)
+    return T
+
+
+def jumped(before: Posture, after: Posture, most: float) -> tuple[str, ...]:
+    """
+    Return the points that moved by more than a distance [m] between two postures of a tracker.
+
+    Points that are lost, or missing, in either of them are none.
+    """
+    both = [name for name in after.names if name in before.names]
+    here, there = ([p.names.index(name) for name in both] for p in (after, before))
+    moves = np.linalg.norm(after.positions[here] - before.positions[there], axis=1)
+    return tuple(name for name, move in zip(both, moves, strict=True) if move > most)
+
+
+def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
+    """Return the joints of a posture, (n, 3), NaN where lost."""
+    layout = _layout(skeleton, posture.names)
+    points = np.empty((len(posture.names) + 1, 3))
+    points[:-1] = posture.positions
+    points[-1] = np.nan
+    joints: Array = (points[layout.points] * layout.weights).sum(axis=1)
+    if layout.offset_joints.size:
+        if posture.rotations is None or not posture.names:
+            joints[layout.offset_joints] = np.nan
+        else:
+            turned = posture.rotations[layout.offset_points] @ layout.offsets
+            joints[layout.offset_joints] += turned[:, :, 0]
+    joints[~(np.abs(joints) <= FARTHEST_POINT)] = np.nan
+    return layout, joints
+
+
+def _base(
+    skeleton: Skeleton, layout: _Layout, joints: Array, posture: Posture
+) -> tuple[Array, Array]:
+    """Return the axes of the base frame as columns, (3, 3), and its origin, (3,)."""
+    base = skeleton.base
+    if base is None:
+        return np.eye(3), np.zeros(3)
+    if isinstance(base, FrameBase):
+        if layout.base_point == len(posture.names) or posture.rotations is None:
+            raise SceneError(f'base: no frame "{base.frame}" with a rotation, expected one')
+        # What is left of rounding in single precision goes.
+        turned = posture.rotations[layout.base_point] @ skeleton.axes
+        rows, is_clear = _axes(turned.T[None, [2, 1]], layout.base_order, layout.base_signs)
+        at, name = posture.positions[layout.base_point], base.frame
+    else:
+        ends = layout.base_ends
+        spans = joints[ends[:, 1]] - joints[ends[:, 0]]
+        rows, is_clear = _axes(spans[None], layout.base_order, layout.base_signs)
+        at, name = joints[layout.base_origin], base.origin
+    rotation = rows[0].T
+    origin = at + rotation @ base.offset
+    if not is_clear[0] or not np.abs(origin).max() <= FARTHEST_POINT:
+        raise SceneError(f'base: "{name}", or what its axes are made of, is lost, expected both')
+    return rotation, origin
+
+
+def _axes(spans: Array, order: Indices, signs: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """
+    Return unit axes, a row each, (m, 3, 3), of two directions, (m, 2, 3), and whether they are.
+
+    `order` says which of the first, the second and their product is each axis, `signs` which way
+    the product points.
+    """
+    first, second = spans[:, 0], spans[:, 1]
+    length = np.sqrt((first * first).sum(axis=1))
+    u = first / np.maximum(length, CLOSEST)[:, None]
+    v = second - (second * u).sum(axis=1)[:, None] * u
+    width = np.sqrt((v * v).sum(axis=1))
+    v /= np.maximum(width, CLOSEST)[:, None]
+    w = (u[:, _NEXT] * v[:, _LAST] - u[:, _LAST] * v[:, _NEXT]) * signs[:, None]
+    rows = np.stack((u, v, w), axis=1)[np.arange(len(order))[:, None], order]
+    return rows, (length >= CLOSEST) & (width >= CLOSEST)
+
+
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+
+
+def _rows(layout: _Layout, joints: Array) -> Array:
+    """Return the numbers of the boxes, (m, 15), NaN where a joint is lost."""
+    spans = joints[layout.ends[:, :, 1]] - joints[layout.ends[:, :, 0]]
+    limbs = spans[layout.is_limb, 0]
+    along = limbs / np.maximum(np.sqrt((limbs * limbs).sum(axis=1)), CLOSEST)[:, None]
+    # The left of a limb, turned from hanging the shortest way.
+    share = (along @ LEFT) / np.maximum(1.0 + along @ HANGING, 1e-12)
+    spans[layout.is_limb, 1] = LEFT - share[:, None] * (HANGING + along)
+    axes, is_clear = _axes(spans, layout.order, layout.signs)
+    margins = layout.margins
+    surrounded = joints[layout.part_joints]
+    if not is_clear.all():
+        # Where something is NaN, it stays so by what is surrounded.
+        axes[~is_clear] = np.eye(3)
+        margins = np.where(is_clear[:, None, None], margins, layout.reaches[:, None, None])
+        lost = np.isnan(spans).any(axis=(1, 2))
+        surrounded[lost] = np.nan
+    inside = np.matmul(surrounded, axes.transpose(0, 2, 1))
+    lower = inside.min(axis=1) - margins[:, :, 0]
+    upper = inside.max(axis=1) + margins[:, :, 1]
+    rows = np.empty((len(axes), NUMBERS))
+    rows[:, :SIZE] = np.matmul(0.5 * (lower + upper)[:, None], axes)[:, 0]
+    rows[:, SIZE:ROTATION] = upper - lower
+    rows[:, ROTATION:] = axes.transpose(0, 2, 1).reshape(-1, 9)
+    return rows
+
+
+@lru_cache(maxsize=16)
+def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
+    """Return where a skeleton finds its points in postures with these names."""
+    place = {name: k for k, name in enumerate(names)}
+    n = len(skeleton.joints)
+    row = {joint.name: k for k, joint in enumerate(skeleton.joints)}
+    row |= {BASE: n, **{axis: n + 1 + k for k, axis in enumerate(AXES)}}
+    points = _padded([[place.get(p, len(names)) for p in j.points] for j in skeleton.joints])
+    weights = np.zeros(points.shape)
+    for weight, joint in zip(weights, skeleton.joints, strict=True):
+        weight[: len(joint.points)] = 1.0 / len(joint.points)
+    # Frames that are missing have no place: their joints are lost by their positions.
+    with_offset = [k for k, joint in enumerate(skeleton.joints) if joint.offset is not None]
+    offset_points = points[with_offset, 0] if with_offset else np.zeros(0, dtype=np.intp)
+    offsets = [skeleton.axes @ skeleton.joints[k].offset for k in with_offset]
+    base = skeleton.base
+    base_axes = base.axes if isinstance(base, JointBase) else BASE_AXES
+    base_order, base_signs = _ordered([base_axes])
+    kinds = [part.axes or BASE_AXES for part in skeleton.parts]
+    order, signs = _ordered(kinds)
+    ends = [[[row[d.start], row[d.end]] for d in (*axes, axes[0])[:2]] for axes in kinds]
+    margins = np.array([part.margins for part in skeleton.parts])
+    return _Layout(
+        points=points,
+        weights=weights[:, :, None],
+        offset_joints=np.array(with_offset, dtype=np.intp),
+        offset_points=np.minimum(offset_points, len(names) - 1),
+        offsets=np.array(offsets).reshape(-1, 3, 1),
+        base_point=place.get(base.frame, len(names)) if isinstance(base, FrameBase) else 0,
+        base_origin=row[base.origin] if isinstance(base, JointBase) else 0,
+        base_ends=np.array([[row[d.start], row[d.end]] for d in base_axes]),
+        base_order=base_order,
+        base_signs=base_signs,
+        part_joints=_padded([[row[name] for name in part.joints] for part in skeleton.parts]),
+        ends=np.array(ends),
+        is_limb=np.array([len(axes) == 1 for axes in kinds]),
+        order=order,
+        signs=signs,
+        margins=margins,
+        reaches=LONGEST_BONE + np.sqrt((margins.max(axis=2) ** 2).sum(axis=1)),
+    )
+
+
+def _padded(lists: list[list[int]]) -> Indices:
+    """Return lists of indices as rows, (n, longest), the shorter ones ended by their first."""
+    longest = max(map(len, lists), default=1)
+    padded = [[*row, *row[:1] * (longest - len(row))] for row in lists]
+    return np.array(padded, dtype=np.intp).reshape(len(lists), longest)
+
+
+def _ordered(kinds: list[tuple[Direction, ...]]) -> tuple[Indices, Array]:
+    """Return, for `_axes`, which direction is which axis, and the sign of the third one."""
+    order, signs = [], []
+    for axes in kinds:
+        first = AXES.index(axes[0].axis)
+        # The second axis of a limb is its left, or its top where it lies along its left.
+        second = AXES.index(axes[1].axis) if len(axes) == 2 else (first - 1) % 3
+        third = 3 - first - second
+        found = {first: 0, second: 1, third: 2}
+        order.append([found[k] for k in range(3)])
+        signs.append(1.0 if (second - first) % 3 == 1 else -1.0)
+    return np.array(order), np.array(signs)
