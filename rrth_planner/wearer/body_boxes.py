@@ -176,21 +176,23 @@ def _axes(spans: Array, order: Indices, signs: Array) -> tuple[Array, NDArray[np
     """
     Return unit axes, a row each, (m, 3, 3), of two directions, (m, 2, 3), and whether they are.
 
-    `order` says which of the first, the second and their product is each axis, `signs` which way
-    the product points.
+    `order` says which row of all (first, second, product) is each axis, `signs` which way the
+    products point.
     """
     first, second = spans[:, 0], spans[:, 1]
-    length = np.sqrt((first * first).sum(axis=1))
-    u = first / np.maximum(length, CLOSEST)[:, None]
-    v = second - (second * u).sum(axis=1)[:, None] * u
-    width = np.sqrt((v * v).sum(axis=1))
-    v /= np.maximum(width, CLOSEST)[:, None]
-    w = (u[:, _NEXT] * v[:, _LAST] - u[:, _LAST] * v[:, _NEXT]) * signs[:, None]
-    rows = np.stack((u, v, w), axis=1)[np.arange(len(order))[:, None], order]
+    length = np.sqrt(np.einsum('ij,ij->i', first, first))
+    found = np.empty((len(spans), 3, 3))
+    u = np.divide(first, np.maximum(length, CLOSEST)[:, None], out=found[:, 0])
+    v = second - np.einsum('ij,ij->i', second, u)[:, None] * u
+    width = np.sqrt(np.einsum('ij,ij->i', v, v))
+    v = np.divide(v, np.maximum(width, CLOSEST)[:, None], out=found[:, 1])
+    u, v = u.T, v.T
+    # The product of both, written out: `np.cross` takes as long as all the rest.
+    found[:, 2, 0] = signs * (u[1] * v[2] - u[2] * v[1])
+    found[:, 2, 1] = signs * (u[2] * v[0] - u[0] * v[2])
+    found[:, 2, 2] = signs * (u[0] * v[1] - u[1] * v[0])
+    rows = found.reshape(-1, 3)[order]
     return rows, (length >= CLOSEST) & (width >= CLOSEST)
-
-
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 
 def _rows(layout: _Layout, joints: Array) -> Array:
@@ -279,6 +281,6 @@ def _ordered(kinds: list[tuple[Direction, ...]]) -> tuple[Indices, Array]:
         second = AXES.index(axes[1].axis) if len(axes) == 2 else (first - 1) % 3
         third = 3 - first - second
         found = {first: 0, second: 1, third: 2}
-        order.append([found[k] for k in range(3)])
+        order.append([3 * len(order) + found[k] for k in range(3)])
         signs.append(1.0 if (second - first) % 3 == 1 else -1.0)
     return np.array(order), np.array(signs)
