@@ -115,9 +115,7 @@ def _axes(data: Any) -> Array:
     given = mapping(data, 'axes', AXES, SceneError)
     for axis, letter in given.items():
         if not isinstance(letter, str) or letter not in LETTERS:
-            raise SceneError(
-                f'axes: {axis} {shown(letter)}, expected one of {", ".join(LETTERS)}'
-            )
+            raise SceneError(f'axes: {axis} {shown(letter)}, expected one of {", ".join(LETTERS)}')
     return np.column_stack([LETTERS[given[axis]] for axis in AXES])
 
 
@@ -162,9 +160,7 @@ def _part(name: str, data: Any) -> Part:
 def _directions(data: Any, label: str) -> tuple[Direction, ...]:
     """Return axes, each with the two joints that it leads from and to, in their order."""
     given = mapping(data, f'{label}: axes', (), SceneError, AXES)
-    return tuple(
-        Direction(axis, *_pair(ends, f'{label}: {axis}')) for axis, ends in given.items()
-    )
+    return tuple(Direction(axis, *_pair(ends, f'{label}: {axis}')) for axis, ends in given.items())
 
 
 def _pair(data: Any, label: str) -> tuple[str, str]:

@@ -12,7 +12,15 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.wearer.posture import Posture
-from rrth_planner.wearer.skeleton import AXES, BASE, Direction, FrameBase, JointBase, Skeleton
+from rrth_planner.wearer.skeleton import (
+    AXES,
+    BASE,
+    Direction,
+    FrameBase,
+    JointBase,
+    LONGEST,
+    Skeleton,
+)
 
 Indices = NDArray[np.intp]
 
@@ -135,14 +143,15 @@ def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
     points = np.empty((len(posture.names) + 1, 3))
     points[:-1] = posture.positions
     points[-1] = np.nan
+    points[~(np.abs(points) <= FARTHEST_POINT)] = np.nan
     joints: Array = (points[layout.points] * layout.weights).sum(axis=1)
     if layout.offset_joints.size:
         if posture.rotations is None or not posture.names:
             joints[layout.offset_joints] = np.nan
         else:
             turned = posture.rotations[layout.offset_points] @ layout.offsets
+            turned[~(np.abs(turned) <= LONGEST * 2)] = np.nan
             joints[layout.offset_joints] += turned[:, :, 0]
-    joints[~(np.abs(joints) <= FARTHEST_POINT)] = np.nan
     return layout, joints
 
 

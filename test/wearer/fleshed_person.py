@@ -90,7 +90,7 @@ def make_person(rng, is_upright=False):
     world = turn(rng.standard_normal(3), rng.uniform(0, 180)), rng.uniform(-2.0, 2.0, 3)
     size = rng.uniform(0.88, 1.1)
     frames['pelvis'] = world
-    grow = (lambda name, *rest: add_frame(frames, name, *rest))
+    grow = lambda name, *rest: add_frame(frames, name, *rest)
     bend = [angle(-10, 40), angle(-15, 15), angle(-15, 15)]
     lumbar = turn(Z, bend[2]) @ turn(X, bend[1]) @ turn(Y, bend[0])
     grow('lumbar', 'pelvis', [0.0, 0.0, 0.11 * size], lumbar)
@@ -279,7 +279,13 @@ def cmu_bvh(person):
     """Return joints in frames with x left, y up and z forward."""
     turned = np.column_stack([Y, Z, X])
     segments = {'hip': 'pelvis', 'chest': 'thorax', 'neck': 'neck', 'head': 'head'}
-    joints = {'ForeArm': 'forearm', 'Hand': 'hand', 'Thigh': 'thigh', 'Shin': 'shin', 'Foot': 'foot'}
+    joints = {
+        'ForeArm': 'forearm',
+        'Hand': 'hand',
+        'Thigh': 'thigh',
+        'Shin': 'shin',
+        'Foot': 'foot',
+    }
     for side, _ in SIDES:
         segments |= {f'{side[0]}{name}': f'{side} {frame}' for name, frame in joints.items()}
     seen = {}
@@ -341,7 +347,11 @@ def tum_bvh(person):
     }
     for side, _ in SIDES:
         other = 'right' if side == 'left' else 'left'
-        for name, frame in {'upper_arm': 'upper arm', 'forearm': 'forearm', 'hand': 'hand'}.items():
+        for name, frame in {
+            'upper_arm': 'upper arm',
+            'forearm': 'forearm',
+            'hand': 'hand',
+        }.items():
             rotation = person.frames[f'{side} {frame}'][0] @ turned
             seen[f'{other}_{name}'] = person.at(f'{side} {frame}'), rotation
     return seen
