@@ -18,7 +18,6 @@ from rrth_planner.wearer.skeleton import (
     FrameBase,
     Joint,
     JointBase,
-    LONGEST,
     Part,
     Skeleton,
 )

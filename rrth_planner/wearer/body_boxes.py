@@ -7,7 +7,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box, Scene
@@ -24,6 +23,8 @@ from rrth_planner.wearer.skeleton import (
 
 Indices = NDArray[np.intp]
 
+# Of `Box.numbers`, (15,).
+CENTER, SIZE, ROTATION = slice(0, 3), slice(3, 6), slice(6, 15)
 # A point further from the tracker's origin is lost [m].
 FARTHEST_POINT = 1e3
 # Joints closer than this say no direction: a tracker has mixed them up [m].
@@ -224,10 +225,10 @@ def _rows(layout: _Layout, joints: Array) -> Array:
     inside = np.matmul(surrounded, axes.transpose(0, 2, 1))
     lower = inside.min(axis=1) - margins[:, :, 0]
     upper = inside.max(axis=1) + margins[:, :, 1]
-    rows = np.empty((len(axes), NUMBERS))
-    rows[:, :SIZE] = np.matmul(0.5 * (lower + upper)[:, None], axes)[:, 0]
-    rows[:, SIZE:ROTATION] = upper - lower
-    rows[:, ROTATION:] = axes.transpose(0, 2, 1).reshape(-1, 9)
+    rows = np.empty((len(axes), ROTATION.stop))
+    rows[:, CENTER] = np.matmul(0.5 * (lower + upper)[:, None], axes)[:, 0]
+    rows[:, SIZE] = upper - lower
+    rows[:, ROTATION] = axes.transpose(0, 2, 1).reshape(-1, 9)
     return rows
 
 
@@ -243,9 +244,10 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
     for weight, joint in zip(weights, skeleton.joints, strict=True):
         weight[: len(joint.points)] = 1.0 / len(joint.points)
     # Frames that are missing have no place: their joints are lost by their positions.
-    with_offset = [k for k, joint in enumerate(skeleton.joints) if joint.offset is not None]
+    placed = [(k, j.offset) for k, j in enumerate(skeleton.joints) if j.offset is not None]
+    with_offset = [k for k, _ in placed]
     offset_points = points[with_offset, 0] if with_offset else np.zeros(0, dtype=np.intp)
-    offsets = [skeleton.axes @ skeleton.joints[k].offset for k in with_offset]
+    offsets = [skeleton.axes @ offset for _, offset in placed]
     base = skeleton.base
     base_axes = base.axes if isinstance(base, JointBase) else BASE_AXES
     base_order, base_signs = _ordered([base_axes])
@@ -283,7 +285,8 @@ def _padded(lists: list[list[int]]) -> Indices:
 
 def _ordered(kinds: list[tuple[Direction, ...]]) -> tuple[Indices, Array]:
     """Return, for `_axes`, which direction is which axis, and the sign of the third one."""
-    order, signs = [], []
+    order: list[list[int]] = []
+    signs = []
     for axes in kinds:
         first = AXES.index(axes[0].axis)
         # The second axis of a limb is its left, or its top where it lies along its left.

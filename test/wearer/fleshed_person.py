@@ -90,19 +90,18 @@ def make_person(rng, is_upright=False):
     world = turn(rng.standard_normal(3), rng.uniform(0, 180)), rng.uniform(-2.0, 2.0, 3)
     size = rng.uniform(0.88, 1.1)
     frames['pelvis'] = world
-    grow = lambda name, *rest: add_frame(frames, name, *rest)
     bend = [angle(-10, 40), angle(-15, 15), angle(-15, 15)]
     lumbar = turn(Z, bend[2]) @ turn(X, bend[1]) @ turn(Y, bend[0])
-    grow('lumbar', 'pelvis', [0.0, 0.0, 0.11 * size], lumbar)
+    add_frame(frames, 'lumbar', 'pelvis', [0.0, 0.0, 0.11 * size], lumbar)
     bend = [angle(-10, 35), angle(-15, 15), angle(-25, 25)]
     thorax = turn(Z, bend[2]) @ turn(X, bend[1]) @ turn(Y, bend[0])
-    grow('thorax', 'lumbar', [0.0, 0.0, 0.21 * size], thorax)
+    add_frame(frames, 'thorax', 'lumbar', [0.0, 0.0, 0.21 * size], thorax)
     # The middle of the chest: what the arm is worn on.
-    grow('base', 'thorax', [0.0, 0.0, -0.05], np.eye(3))
+    add_frame(frames, 'base', 'thorax', [0.0, 0.0, -0.05], np.eye(3))
     nod = turn(Z, angle(-35, 35)) @ turn(X, angle(-20, 20)) @ turn(Y, angle(-30, 25))
-    grow('neck', 'thorax', [-0.035, 0.0, 0.22 * size], nod)
+    add_frame(frames, 'neck', 'thorax', [-0.035, 0.0, 0.22 * size], nod)
     nod = turn(Z, angle(-40, 40)) @ turn(X, angle(-15, 15)) @ turn(Y, angle(-20, 25))
-    grow('head', 'neck', [0.015, 0.0, rng.uniform(0.10, 0.125)], nod)
+    add_frame(frames, 'head', 'neck', [0.015, 0.0, rng.uniform(0.10, 0.125)], nod)
     trunk(person, rng, size)
     for side, sign in SIDES:
         arm(person, rng, side, sign, size, angle)

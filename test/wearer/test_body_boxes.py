@@ -2,11 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes contain the flesh of people, as each tracker reports them, and are not absurdly large."""
 
-from fleshed_person import make_person, seen_by, SEEN, turn
+from fleshed_person import make_person, SEEN, seen_by, turn
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.io.text_file import load_yaml
+from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box
 from rrth_planner.wearer.body_boxes import base_pose, body_boxes, jumped
@@ -108,6 +113,23 @@ def test_an_upright_wearer_has_his_parts_where_the_body_of_the_examples_has_them
     )
     for box in body_boxes(load_skeleton('xsens'), other)[0].boxes:
         np.testing.assert_allclose(box.numbers, boxes[box.name].numbers, atol=1e-12)
+
+
+@pytest.mark.parametrize('tracker', SEEN)
+def test_the_folded_arm_keeps_its_margin_from_a_wearer_who_stands(tracker):
+    arm, skeleton, settings = load_arm(), load_skeleton(tracker), load_settings(4)
+    folded = load_yaml(resource_path('config/playback.yaml'))['/**']['ros__parameters']
+    poses = forward_kinematics(arm, np.array(folded['initial_positions']))
+    corners = np.array([arm.T_base_mount[:3, 3], *poses[:, :3, 3]])
+    ray = poses[-1, :3, 3] + settings.ray_guard_length * poses[-1, :3, 2]
+    share = np.linspace(0.0, 1.0, 50)[:, None]
+    ends = zip(corners, [*corners[1:], ray], strict=True)
+    line = np.concatenate([start + share * (end - start) for start, end in ends])
+    for seed in range(50):
+        person = make_person(np.random.default_rng(seed), is_upright=True)
+        for box in body_boxes(skeleton, seen_by(tracker, person))[0].boxes:
+            gaps = np.maximum(np.abs((line - box.center) @ box.rotation) - box.size / 2, 0.0)
+            assert np.linalg.norm(gaps, axis=1).min() > settings.margin, box.name
 
 
 @pytest.mark.parametrize('tracker', SEEN)
