@@ -18,7 +18,6 @@ from rrth_planner.wearer.skeleton import (
     FrameBase,
     Joint,
     JointBase,
-    LONGEST,
     Part,
     Skeleton,
 )
@@ -133,7 +132,9 @@ def _parts(given: Mapping[str, Any], human: Mapping[str, Any]) -> tuple[Part, ..
         label = f'part "{name}"'
         # Not even a part that is new there may have unknown entries.
         entries = mapping(entry, label, (), SceneError, (*LIMB, *BLOCK, 'axes'))
-        merged[name] = {**merged.get(name, {}), **entries}
+        # One that says what it is round is another part by the same name.
+        is_new = 'bone' in entries or 'around' in entries
+        merged[name] = entries if is_new else {**merged.get(name, {}), **entries}
     return tuple(_part(name, entry) for name, entry in merged.items())
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.kernels.layout import ORTHOGONAL
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import printable, SceneError, shown
 
@@ -15,6 +14,8 @@ from rrth_planner.model.errors import printable, SceneError, shown
 AXES = ('forward', 'left', 'up')
 # The joint that every skeleton has: the origin of the base frame. No joint is called like an axis.
 BASE = 'base'
+# Axes of a frame are perpendicular up to this.
+ORTHOGONAL = 1e-6
 # Nothing on a wearer is longer [m].
 LONGEST = 5.0
 
