@@ -204,22 +204,28 @@ def first_escape_violation(
     """
     Return the first violation of a motion that escapes from boxes, or None.
 
-    depths (m,): penetration depth at the start in each box, grown by the margin: by how much that
-    would have to shrink on every side for the arm to be clear [m]. No motion may exceed it; < 0:
-    clear. escape_time: when the escape ends; 0: there is none [s]. All else as for
-    `first_violation`.
+    depths (2, m): penetration depths at the start in each box, grown by the margin, of the bars
+    without the pointing ray and of the ray: by how much the box would have to shrink on every
+    side for them to be clear [m]; < 0: clear. No motion may exceed that of the bars; a box that
+    the ray is in counts for the bars alone. escape_time: when the escape ends; 0: there is none
+    [s]. All else as for `first_violation`.
     """
     if escape_time == 0.0:
         return None
-    boxes, kept = [], margin - np.maximum(depths, 0.0)
+    of_bars, of_ray = depths
+    boxes, kept = [], margin - np.maximum(of_bars, 0.0)
     for box, by in zip(scene.boxes, kept.tolist(), strict=True):
         size = box.size + 2.0 * (by - APART)
         if not (size > 0.0).all():
             return Violation(0.0, by, 'the arm', box.name)
         boxes.append(Box(box.name, box.center, size, box.rotation))
-    escape = part_of(trajectory, 0.0, escape_time)
-    violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray_guard_length, 0.0)
-    if violation is None:
-        return None
-    by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == violation.box)
-    return replace(violation, distance=violation.distance - APART + by)
+    escape, is_void = part_of(trajectory, 0.0, escape_time), of_ray > 0.0
+    found = []
+    for ray, chosen in ((0.0, is_void), (ray_guard_length, ~is_void)):
+        part = [i for i, is_chosen in enumerate(chosen) if is_chosen]
+        checked = Scene(tuple(boxes[i] for i in part))
+        violation = first_violation(arm, checked, escape, APART, ray, 0.0)
+        if violation is not None:
+            by = max(kept[i] for i in part if boxes[i].name == violation.box)
+            found.append(replace(violation, distance=violation.distance - APART + float(by)))
+    return min(found, key=lambda violation: violation.time, default=None)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.fcl_checker import first_escape_violation, first_violation
-from rrth_planner.collision.penetration import box_depths, leads_out
+from rrth_planner.collision.penetration import escape_depths, leads_out
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
@@ -47,7 +47,7 @@ def violation_seen(
     ray = ray_guard_length
     if escape_time > 0.0:
         world = arm_world(arm, scene, margin, ray)
-        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        depths = escape_depths(world, trajectory.positions[0])
         violation = first_escape_violation(
             arm, scene, depths, trajectory, escape_time, margin, ray
         )

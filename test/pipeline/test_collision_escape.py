@@ -9,7 +9,13 @@ import re
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
+from rrth_planner.collision.penetration import (
+    box_depths,
+    escape_depths,
+    half_widths,
+    leads_out,
+    relaxed,
+)
 from rrth_planner.collision.reference_checker import bar_box_contact, first_contact
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
@@ -46,6 +52,8 @@ ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
 SEEDS = strategies.integers(0, 2**31)
 FREE = 1.0
+# Bars of an arm, the pointing ray being the last one.
+ARM, BARS, POINTING = slice(None), slice(-1), slice(-1, None)
 BODIES = [wearer(), *(varied_body(np.random.default_rng(k)) for k in range(5))]
 
 
@@ -65,10 +73,10 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
     )
 
 
-def collides(arm, box, q, growth):
-    """Return at which of the instants q, (n, dof), the reference finds the arm in a grown box."""
-    ends = oracle_bars(arm, q, RAY)
-    radii = [arm.radii[row] for row, _ in bar_ends(arm)]
+def collides(arm, box, q, growth, part=ARM):
+    """Return at which of the instants q, (n, dof), the reference finds a part in a grown box."""
+    ends = oracle_bars(arm, q, RAY)[:, part]
+    radii = [arm.radii[row] for row, _ in bar_ends(arm)][part]
     hits = [
         bar_box_contact(ends[:, k], box.center, box.rotation, 0.5 * box.size + growth + radius)
         for k, radius in enumerate(radii)
@@ -76,31 +84,31 @@ def collides(arm, box, q, growth):
     return np.any(hits, axis=0)
 
 
-def reference_depth(arm, box, q):
+def reference_depth(arm, box, q, part=ARM):
     """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
     low, high = -0.5 * box.size.min(), FREE
-    if not collides(arm, box, q[None], high)[0]:
+    if not collides(arm, box, q[None], high, part)[0]:
         return MARGIN - FREE
     for _ in range(48):
         middle = 0.5 * (low + high)
-        if collides(arm, box, q[None], middle)[0]:
+        if collides(arm, box, q[None], middle, part)[0]:
             high = middle
         else:
             low = middle
     return MARGIN - high
 
 
-def leaned(arm, scene, q, rng, depth):
-    """Return the scene with one box pushed into the arm so deep, or None."""
+def leaned(arm, scene, q, rng, depth, part):
+    """Return the scene with one box pushed into a part of the arm so deep, or None."""
     index = int(rng.integers(len(scene.boxes)))
     box = scene.boxes[index]
-    bar = oracle_bars(arm, q[None], RAY)[0, rng.choice([0, -1])]
+    bar = oracle_bars(arm, q[None], RAY)[0, part][rng.choice([0, -1])]
     towards = bar[0] + rng.uniform(0.2, 1.0) * (bar[1] - bar[0]) - box.center
     low, high = 0.0, 1.0
 
     def is_deeper(share):
         pushed = replace(box, center=box.center + share * towards)
-        return collides(arm, pushed, q[None], MARGIN - depth)[0]
+        return collides(arm, pushed, q[None], MARGIN - depth, part)[0]
 
     if is_deeper(low) or not is_deeper(high):
         return None
@@ -126,18 +134,18 @@ def is_shoulder_covered(arm, scene):
     )
 
 
-def leaned_case(seed, low, high):
-    """Return arm, wearer, start and reference depths of the boxes, the deepest within bounds."""
+def leaned_case(seed, low, high, part=ARM):
+    """Return arm, wearer, start and reference depths of a part, the deepest within bounds."""
     rng = np.random.default_rng(seed)
     while True:
         arm = table_1_arm(rng.choice([0.0, 0.02]))
         scene = BODIES[int(rng.integers(len(BODIES)))]
         world = arm_world(arm, scene, MARGIN, RAY)
         q = free_configuration(rng, world)
-        found = leaned(arm, scene, q, rng, rng.uniform(low, high))
+        found = leaned(arm, scene, q, rng, rng.uniform(low, high), part)
         if found is None or is_shoulder_covered(arm, found):
             continue
-        depths = np.array([reference_depth(arm, box, q) for box in found.boxes])
+        depths = np.array([reference_depth(arm, box, q, part) for box in found.boxes])
         if depths.max() < high:
             return arm, found, q, depths
 
@@ -156,9 +164,21 @@ def test_depths_are_those_of_the_reference(seed):
         if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
             assert depth == pytest.approx(expected, abs=1e-7)
     assert world.is_valid(q) == (depths.max() < 0.0)
-    if (smaller := relaxed(world, np.maximum(depths, 0.0) + 1e-7)) is not None:
-        assert smaller.is_valid(q)
+    assert relaxed(world, np.maximum(depths, 0.0) + 1e-7).is_valid(q)
+    if (depths < half_widths(world)).all():
         assert not relaxed(world, np.maximum(depths - 1e-7, -FREE)).is_valid(q)
+    for part, found in zip((BARS, POINTING), escape_depths(world, q), strict=True):
+        for box, depth in zip(scene.boxes, found, strict=True):
+            expected = reference_depth(arm, box, q, part)
+            if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
+                assert depth == pytest.approx(expected, abs=1e-7)
+
+
+def escape_said(sentence):
+    """Return the boxes that a sentence says the bars are in, the deepest first, and the ray."""
+    escape = re.search(r', escape (.*)', sentence)[1].partition(';')[0]
+    of_bars, _, of_ray = escape.partition('of the pointing ray')
+    return [re.findall(r'box "(\w+)"', part) for part in (of_bars, of_ray)]
 
 
 @examples(50)
@@ -177,13 +197,14 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     assert np.array_equal(trajectory.positions[0], q_start)
     assert np.array_equal(plan.path.waypoints[0], q_start)
     assert out in trajectory.times
-    deepest = scene.boxes[int(np.argmax(depths))].name
-    said = re.search(
-        r'escape from box "(\w+)", penetration depth (\d\.\d+) m at ([\w ]+)', plan.sentence
-    )
-    assert said[1] == deepest
-    assert float(said[2]) == pytest.approx(depths.max(), abs=1e-3)
-    assert plan.sentence.count('penetration depth') == np.count_nonzero(depths > -1e-5)
+    said = escape_said(plan.sentence)
+    for part, k in ((BARS, 0), (POINTING, 1)):
+        inside = {box.name: reference_depth(arm, box, q_start, part) for box in scene.boxes}
+        assert set(said[k]) == {name for name, depth in inside.items() if depth > -1e-5}
+        if part is BARS and said[k]:
+            assert said[k][0] == max(inside, key=inside.get)
+            depth = re.search(r'penetration depth (\d\.\d+) m at link', plan.sentence)[1]
+            assert float(depth) == pytest.approx(max(inside.values()), abs=1e-3)
     assert plan.clearance >= MARGIN - 1e-6
     times = np.union1d(np.arange(0.0, trajectory.duration, 1e-3), [out, trajectory.duration])
     q, v, _ = sample(trajectory, times)
@@ -223,7 +244,7 @@ def test_an_arm_whose_shoulder_is_covered_has_no_escape():
 @examples(15)
 @given(SEEDS)
 def test_deeper_is_rejected_with_part_box_and_depth(seed):
-    arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06)
+    arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06, BARS)
     plan = ask(arm, scene, q_start)
     assert plan.status is PlanStatus.START_IN_COLLISION
     world = arm_world(arm, scene, MARGIN, RAY)
@@ -248,11 +269,11 @@ def test_deeper_is_rejected_with_part_box_and_depth(seed):
     assert 'escape_depth' not in plan.sentence
 
 
-def pressed(depth=0.03):
-    """Return the wearer with a plate pressed against the folded arm's tool from below."""
+def pressed(depth=0.03, bar=-1):
+    """Return the wearer with a plate pressed against a bar of the folded arm, or its ray."""
     arm = table_1_arm()
-    tip = oracle_bars(arm, FOLDED[None], RAY)[0, -1]
-    along = tip[1] - tip[0]
+    tip = oracle_bars(arm, FOLDED[None], RAY)[0, bar]
+    along = (tip[1] - tip[0]) / np.linalg.norm(tip[1] - tip[0])
     side = np.cross(along, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     rotation = np.stack([np.cross(side, along), side, along], axis=1)
@@ -298,8 +319,9 @@ def test_an_arm_beyond_its_limits_is_not_led_out():
     assert ask(arm, scene, q).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_a_hand_that_is_closed_round_the_arm_is_rejected():
-    arm, scene = pressed()
+def closed(bar):
+    """Return the wearer with a hand closed round a bar of the folded arm, or its ray."""
+    arm, scene = pressed(bar=bar)
     hand = scene.boxes[-1]
     others = [
         replace(hand, name=f'finger_{i}', center=tip)
@@ -308,10 +330,21 @@ def test_a_hand_that_is_closed_round_the_arm_is_rejected():
             for offset in np.array([[0.0, 0.14, 0.0], [0.08, 0.07, 0.0], [-0.08, 0.07, 0.0]])
         )
     ]
-    plan = ask(arm, Scene((*scene.boxes, *others)), FOLDED)
+    return arm, Scene((*scene.boxes, *others))
+
+
+def test_a_hand_that_is_closed_round_the_arm_is_rejected():
+    plan = ask(*closed(bar=0), FOLDED)
     assert plan.status is PlanStatus.START_IN_COLLISION
     assert 'no straight escape is proven free' in plan.sentence
     assert '"hand"' in plan.sentence or '"finger_' in plan.sentence
+
+
+def test_a_hand_that_is_closed_round_the_ray_holds_nothing():
+    plan = ask(*closed(bar=-1), FOLDED)
+    assert plan.status is PlanStatus.SOLVED, plan.sentence
+    # Out through the hand, since the ray has no body; into no finger.
+    assert escape_said(plan.sentence) == [[], ['hand']]
 
 
 def test_the_same_seed_leads_out_the_same_way():
@@ -350,7 +383,7 @@ def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
 
 
 def second_opinion(arm, scene, world, trajectory):
-    depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+    depths = escape_depths(world, trajectory.positions[0])
     return fcl_checker.first_escape_violation(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
@@ -368,7 +401,7 @@ def test_an_escape_with_a_violation_by_python_fcl_is_rejected(monkeypatch):
 
 
 def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
-    arm, scene = pressed()
+    arm, scene = pressed(bar=0)
     world = arm_world(arm, scene, MARGIN, RAY)
     plan = ask(arm, scene, FOLDED)
     way = plan.path.waypoints[1] - FOLDED
@@ -382,7 +415,7 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     assert verdicts[1.0] == (True, None)
     is_out, violation = verdicts[-0.2]
     assert not is_out
-    assert (violation.bar, violation.box) == ('pointing ray', 'hand')
+    assert (violation.bar, violation.box) == ('link 3', 'hand')
     # Half way it is no deeper but not out.
     assert verdicts[0.5] == (False, None)
     # A plate in the way, which the arm does not reach yet.
