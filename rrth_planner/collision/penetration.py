@@ -80,49 +80,69 @@ def half_widths(world: World) -> Array:
     return halves
 
 
-def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0.0) -> bool:
+def leads_out(
+    trajectory: Trajectory, world: World, margin: float, end: float, begin: float = 0.0
+) -> bool:
     """
     Return whether a motion is proven to escape from the boxes that the arm is in.
 
-    The time is cut into intervals; from one to the next the penetration depth of the bars may
-    increase in no box. Within an interval they are proven free of the boxes shrunk by their depth
-    at its start; a box that they are not in, or have left, is not shrunk. So the bars enter no
-    other box, and nowhere get deeper by more than `GAP` than at the start of the interval.
+    The time is cut into intervals; from one to the next the penetration depth may increase in no
+    box, neither that of the bars nor that of the pointing ray. Within an interval both are proven
+    free of the boxes shrunk by their depth at its start; a box that they are not in, or have left,
+    is not shrunk. At the end both are clear of all boxes. So the arm enters no other box, and
+    nowhere gets deeper by more than `GAP` than at the start of the interval.
 
-    The pointing ray has no body: until it has left a box that it is in, that does not count for
-    it. It is proven free of all others, and of a box from the interval on at whose start it has
-    left that. At the end bars and ray are clear of all boxes.
+    The ray has no body: where it is deeper than the margin, and therefore in the wearer already,
+    that box does not count for it.
 
-    The world has its boxes grown by the whole margin; end: when the arm has to be clear, begin:
+    The world has its boxes grown by the margin [m]; end: when the arm has to be clear, begin:
     start of the part that is checked [s].
     """
     times = np.linspace(min(max(begin, 0.0), end), end, INTERVALS + 1)
     deep = escape_depths(world, positions_at(trajectory, times))
     if deep.size == 0:
         return True
-    is_in = (deep > -GAP) & (deep[0] > -GAP)
-    allowed = np.where(is_in, np.maximum(deep + GAP, 0.0), 0.0)[:, 0]
-    is_entered = is_in[:, 1]
+    allowed = np.where(deep[0] > -GAP, _allowed_depths(world, deep, margin), 0.0)
+    of_bars, of_arm = allowed[:, 0], allowed.max(axis=1)
     if (
         (deep[-1] > 0.0).any()
         or (np.diff(allowed, axis=0) > 0.0).any()
-        or (is_entered[1:] > is_entered[:-1]).any()
-        or (allowed >= half_widths(world)).any()
+        or (of_bars >= half_widths(world)).any()
     ):
         return False
     bars = without_ray(world)
-    for by, is_void, (start, stop) in zip(
-        allowed, is_entered, pairwise(times.tolist()), strict=False
-    ):
+    for i, (start, stop) in enumerate(pairwise(times.tolist())):
         if stop <= start:
             continue
         # Once the arm is clear of all boxes, the remaining time is one interval.
-        is_out = not (by.any() or is_void.any())
+        is_out = not of_arm[i].any()
         part = part_of(trajectory, 0.0, end if is_out else stop)
-        if not certify(part, relaxed(world, np.where(is_void, np.inf, by)), start).is_proven:
+        if not certify(part, relaxed(world, of_arm[i]), start).is_proven:
             return False
-        if is_void.any() and not certify(part, relaxed(bars, by), start).is_proven:
+        if (of_bars[i] < of_arm[i]).any() and not certify(
+            part, relaxed(bars, of_bars[i]), start
+        ).is_proven:
             return False
         if is_out:
             break
     return True
+
+
+def gets_no_deeper(trajectory: Trajectory, world: World, margin: float, begin: float) -> bool:
+    """
+    Return whether a motion is proven to get no deeper into any box than it is at a time [s].
+
+    As `leads_out`, but in one interval, and it need not leave the boxes: what has left one may
+    come back as deep as it was.
+    """
+    deep = escape_depths(world, positions_at(trajectory, [begin])[0])
+    allowed = _allowed_depths(world, deep, margin).max(axis=0)
+    return certify(trajectory, relaxed(world, allowed), begin).is_proven
+
+
+def _allowed_depths(world: World, deep: Array, margin: float) -> Array:
+    """Return how deep bars and ray may be that are at some `escape_depths`, same shape [m]."""
+    allowed: Array = np.where(deep > -GAP, np.maximum(deep + GAP, 0.0), 0.0)
+    # The grown box vanishes where it does not count.
+    allowed[..., 1, :] = np.where(deep[..., 1, :] > margin, half_widths(world), allowed[..., 1, :])
+    return allowed

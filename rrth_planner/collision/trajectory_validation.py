@@ -15,17 +15,17 @@ from rrth_planner.model.trajectory import beyond, Trajectory
 
 
 def is_proven_free(
-    world: World, trajectory: Trajectory, reach: float, escape_time: float = 0.0
+    world: World, trajectory: Trajectory, margin: float, reach: float, escape_time: float = 0.0
 ) -> bool:
     """
     Return whether a motion is certified, and its end with the ray out to the target.
 
-    reach: how far the target is from the tool at the end [m]; escape_time: until then the motion
-    escapes from boxes that the arm was in [s].
+    margin: by which the world's boxes are grown; reach: how far the target is from the tool at the
+    end [m]; escape_time: until then the motion escapes from boxes that the arm was in [s].
     """
     return (
         world.is_valid(trajectory.positions[-1], reach)
-        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
+        and (escape_time == 0.0 or leads_out(trajectory, world, margin, escape_time))
         and certify(trajectory, world, escape_time).is_proven
     )
 

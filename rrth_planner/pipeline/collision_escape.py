@@ -98,7 +98,7 @@ def plan_escape(
             tries = list(search(roomy, q_start, spare, longest, rng, should_stop))
             if should_stop():
                 return CANCELLED
-            # Where the ray need go nowhere deeper it does not.
+            # Preferred are those on which the ray gets nowhere deeper within the wearer either.
             keys = [(_rises(world, q_start, q), float(np.linalg.norm(q - q_start))) for q in tries]
             for i in sorted(range(len(tries)), key=keys.__getitem__):
                 if should_stop():
@@ -106,7 +106,7 @@ def plan_escape(
                 if best is not None and keys[i] >= least:
                     break
                 trajectory = parameterize(Path(np.stack([q_start, tries[i]])), (), limits)
-                if leads_out(trajectory, world, trajectory.duration):
+                if leads_out(trajectory, world, question.margin, trajectory.duration):
                     best, least = trajectory, keys[i]
                     longest = LONGEST if least[0] else least[1]
                     break

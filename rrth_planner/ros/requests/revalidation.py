@@ -131,7 +131,7 @@ class Revalidation:
             and escape_depths(world, self._motion.positions[0])[0].max() >= parameters.escape_depth
         )
         if is_too_deep or not is_proven_free(
-            world, self._motion, self._target_distance, escape_time
+            world, self._motion, parameters.margin, self._target_distance, escape_time
         ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
