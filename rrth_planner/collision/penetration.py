@@ -102,7 +102,9 @@ def leads_out(
     deep = escape_depths(world, positions_at(trajectory, times))
     if deep.size == 0:
         return True
-    allowed = np.where(deep[0] > -GAP, _allowed_depths(world, deep, margin), 0.0)
+    allowed = np.where(deep[0] > -GAP, _allowed_depths(deep), 0.0)
+    # The grown box vanishes where it does not count for the ray.
+    allowed[:, 1] = np.where(deep[:, 1] > margin, half_widths(world), allowed[:, 1])
     of_bars, of_arm = allowed[:, 0], allowed.max(axis=1)
     if (
         (deep[-1] > 0.0).any()
@@ -128,21 +130,18 @@ def leads_out(
     return True
 
 
-def gets_no_deeper(trajectory: Trajectory, world: World, margin: float, begin: float) -> bool:
+def gets_no_deeper(trajectory: Trajectory, world: World, begin: float) -> bool:
     """
     Return whether a motion is proven to get no deeper into any box than it is at a time [s].
 
-    As `leads_out`, but in one interval, and it need not leave the boxes: what has left one may
-    come back as deep as it was.
+    Nor into the wearer with the ray: only where that is so deep that a box shrunk by its depth
+    vanishes does the box not count. What has left a box may come back as deep as it was.
     """
-    deep = escape_depths(world, positions_at(trajectory, [begin])[0])
-    allowed = _allowed_depths(world, deep, margin).max(axis=0)
-    return certify(trajectory, relaxed(world, allowed), begin).is_proven
+    deep = escape_depths(world, positions_at(trajectory, [begin])[0]).max(axis=0)
+    return certify(trajectory, relaxed(world, _allowed_depths(deep)), begin).is_proven
 
 
-def _allowed_depths(world: World, deep: Array, margin: float) -> Array:
-    """Return how deep bars and ray may be that are at some `escape_depths`, same shape [m]."""
+def _allowed_depths(deep: Array) -> Array:
+    """Return how deep parts may be that are so deep in boxes, of any shape [m]."""
     allowed: Array = np.where(deep > -GAP, np.maximum(deep + GAP, 0.0), 0.0)
-    # The grown box vanishes where it does not count.
-    allowed[..., 1, :] = np.where(deep[..., 1, :] > margin, half_widths(world), allowed[..., 1, :])
     return allowed

@@ -147,7 +147,7 @@ def escapes_by_continuing(
     return (
         world.is_valid(trajectory.positions[-1], reach)
         and leads_out(trajectory, without_ray(world), margin, trajectory.duration, phase)
-        and gets_no_deeper(trajectory, world, margin, phase)
+        and gets_no_deeper(trajectory, world, phase)
     )
 
 

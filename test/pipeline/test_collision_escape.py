@@ -21,7 +21,7 @@ from rrth_planner.collision.reference_checker import bar_box_contact, first_cont
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import is_remaining_free
+from rrth_planner.execution.remaining_motion import escapes_by_continuing, is_remaining_free
 from rrth_planner.model.arm import bar_ends
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
@@ -579,6 +579,68 @@ def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
     near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
     followed = Scene((*scene.boxes[:-1], near))
     assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+
+
+@examples(25)
+@given(SEEDS)
+def test_an_escape_goes_on_where_the_wearer_moves_in_the_ray(seed):
+    arm, scene, _, q_start = entered_case(seed)
+    plan = ask(arm, scene, q_start)
+    if plan.status is not PlanStatus.SOLVED:
+        return
+    trajectory, rng = plan.trajectory, np.random.default_rng(seed)
+    running = ExecutingMotion(
+        trajectory=trajectory,
+        start_time=0.0,
+        target_distance=plan.target_distance,
+        escape_time=plan.escape_time,
+    )
+    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    for _ in range(6):
+        phase, moved = rng.uniform(0.0, plan.escape_time), rng.normal(size=3)
+        box = scene.boxes[-1]
+        box = replace(box, center=box.center + 0.01 * moved / np.linalg.norm(moved))
+        now = Scene((*scene.boxes[:-1], box))
+        is_free = is_remaining_free(running, phase, arm, now, **kept)
+        goes_on = is_free or escapes_by_continuing(running, phase, arm, now, **kept)
+        n_moved[goes_on] += 1
+        n_moved['without proof'] += not is_free
+        if not goes_on:
+            continue
+        q = positions_at(trajectory, np.linspace(phase, trajectory.duration, 400))
+        assert first_contact(arm, now, q[-1:], plan.target_distance, MARGIN - 1e-6) is None
+        for box in now.boxes:
+            assert not collides(arm, box, q, MARGIN - 1e-6, BARS).any()
+            depth = max(0.0, reference_depth(arm, box, q[0], POINTING))
+            if depth < 0.5 * box.size.min() + MARGIN - 1e-5:
+                assert not collides(arm, box, q, MARGIN - depth - 3e-6, POINTING).any()
+
+
+n_moved: Counter[bool | str] = Counter()
+
+
+def test_most_escapes_go_on_where_the_wearer_moves_in_the_ray():
+    assert n_moved['without proof'] >= 10
+    assert n_moved[True] >= 0.9 * (n_moved[True] + n_moved[False])
+
+
+def test_a_hand_that_comes_into_the_way_of_a_bar_is_no_reason_to_go_on():
+    arm, scene = pressed()
+    plan = ask(arm, scene, FOLDED)
+    running = ExecutingMotion(
+        trajectory=plan.trajectory, start_time=0.0, escape_time=plan.escape_time
+    )
+    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    later = positions_at(plan.trajectory, [0.7 * plan.trajectory.duration])
+    for bar, size, goes_on in ((0, 0.02, False), (-1, 1e-3, True)):
+        ends = oracle_bars(arm, later, RAY)[0, bar]
+        box = Box('late', ends.mean(axis=0), np.full(3, size), np.eye(3))
+        if goes_on:
+            # In the ray now, instead of later.
+            box = replace(box, center=oracle_bars(arm, FOLDED[None], RAY)[0, -1].mean(axis=0))
+        now = Scene((*scene.boxes, box))
+        assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, now, **kept)
+        assert escapes_by_continuing(running, 0.0, arm, now, **kept) == goes_on
 
 
 def test_an_empty_world_has_no_depth():
