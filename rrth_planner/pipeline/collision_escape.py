@@ -31,14 +31,14 @@ STEP = 1e-6
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Escape:
     """
-    A straight motion out of boxes grown by the margin.
+    A straight motion of bars and pointing ray out of boxes grown by the margin.
 
     Parameters
     ----------
     trajectory : Trajectory
         From rest at the start to rest clear of the boxes.
     sentence : str
-        The boxes, and the penetration depths at the start.
+        The boxes that bars and ray are in at the start, and how deep the bars are.
 
     """
 

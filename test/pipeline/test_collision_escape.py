@@ -343,7 +343,7 @@ def test_nearly_all_rays_come_out():
     assert len(n_rays_out) >= 39
 
 
-@examples(50)
+@examples(30)
 @given(SEEDS)
 def test_no_motion_is_proven_to_take_a_ray_out_that_does_not(seed):
     arm, scene, world, q_start = entered_case(seed)
@@ -373,8 +373,8 @@ n_verdicts: Counter[tuple[bool, bool, bool]] = Counter()
 
 
 def test_both_checkers_find_good_and_bad_escapes_of_a_ray():
-    assert n_verdicts[True, True, True] >= 25, n_verdicts
-    assert n_verdicts[False, False, False] >= 10, n_verdicts
+    assert n_verdicts[True, True, True] >= 15, n_verdicts
+    assert n_verdicts[False, False, False] >= 5, n_verdicts
     # What is good is mostly proven: the depths at the ends of intervals are the rest.
     assert n_verdicts[False, True, True] <= 0.1 * n_verdicts[True, True, True], n_verdicts
 
@@ -581,7 +581,7 @@ def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
     assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
 
 
-@examples(25)
+@examples(15)
 @given(SEEDS)
 def test_an_escape_goes_on_where_the_wearer_moves_in_the_ray(seed):
     arm, scene, _, q_start = entered_case(seed)
@@ -620,7 +620,7 @@ n_moved: Counter[bool | str] = Counter()
 
 
 def test_most_escapes_go_on_where_the_wearer_moves_in_the_ray():
-    assert n_moved['without proof'] >= 10
+    assert n_moved['without proof'] >= 5
     assert n_moved[True] >= 0.9 * (n_moved[True] + n_moved[False])
 
 
