@@ -206,11 +206,25 @@ def main() -> None:
     seconds = requests = aimed = ray = contacts = brakes = 0
     for k, file in enumerate(files):
         with tempfile.TemporaryDirectory() as folder:
-            r = soak_person(file, float(sys.argv[1]), float(sys.argv[2]), Path(folder), 0.1, seed=k)
-        print(r.name, f'{r.n_aimed} of {r.n_requests} aimed; contacts {r.n_contacts}; ray {r.ray_seconds:.2f} s; stops {len(r.brakes)}; {dict(r.answers)}', r.contacts[:5], flush=True)
+            r = soak_person(
+                file, float(sys.argv[1]), float(sys.argv[2]), Path(folder), 0.1, seed=k
+            )
+        print(
+            r.name,
+            f'{r.n_aimed} of {r.n_requests} aimed; contacts {r.n_contacts}; ray {r.ray_seconds:.2f} s; stops {len(r.brakes)}; {dict(r.answers)}',
+            r.contacts[:5],
+            flush=True,
+        )
         total += r.answers
-        seconds += r.seconds; requests += r.n_requests; aimed += r.n_aimed; ray += r.ray_seconds; contacts += r.n_contacts; brakes += len(r.brakes)
-    print(f'ALL {seconds:.0f} s: {aimed} of {requests} aimed ({100 * aimed / requests:.1f} %), contacts {contacts}, ray {ray:.2f} s, stops {brakes}, {dict(total)}')
+        seconds += r.seconds
+        requests += r.n_requests
+        aimed += r.n_aimed
+        ray += r.ray_seconds
+        contacts += r.n_contacts
+        brakes += len(r.brakes)
+    print(
+        f'ALL {seconds:.0f} s: {aimed} of {requests} aimed ({100 * aimed / requests:.1f} %), contacts {contacts}, ray {ray:.2f} s, stops {brakes}, {dict(total)}'
+    )
 
 
 if __name__ == '__main__':

@@ -84,9 +84,9 @@ def plan_motion(
         state: the arm continues straight ahead, no further than it needs to stop, and blends
         into the path; or, where there is no room for that, it stops along its present motion.
     escape_depth : float
-        An arm at rest with a smaller penetration depth in the boxes grown by the margin escapes
-        first [m]; 0: never. The depth is by how much a box would have to be smaller on every
-        side.
+        An arm at rest whose bars have a smaller penetration depth in the boxes grown by the
+        margin escapes first [m]; 0: never. The depth is by how much a box would have to be
+        smaller on every side; that of the pointing ray, which has no body, may be any.
 
     Raises
     ------

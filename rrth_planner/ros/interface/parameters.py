@@ -32,7 +32,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
     limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
     timeout = (0.0, LONGEST_TIMEOUT)
     ray = 'length of the pointing ray kept clear in motion'
-    escape = 'greatest penetration depth, margin included, to escape from; 0: none'
+    escape = 'greatest depth of a bar in a box, margin included, to escape from; 0: none'
     latency = 'age at reception of a body without stamp'
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
