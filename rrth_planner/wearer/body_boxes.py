@@ -126,18 +126,6 @@ def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
     return T
 
 
-def jumped(before: Posture, after: Posture, most: float) -> tuple[str, ...]:
-    """
-    Return the points that moved by more than a distance [m] between two postures of a tracker.
-
-    Points that are lost, or missing, in either of them are none.
-    """
-    both = [name for name in after.names if name in before.names]
-    here, there = ([p.names.index(name) for name in both] for p in (after, before))
-    moves = np.linalg.norm(after.positions[here] - before.positions[there], axis=1)
-    return tuple(name for name, move in zip(both, moves, strict=True) if move > most)
-
-
 def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
     """Return the joints of a posture, (n, 3), NaN where lost."""
     layout = _layout(skeleton, posture.names)
