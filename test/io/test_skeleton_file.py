@@ -126,8 +126,8 @@ def drop(*keys):
             r'joint "nose": offset: .*expected numbers of shape \(3\) \[m\]',
         ),
         (
-            lambda d: d['joints']['nose'].update(ofset=1),
-            'joint "nose": ofset, expected only frame, offset',
+            lambda d: d['joints']['nose'].update(shift=1),
+            'joint "nose": shift, expected only frame, offset',
         ),
         (lambda d: d.update(base='T8'), "base: 'T8', expected a mapping with origin, offset"),
         (lambda d: d['base'].update(origin='neck'), 'base: origin, expected only frame, offset'),
