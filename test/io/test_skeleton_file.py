@@ -40,6 +40,7 @@ def test_a_ready_made_skeleton_has_both_sides_alike(name):
             mirrored[1] = mirrored[1, ::-1]
             np.testing.assert_array_equal(part.margins, mirrored)
             assert [joint.replace('left', 'right') for joint in part.joints] == [*other.joints]
+            np.testing.assert_array_equal(part.rest * [1, -1, 1], other.rest)
     for joint in skeleton.joints:
         if joint.offset is not None and joint.name.startswith('left '):
             (other,) = (
