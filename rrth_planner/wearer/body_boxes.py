@@ -183,7 +183,7 @@ def _axes(spans: Array, order: Indices, signs: Array) -> tuple[Array, NDArray[np
     width = np.sqrt(np.einsum('ij,ij->i', v, v))
     v = np.divide(v, np.maximum(width, CLOSEST)[:, None], out=found[:, 1])
     u, v = u.T, v.T
-    # The product of both, written out: `np.cross` takes as long as all the rest.
+    # Their product, written out: `np.cross` takes several times as long.
     found[:, 2, 0] = signs * (u[1] * v[2] - u[2] * v[1])
     found[:, 2, 1] = signs * (u[2] * v[0] - u[0] * v[2])
     found[:, 2, 2] = signs * (u[0] * v[1] - u[1] * v[0])
