@@ -4,6 +4,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
+import os
 from pathlib import Path
 import sys
 import time
@@ -105,7 +106,7 @@ def soak_person(
 
     with (
         ros_client(lambda: PeopleClient(folder)) as client,
-        ChildProcess(PLANNER, ARGUMENTS, listen) as one,
+        ChildProcess(PLANNER, [*ARGUMENTS, *os.environ.get('EXTRA', '').split()], listen) as one,
         ChildProcess(PLAYBACK, [], lambda _: None) as other,
         ChildProcess(
             WEARER, [*([] if file is None else [str(file)]), *options], lambda _: None
