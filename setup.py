@@ -19,7 +19,9 @@ from setuptools import find_packages, setup
 ROOT = os.path.dirname(os.path.realpath(__file__))
 # What is beside the code, by folder.
 FILES = {
-    'config': ['*.yaml', '*.xml', 'examples/*', 'maps/*.yaml', 'people/*'],
+    'config': [
+        *('*.yaml', '*.xml', 'examples/*', 'maps/*.yaml', 'people/*', 'skeletons/*.yaml'),
+    ],
     'msg_examples': ['*.yaml'],
     'rviz': ['*.rviz'],
     'urdf': ['*.urdf'],

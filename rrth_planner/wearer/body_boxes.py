@@ -7,25 +7,30 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.wearer.posture import Posture
-from rrth_planner.wearer.skeleton import AXES, BASE, Direction, FrameBase, JointBase, Skeleton
+from rrth_planner.wearer.skeleton import (
+    AXES,
+    BASE,
+    Direction,
+    FrameBase,
+    JointBase,
+    LONGEST,
+    Skeleton,
+)
 
 Indices = NDArray[np.intp]
 
+# Of `Box.numbers`, (15,).
+CENTER, SIZE, ROTATION = slice(0, 3), slice(3, 6), slice(6, 15)
 # A point further from the tracker's origin is lost [m].
 FARTHEST_POINT = 1e3
 # Joints closer than this say no direction: a tracker has mixed them up [m].
 CLOSEST = 0.01
 # No joint of an adult is further from the next one: more than the longest thigh [m].
 LONGEST_BONE = 0.5
-# How a limb hangs that is turned least, and its left: of all directions, those that are opposite,
-# up and back, are the least common, and close to them its box may turn round the limb suddenly.
-HANGING = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
-LEFT = np.array([0.0, 1.0, 0.0])
 # The axes in which a box is kept whose own are unknown.
 BASE_AXES = (Direction('up', BASE, 'up'), Direction('left', BASE, 'left'))
 
@@ -52,6 +57,8 @@ class _Layout:
     part_joints: Indices
     ends: Indices
     is_limb: NDArray[np.bool_]
+    rests: Array
+    rest_sides: Array
     order: Indices
     signs: Array
     margins: Array
@@ -117,32 +124,21 @@ def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
     return T
 
 
-def jumped(before: Posture, after: Posture, most: float) -> tuple[str, ...]:
-    """
-    Return the points that moved by more than a distance [m] between two postures of a tracker.
-
-    Points that are lost, or missing, in either of them are none.
-    """
-    both = [name for name in after.names if name in before.names]
-    here, there = ([p.names.index(name) for name in both] for p in (after, before))
-    moves = np.linalg.norm(after.positions[here] - before.positions[there], axis=1)
-    return tuple(name for name, move in zip(both, moves, strict=True) if move > most)
-
-
 def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
     """Return the joints of a posture, (n, 3), NaN where lost."""
     layout = _layout(skeleton, posture.names)
     points = np.empty((len(posture.names) + 1, 3))
     points[:-1] = posture.positions
     points[-1] = np.nan
+    points[~(np.abs(points) <= FARTHEST_POINT)] = np.nan
     joints: Array = (points[layout.points] * layout.weights).sum(axis=1)
     if layout.offset_joints.size:
         if posture.rotations is None or not posture.names:
             joints[layout.offset_joints] = np.nan
         else:
             turned = posture.rotations[layout.offset_points] @ layout.offsets
+            turned[~(np.abs(turned) <= LONGEST * 2)] = np.nan
             joints[layout.offset_joints] += turned[:, :, 0]
-    joints[~(np.abs(joints) <= FARTHEST_POINT)] = np.nan
     return layout, joints
 
 
@@ -176,21 +172,23 @@ def _axes(spans: Array, order: Indices, signs: Array) -> tuple[Array, NDArray[np
     """
     Return unit axes, a row each, (m, 3, 3), of two directions, (m, 2, 3), and whether they are.
 
-    `order` says which of the first, the second and their product is each axis, `signs` which way
-    the product points.
+    `order` says which row of all (first, second, product) is each axis, `signs` which way the
+    products point.
     """
     first, second = spans[:, 0], spans[:, 1]
-    length = np.sqrt((first * first).sum(axis=1))
-    u = first / np.maximum(length, CLOSEST)[:, None]
-    v = second - (second * u).sum(axis=1)[:, None] * u
-    width = np.sqrt((v * v).sum(axis=1))
-    v /= np.maximum(width, CLOSEST)[:, None]
-    w = (u[:, _NEXT] * v[:, _LAST] - u[:, _LAST] * v[:, _NEXT]) * signs[:, None]
-    rows = np.stack((u, v, w), axis=1)[np.arange(len(order))[:, None], order]
+    length = np.sqrt(np.einsum('ij,ij->i', first, first))
+    found = np.empty((len(spans), 3, 3))
+    u = np.divide(first, np.maximum(length, CLOSEST)[:, None], out=found[:, 0])
+    v = second - np.einsum('ij,ij->i', second, u)[:, None] * u
+    width = np.sqrt(np.einsum('ij,ij->i', v, v))
+    v = np.divide(v, np.maximum(width, CLOSEST)[:, None], out=found[:, 1])
+    u, v = u.T, v.T
+    # Their product, written out: `np.cross` takes several times as long.
+    found[:, 2, 0] = signs * (u[1] * v[2] - u[2] * v[1])
+    found[:, 2, 1] = signs * (u[2] * v[0] - u[0] * v[2])
+    found[:, 2, 2] = signs * (u[0] * v[1] - u[1] * v[0])
+    rows = found.reshape(-1, 3)[order]
     return rows, (length >= CLOSEST) & (width >= CLOSEST)
-
-
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 
 
 def _rows(layout: _Layout, joints: Array) -> Array:
@@ -198,9 +196,11 @@ def _rows(layout: _Layout, joints: Array) -> Array:
     spans = joints[layout.ends[:, :, 1]] - joints[layout.ends[:, :, 0]]
     limbs = spans[layout.is_limb, 0]
     along = limbs / np.maximum(np.sqrt((limbs * limbs).sum(axis=1)), CLOSEST)[:, None]
-    # The left of a limb, turned from hanging the shortest way.
-    share = (along @ LEFT) / np.maximum(1.0 + along @ HANGING, 1e-12)
-    spans[layout.is_limb, 1] = LEFT - share[:, None] * (HANGING + along)
+    # A side of each limb, turned with it from its rest the shortest way.
+    rests, sides = layout.rests, layout.rest_sides
+    near = 1.0 + np.einsum('ij,ij->i', along, rests)
+    share = np.einsum('ij,ij->i', along, sides) / np.maximum(near, 1e-12)
+    spans[layout.is_limb, 1] = sides - share[:, None] * (rests + along)
     axes, is_clear = _axes(spans, layout.order, layout.signs)
     margins = layout.margins
     surrounded = joints[layout.part_joints]
@@ -213,10 +213,10 @@ def _rows(layout: _Layout, joints: Array) -> Array:
     inside = np.matmul(surrounded, axes.transpose(0, 2, 1))
     lower = inside.min(axis=1) - margins[:, :, 0]
     upper = inside.max(axis=1) + margins[:, :, 1]
-    rows = np.empty((len(axes), NUMBERS))
-    rows[:, :SIZE] = np.matmul(0.5 * (lower + upper)[:, None], axes)[:, 0]
-    rows[:, SIZE:ROTATION] = upper - lower
-    rows[:, ROTATION:] = axes.transpose(0, 2, 1).reshape(-1, 9)
+    rows = np.empty((len(axes), ROTATION.stop))
+    rows[:, CENTER] = np.matmul(0.5 * (lower + upper)[:, None], axes)[:, 0]
+    rows[:, SIZE] = upper - lower
+    rows[:, ROTATION] = axes.transpose(0, 2, 1).reshape(-1, 9)
     return rows
 
 
@@ -232,15 +232,20 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
     for weight, joint in zip(weights, skeleton.joints, strict=True):
         weight[: len(joint.points)] = 1.0 / len(joint.points)
     # Frames that are missing have no place: their joints are lost by their positions.
-    with_offset = [k for k, joint in enumerate(skeleton.joints) if joint.offset is not None]
+    placed = [(k, j.offset) for k, j in enumerate(skeleton.joints) if j.offset is not None]
+    with_offset = [k for k, _ in placed]
     offset_points = points[with_offset, 0] if with_offset else np.zeros(0, dtype=np.intp)
-    offsets = [skeleton.axes @ skeleton.joints[k].offset for k in with_offset]
+    offsets = [skeleton.axes @ offset for _, offset in placed]
     base = skeleton.base
     base_axes = base.axes if isinstance(base, JointBase) else BASE_AXES
     base_order, base_signs = _ordered([base_axes])
     kinds = [part.axes or BASE_AXES for part in skeleton.parts]
     order, signs = _ordered(kinds)
     ends = [[[row[d.start], row[d.end]] for d in (*axes, axes[0])[:2]] for axes in kinds]
+    limbs = [part for part, axes in zip(skeleton.parts, kinds, strict=True) if len(axes) == 1]
+    rests = np.array([part.rest / np.linalg.norm(part.rest) for part in limbs]).reshape(-1, 3)
+    # Any side will do, as long as it is always the same.
+    sides = [np.cross(rest, np.eye(3)[np.abs(rest).argmin()]) for rest in rests]
     margins = np.array([part.margins for part in skeleton.parts])
     return _Layout(
         points=points,
@@ -256,6 +261,8 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
         part_joints=_padded([[row[name] for name in part.joints] for part in skeleton.parts]),
         ends=np.array(ends),
         is_limb=np.array([len(axes) == 1 for axes in kinds]),
+        rests=rests,
+        rest_sides=np.array([side / np.linalg.norm(side) for side in sides]).reshape(-1, 3),
         order=order,
         signs=signs,
         margins=margins,
@@ -272,13 +279,14 @@ def _padded(lists: list[list[int]]) -> Indices:
 
 def _ordered(kinds: list[tuple[Direction, ...]]) -> tuple[Indices, Array]:
     """Return, for `_axes`, which direction is which axis, and the sign of the third one."""
-    order, signs = [], []
+    order: list[list[int]] = []
+    signs = []
     for axes in kinds:
         first = AXES.index(axes[0].axis)
         # The second axis of a limb is its left, or its top where it lies along its left.
         second = AXES.index(axes[1].axis) if len(axes) == 2 else (first - 1) % 3
         third = 3 - first - second
         found = {first: 0, second: 1, third: 2}
-        order.append([found[k] for k in range(3)])
+        order.append([3 * len(order) + found[k] for k in range(3)])
         signs.append(1.0 if (second - first) % 3 == 1 else -1.0)
     return np.array(order), np.array(signs)

@@ -19,6 +19,7 @@ from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.motion_file import read_motion, write_motion
 from rrth_planner.io.person_file import write_person
 from rrth_planner.io.settings import load_settings
+from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.text_file import load_yaml, parse_yaml, to_yaml
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arrays import FARTHEST
@@ -81,6 +82,7 @@ def recording(folder, suffix):
 
 
 BODIES = ('config/body.yaml', 'msg_examples/body.yaml', 'msg_examples/body_bad.yaml')
+SKELETONS = ('config/skeletons/xsens.yaml', 'config/skeletons/azure_kinect.yaml')
 # What reads a file, the end of its name, and files that it reads.
 READERS = {
     'arm': (load_arm, '.yaml', lambda _: shipped('config/arm.yaml')),
@@ -88,6 +90,7 @@ READERS = {
     'body': (load_body, '.yaml', lambda _: shipped('config/body.yaml')),
     'wearer': (load_body, '.yaml', lambda _: shipped(*BODIES)),
     'settings': (lambda p: load_settings(4, p), '.yaml', lambda _: shipped('config/planner.yaml')),
+    'skeleton': (load_skeleton, '.yaml', lambda _: shipped(*SKELETONS)),
     'incident': (read_incident, '.yaml', lambda _: [incident_text().encode()]),
     'motion': (read_motion, '.yaml', lambda folder: motion(folder, '.yaml')),
     'table': (read_motion, '.csv', lambda folder: motion(folder, '.csv')),

@@ -33,6 +33,7 @@ from rrth_planner.io.resources import resource_path
 here = Path(rrth.__file__).parent
 assert here.parent == Path({folder!r}), here
 names = ('config/arm.yaml', 'config/maps/spiral.yaml', 'config/examples/chest_arm.urdf')
+names = (*names, 'config/human.yaml', 'config/skeletons/xsens.yaml')
 for name in (*names, 'msg_examples/body.yaml', 'urdf/arm.urdf', 'rviz/rrth_planner.rviz'):
     assert resource_path(name) == here / name
 assert rrth.load_settings(rrth.load_arm().dof) and rrth.load_body()
