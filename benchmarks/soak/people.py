@@ -27,7 +27,7 @@ from benchmarks.soak.monitor import ARGUMENTS, PLANNER, PLAYBACK
 
 WEARER = 'rrth_planner.cli.wearer'
 # Targets low in front of the wearer, where his hands work: lower and upper corner [m].
-LOW_IN_FRONT = np.array([[0.5, -0.6, -0.8], [1.5, 0.6, -0.1]])
+LOW_IN_FRONT = np.array([[0.8, -0.6, -0.6], [1.6, 0.6, 0.0]])
 # An arm that aims this near to its target has arrived [m]; a request has so long for that [s].
 AIMS, PATIENCE = 0.02, 6.0
 # A slower arm is at rest [rad/s].

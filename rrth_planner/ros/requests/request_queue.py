@@ -35,8 +35,8 @@ from trajectory_msgs.msg import JointTrajectory
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 # An arm may come to rest so much later than its commanded stop [s].
 LONGEST_SETTLING = 1.0
-# A request whose motion became invalid is planned again after this time [s].
-AGAIN = 0.005
+# A request that the wearer was in the way of is planned again after this time [s].
+AGAIN = 0.01
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -225,7 +225,7 @@ class PlanQueue:
         settle_published: Callable[[PlanOutcome], None],
     ) -> PlanOutcome:
         """
-        Return the outcome of a request, planned again while the wearer moves into its motions.
+        Return the outcome of a request, planned again while a wearer who moves is in its way.
 
         After `time_limit` the last outcome stands.
         """
@@ -267,7 +267,10 @@ class PlanQueue:
                 goal,
                 running,
             )
-            if not outcome.may_change or ticket.is_cancelled or time.monotonic() >= end:
+            may_change = outcome.is_outdated or (
+                outcome.is_in_the_way and self._inputs.is_wearer_moving()
+            )
+            if not may_change or ticket.is_cancelled or time.monotonic() >= end:
                 return outcome
             time.sleep(AGAIN)
 
