@@ -44,7 +44,7 @@ class PlanOutcome:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the same request may be solved now: wearer or arm have moved, or the arm does."""
+        """Whether wearer or arm have moved meanwhile, or the arm still moves."""
         if self.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
             return True
         is_start = self.code in (

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+import math
 import time
 import traceback
 
@@ -37,6 +38,8 @@ PERIOD, SHORTEST_SHOW = 0.05, 0.2
 LONGEST_SETTLING = 1.0
 # A request that the wearer was in the way of is planned again after this time [s].
 AGAIN = 0.01
+# After a stop the same goal is tried for so long, so often [s].
+PATIENCE, RESUME_PERIOD = 5.0, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -76,11 +79,15 @@ class _Resumption:
 
     ticket: _Ticket
     goal: PointingGoal
+    # Numbers of motions and requests until then.
     n_motions: int
+    n_requests: int
     # When the stop ends [s], and until when to wait for the rest by the monotonic clock, since a
-    # simulated one may stand still.
+    # simulated one may stand still; and until when to try again while the wearer is in the way.
     stopped: float
     latest: float
+    end: float
+    is_first: bool = True
 
     def is_due(self, joints: JointReading | None) -> bool:
         """Return whether the arm rests by a reading after the end of its stop, or time is up."""
@@ -124,6 +131,7 @@ class PlanQueue:
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
+        self._n_requests = 0
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
@@ -131,6 +139,7 @@ class PlanQueue:
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
         future, ticket = Future(), _Ticket()
+        self._n_requests += 1
         begin = time.perf_counter()
 
         def work() -> None:
@@ -188,11 +197,14 @@ class PlanQueue:
         begin: float,
         ticket: _Ticket,
         settle: Callable[[Response], None],
-    ) -> None:
+        patience: float | None = None,
+    ) -> bool:
         """
         Plan, publish and settle a request; called in the worker's thread.
 
         The request is settled as soon as its motion is published, in the node's own thread.
+        patience: how long to plan again while the wearer moves [s]; None: `time_limit`. Return
+        whether the wearer is in the way of it, or has moved.
         """
         parameters = self._reporter.parameters
 
@@ -200,9 +212,9 @@ class PlanQueue:
             settle(self._response(outcome, parameters, begin))
 
         try:
-            outcome = self._plan(goal, ticket, parameters, settle_published)
+            outcome = self._plan(goal, ticket, parameters, settle_published, patience)
             if outcome.trajectory is not None:
-                return
+                return False
             if ticket.is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
                 outcome = replace(outcome, code=CANCELLED[0], sentence=CANCELLED[1])
         except Exception as problem:
@@ -216,6 +228,7 @@ class PlanQueue:
             outcome = replace(outcome, sentence=outcome.sentence + noted)
             self._reporter.incident(file)
         settle(self._response(outcome, parameters, begin))
+        return outcome.is_outdated or outcome.is_in_the_way
 
     def _plan(
         self,
@@ -223,13 +236,15 @@ class PlanQueue:
         ticket: _Ticket,
         parameters: PlannerParameters,
         settle_published: Callable[[PlanOutcome], None],
+        patience: float | None,
     ) -> PlanOutcome:
         """
         Return the outcome of a request, planned again while a wearer who moves is in its way.
 
-        After `time_limit` the last outcome stands.
+        After a time [s], or `time_limit`, the last outcome stands.
         """
-        monitor, end = self._monitor, time.monotonic() + parameters.options.time_limit
+        longest = parameters.options.time_limit if patience is None else patience
+        monitor, end = self._monitor, time.monotonic() + longest
         while True:
             n_stops, running = monitor.n_stops, monitor.running
 
@@ -360,19 +375,25 @@ class PlanQueue:
                     _Ticket(),
                     stop.goal,
                     stop.n_motions,
+                    self._n_requests,
                     self._now() + duration,
                     time.monotonic() + duration + LONGEST_SETTLING,
+                    time.monotonic() + duration + PATIENCE,
                 )
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
         if resumption is None:
             return
-        if resumption.n_motions != self._monitor.n_motions:
-            # A motion that was requested since then has priority.
+        if self._is_overtaken(resumption):
             self._discard_resumption()
         elif resumption.is_due(self._inputs.joints.value):
             self._resumption = None
             self.prepare(partial(self._resume, resumption))
+
+    def _is_overtaken(self, resumption: _Resumption) -> bool:
+        """Return whether something else was requested or commanded since its stop."""
+        before = resumption.n_motions, resumption.n_requests
+        return before != (self._monitor.n_motions, self._n_requests)
 
     def _discard_resumption(self) -> None:
         if self._resumption is not None:
@@ -382,16 +403,23 @@ class PlanQueue:
     def _resume(self, resumption: _Resumption) -> None:
         """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
         ticket = resumption.ticket
-        if ticket.is_cancelled or resumption.n_motions != self._monitor.n_motions:
+        if ticket.is_cancelled or self._is_overtaken(resumption):
             self._open.discard(ticket)
             return
         responses: list[Response] = []
-        self._work(resumption.goal, time.perf_counter(), ticket, responses.append)
-        self._open.discard(ticket)
+        begin, present = time.perf_counter(), time.monotonic()
+        is_blocked = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
         response = responses[-1]
-        response.conclude()
-        if not response.is_solved:
+        if response.is_solved or resumption.is_first:
+            response.conclude()
+        if not response.is_solved and resumption.is_first:
             self._monitor.hold(response.text)
+        if is_blocked and present < resumption.end:
+            self._resumption = replace(
+                resumption, stopped=math.inf, latest=present + RESUME_PERIOD, is_first=False
+            )
+        else:
+            self._open.discard(ticket)
 
     def _check_stop(self, stop: Stop) -> None:
         """Have the second checker check a stop that was published as proven free."""
