@@ -1,16 +1,17 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Part three of the soak: recorded people wear the arm while it is asked for one target after another."""
+"""Part three of the soak: recorded people wear the arm, which is asked for target after target."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-import os
 from pathlib import Path
 import sys
 import time
 
 import numpy as np
 from rclpy.serialization import deserialize_message
+from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel, pointing_error
 from rrth_planner.model.scene import Scene
@@ -32,8 +33,10 @@ LOW_IN_FRONT = np.array([[0.8, -0.6, -0.6], [1.6, 0.6, 0.0]])
 AIMS, PATIENCE = 0.02, 6.0
 # A slower arm is at rest [rad/s].
 REST = 1e-3
-# A tracker publishes so often [1/s].
-FPS = 60
+# A tracker publishes so often [1/s]; recordings begin with a T-pose of so long [s].
+FPS, T_POSE = 60, 0.1
+# The recording of the package is played at these rates.
+RATES = (1.0, 1.5)
 
 
 @dataclass(slots=True)
@@ -78,6 +81,17 @@ class PersonRecord:
     is_interrupted: bool = False
 
 
+def soak_people(recordings: Sequence[Path], seconds: float, folder: Path) -> list[PersonRecord]:
+    """Return what was seen of an arm on the person of the package, and on recorded ones."""
+    cases = [(None, rate) for rate in RATES] + [(file, 1.0) for file in recordings]
+    records: list[PersonRecord] = []
+    for seed, (file, rate) in enumerate(cases):
+        records.append(soak_person(file, rate, seconds, folder, seed))
+        if records[-1].is_interrupted:
+            break
+    return records
+
+
 class PeopleClient(SoakClient):
     """A client that also keeps what the tracker publishes."""
 
@@ -89,15 +103,15 @@ class PeopleClient(SoakClient):
 
 
 def soak_person(
-    file: Path | None, rate: float, seconds: float, folder: Path, begin: float = 0.0, seed: int = 1
+    file: Path | None, rate: float, seconds: float, folder: Path, seed: int = 1
 ) -> PersonRecord:
     """
     Return what was seen of an arm on a recorded person for a time [s].
 
-    file: the recording; None for that of the package. rate: how fast it is played, to and fro,
-    from a time `begin` on [s].
+    file: the recording; None for that of the package. rate: how fast it is played, to and fro.
     """
     record = PersonRecord('construction work' if file is None else file.stem, rate)
+    begin = 0.0 if file is None else T_POSE
     options = ['--rate', f'{rate:g}', '--fps', f'{FPS}', '--begin', f'{begin:g}']
     options += ['--skeleton', 'tum_bvh' if file is not None and 'tum' in file.stem else 'cmu_bvh']
 
@@ -106,7 +120,7 @@ def soak_person(
 
     with (
         ros_client(lambda: PeopleClient(folder)) as client,
-        ChildProcess(PLANNER, [*ARGUMENTS, *os.environ.get('EXTRA', '').split()], listen) as one,
+        ChildProcess(PLANNER, ARGUMENTS, listen) as one,
         ChildProcess(PLAYBACK, [], lambda _: None) as other,
         ChildProcess(
             WEARER, [*([] if file is None else [str(file)]), *options], lambda _: None
@@ -191,42 +205,6 @@ def _judge(record: PersonRecord, client: PeopleClient) -> None:
 
 def _crossed(arm: ArmModel, scene: Scene, q: np.ndarray) -> tuple[str, bool]:
     """Return what is in contact with a bar of the arm, and whether its ray crosses a box."""
-    from rrth_planner.collision.reference_checker import first_contact
-
     found = first_contact(arm, scene, q, 0.0, 0.0)
     bars = '' if found is None else f'bar {found.bar} and box "{found.box}"'
     return bars, first_contact(arm, scene, q, RAY, 0.0) is not None
-
-
-def main() -> None:
-    """Soak."""
-    import tempfile
-
-    files = [Path(name) for name in sys.argv[3:]]
-    total = Counter()
-    seconds = requests = aimed = ray = contacts = brakes = 0
-    for k, file in enumerate(files):
-        with tempfile.TemporaryDirectory() as folder:
-            r = soak_person(
-                file, float(sys.argv[1]), float(sys.argv[2]), Path(folder), 0.1, seed=k
-            )
-        print(
-            r.name,
-            f'{r.n_aimed} of {r.n_requests} aimed; contacts {r.n_contacts}; ray {r.ray_seconds:.2f} s; stops {len(r.brakes)}; {dict(r.answers)}',
-            r.contacts[:5],
-            flush=True,
-        )
-        total += r.answers
-        seconds += r.seconds
-        requests += r.n_requests
-        aimed += r.n_aimed
-        ray += r.ray_seconds
-        contacts += r.n_contacts
-        brakes += len(r.brakes)
-    print(
-        f'ALL {seconds:.0f} s: {aimed} of {requests} aimed ({100 * aimed / requests:.1f} %), contacts {contacts}, ray {ray:.2f} s, stops {brakes}, {dict(total)}'
-    )
-
-
-if __name__ == '__main__':
-    main()

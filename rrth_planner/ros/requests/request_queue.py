@@ -391,9 +391,9 @@ class PlanQueue:
             self.prepare(partial(self._resume, resumption))
 
     def _is_overtaken(self, resumption: _Resumption) -> bool:
-        """Return whether something else was requested or commanded since its stop."""
-        before = resumption.n_motions, resumption.n_requests
-        return before != (self._monitor.n_motions, self._n_requests)
+        """Return whether one was commanded since its stop, or requested since its first try."""
+        is_requested = resumption.n_requests != self._n_requests and not resumption.is_first
+        return is_requested or resumption.n_motions != self._monitor.n_motions
 
     def _discard_resumption(self) -> None:
         if self._resumption is not None:
@@ -408,6 +408,7 @@ class PlanQueue:
             return
         responses: list[Response] = []
         begin, present = time.perf_counter(), time.monotonic()
+        n_requests = resumption.n_requests if not resumption.is_first else self._n_requests
         is_blocked = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
         response = responses[-1]
         if response.is_solved or resumption.is_first:
@@ -416,7 +417,11 @@ class PlanQueue:
             self._monitor.hold(response.text)
         if is_blocked and present < resumption.end:
             self._resumption = replace(
-                resumption, stopped=math.inf, latest=present + RESUME_PERIOD, is_first=False
+                resumption,
+                n_requests=n_requests,
+                stopped=math.inf,
+                latest=present + RESUME_PERIOD,
+                is_first=False,
             )
         else:
             self._open.discard(ticket)
