@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 import sys
 import time
+from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
@@ -134,7 +135,7 @@ def soak_person(
         except KeyboardInterrupt:
             record.is_interrupted = True
     client.close()
-    _judge(record, client)
+    judge_person(record, client.bodies, client.states)
     return record
 
 
@@ -175,11 +176,18 @@ def _ask(
         record.seconds = time.monotonic() - begin
 
 
-def _judge(record: PersonRecord, client: PeopleClient) -> None:
-    """Judge the arm at each of its states by the body as it was recorded then."""
+def judge_person(
+    record: PersonRecord, bodies: Sequence[bytes], states: Sequence[tuple[int, Any, Any]]
+) -> None:
+    """
+    Count contacts and crossings of the ray at each state of the arm, by the body of that time.
+
+    bodies: serialized MarkerArrays, with stamps. states: when each was sent [ns], positions and
+    velocities.
+    """
     arm, body = load_arm(), WearerBody()
     scenes: list[tuple[int, Scene]] = []
-    for data in client.bodies:
+    for data in bodies:
         msg = deserialize_message(data, MarkerArray)
         stamp = nanoseconds_of(msg.markers[-1].header.stamp)
         body = body.apply(msg, stamp / NANOSECONDS, FRAME)
@@ -187,7 +195,7 @@ def _judge(record: PersonRecord, client: PeopleClient) -> None:
     scenes.sort(key=lambda item: item[0])
     stamps = np.array([stamp for stamp, _ in scenes])
     was_in, before = False, None
-    for sent, q, v in client.states:
+    for sent, q, v in states:
         k = int(np.searchsorted(stamps, sent)) - 1
         is_moving = max(map(abs, v)) >= REST
         if k < 0 or not is_moving:
