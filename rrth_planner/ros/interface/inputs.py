@@ -112,10 +112,7 @@ class InputSnapshot:
 
     def is_moving(self, now: float) -> bool:
         """Return whether the arm moves at a time [s]."""
-        joints = self.joints
-        return now <= joints.velocities_expire and not bool(
-            (np.abs(joints.velocities) <= REST_SPEED).all()
-        )
+        return self.joints.is_moving(now)
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
@@ -228,7 +225,7 @@ class Inputs:
         """
         body = self.body_at(now, parameters)
         goal = self._goal() if goal is None else goal
-        return InputSnapshot(scene_of(body), goal, self._joints_at(now, parameters.joint_timeout))
+        return InputSnapshot(scene_of(body), goal, self.joints_at(now, parameters.joint_timeout))
 
     def body_at(
         self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0
@@ -272,10 +269,11 @@ class Inputs:
 
     def require_fresh(self, now: float, parameters: PlannerParameters) -> WearerBody:
         """Return the present body [s] for a motion in progress; raise RequestError if stale."""
-        self._joints_at(now, parameters.joint_timeout)
+        self.joints_at(now, parameters.joint_timeout)
         return self.body_at(now, parameters, parameters.keep_lost)
 
-    def _joints_at(self, now: float, timeout: float) -> JointReading:
+    def joints_at(self, now: float, timeout: float) -> JointReading:
+        """Return the present joint positions [s], or raise RequestError where there are none."""
         rejection = self.joint_rejection
         if rejection is not None:
             # Earlier positions say nothing about the present ones.

@@ -16,6 +16,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import REST_SPEED, Trajectory
 from rrth_planner.pipeline.planning_process import Planner
@@ -23,6 +24,7 @@ from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import PlanReport, Reporter
+from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
@@ -38,6 +40,8 @@ PERIOD, SHORTEST_SHOW = 0.05, 0.2
 LONGEST_SETTLING = 1.0
 # A request that the wearer was in the way of is planned again after this time [s].
 AGAIN = 0.01
+# A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
+RAY_PATIENCE = 1.0
 # After a stop the same goal is tried for so long, so often [s].
 PATIENCE, RESUME_PERIOD = 5.0, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
@@ -245,6 +249,7 @@ class PlanQueue:
         """
         longest = parameters.options.time_limit if patience is None else patience
         monitor, end = self._monitor, time.monotonic() + longest
+        self._await_clear_ray(parameters, ticket)
         while True:
             n_stops, running = monitor.n_stops, monitor.running
 
@@ -288,6 +293,35 @@ class PlanQueue:
             if not may_change or ticket.is_cancelled or time.monotonic() >= end:
                 return outcome
             time.sleep(AGAIN)
+
+    def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
+        """
+        Let a wearer who moves take a hand out of the pointing ray of an arm at rest.
+
+        Whatever the arm did, its ray would sweep over the hand first.
+        """
+        end = time.monotonic() + RAY_PATIENCE
+        while (
+            self._is_ray_crossed(parameters)
+            and self._inputs.is_wearer_moving()
+            and time.monotonic() < end
+            and not ticket.is_cancelled
+        ):
+            time.sleep(AGAIN)
+
+    def _is_ray_crossed(self, parameters: PlannerParameters) -> bool:
+        """Return whether the arm rests, clear of the wearer but for its pointing ray."""
+        now, arm = self._now(), parameters.arm
+        try:
+            joints = self._inputs.joints_at(now, parameters.joint_timeout)
+            scene = scene_of(self._inputs.body_at(now, parameters))
+        except RequestError:
+            return False
+        if joints.is_moving(now):
+            return False
+        q, margin, length = joints.positions, parameters.margin, parameters.ray_guard_length
+        is_free = is_place_free(q, arm, scene, margin, length)
+        return not is_free and is_place_free(q, arm, scene, margin, 0.0)
 
     def _response(
         self, outcome: PlanOutcome, parameters: PlannerParameters, begin: float
