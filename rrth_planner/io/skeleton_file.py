@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence, text
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml, naming_file
-from rrth_planner.model.arrays import Array
+from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import SceneError, shown
 from rrth_planner.wearer.skeleton import (
     AXES,
@@ -19,6 +19,7 @@ from rrth_planner.wearer.skeleton import (
     Joint,
     JointBase,
     Part,
+    REST,
     Skeleton,
 )
 
@@ -131,7 +132,7 @@ def _parts(given: Mapping[str, Any], human: Mapping[str, Any]) -> tuple[Part, ..
     for name, entry in changed.items():
         label = f'part "{name}"'
         # Not even a part that is new there may have unknown entries.
-        entries = mapping(entry, label, (), SceneError, (*LIMB, *BLOCK, 'axes'))
+        entries = mapping(entry, label, (), SceneError, (*LIMB, *BLOCK, 'axes', 'rest'))
         # One that says what it is round is another part by the same name.
         is_new = 'bone' in entries or 'around' in entries
         merged[name] = entries if is_new else {**merged.get(name, {}), **entries}
@@ -139,21 +140,25 @@ def _parts(given: Mapping[str, Any], human: Mapping[str, Any]) -> tuple[Part, ..
 
 
 def _part(name: str, data: Any) -> Part:
+    """Return a limb, or a part that a box surrounds."""
     label = f'part "{name}"'
     if isinstance(data, Mapping) and 'bone' in data:
-        limb = mapping(data, label, LIMB, SceneError)
-        start, end = _pair(limb['bone'], f'{label}: bone')
-        radius = number(limb['radius'], f'{label}: radius', 'm', SceneError)
-        ends = sequence(limb['ends'], f'{label}: ends', SceneError)
-        margins = [[radius, radius], [radius, radius], ends]
-        return Part(name, (start, end), margins, (Direction('up', start, end),))  # type: ignore[arg-type]
-    block = mapping(data, label, BLOCK, SceneError, ('axes',))
-    sides = [
-        [number(block[side], f'{label}: {side}', 'm', SceneError) for side in pair]
-        for pair in SIDES
-    ]
-    axes = _directions(block['axes'], label) if 'axes' in block else ()
-    return Part(name, _names(block['around'], f'{label}: around'), np.array(sides), axes)
+        entries = mapping(data, label, LIMB, SceneError, ('rest',))
+        start, end = _pair(entries['bone'], f'{label}: bone')
+        radius = number(entries['radius'], f'{label}: radius', 'm', SceneError)
+        ends = frozen_array(entries['ends'], (2,), f'{label}: ends', 'm', SceneError)
+        margins = np.array([[radius, radius], [radius, radius], ends])
+        joints: tuple[str, ...] = (start, end)
+        axes: tuple[Direction, ...] = (Direction('up', start, end),)
+    else:
+        entries = mapping(data, label, BLOCK, SceneError, ('axes', 'rest'))
+        sides = [
+            [number(entries[side], f'{label}: {side}', 'm', SceneError) for side in pair]
+            for pair in SIDES
+        ]
+        joints, margins = _names(entries['around'], f'{label}: around'), np.array(sides)
+        axes = _directions(entries['axes'], label) if 'axes' in entries else ()
+    return Part(name, joints, margins, axes, entries.get('rest', REST))
 
 
 def _directions(data: Any, label: str) -> tuple[Direction, ...]:

@@ -31,10 +31,6 @@ FARTHEST_POINT = 1e3
 CLOSEST = 0.01
 # No joint of an adult is further from the next one: more than the longest thigh [m].
 LONGEST_BONE = 0.5
-# How a limb hangs that is turned least, and its left: of all directions, those that are opposite,
-# up and back, are the least common, and close to them its box may turn round the limb suddenly.
-HANGING = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
-LEFT = np.array([0.0, 1.0, 0.0])
 # The axes in which a box is kept whose own are unknown.
 BASE_AXES = (Direction('up', BASE, 'up'), Direction('left', BASE, 'left'))
 
@@ -61,6 +57,8 @@ class _Layout:
     part_joints: Indices
     ends: Indices
     is_limb: NDArray[np.bool_]
+    rests: Array
+    rest_sides: Array
     order: Indices
     signs: Array
     margins: Array
@@ -126,18 +124,6 @@ def base_pose(skeleton: Skeleton, posture: Posture) -> Array:
     return T
 
 
-def jumped(before: Posture, after: Posture, most: float) -> tuple[str, ...]:
-    """
-    Return the points that moved by more than a distance [m] between two postures of a tracker.
-
-    Points that are lost, or missing, in either of them are none.
-    """
-    both = [name for name in after.names if name in before.names]
-    here, there = ([p.names.index(name) for name in both] for p in (after, before))
-    moves = np.linalg.norm(after.positions[here] - before.positions[there], axis=1)
-    return tuple(name for name, move in zip(both, moves, strict=True) if move > most)
-
-
 def _joints(skeleton: Skeleton, posture: Posture) -> tuple[_Layout, Array]:
     """Return the joints of a posture, (n, 3), NaN where lost."""
     layout = _layout(skeleton, posture.names)
@@ -197,7 +183,7 @@ def _axes(spans: Array, order: Indices, signs: Array) -> tuple[Array, NDArray[np
     width = np.sqrt(np.einsum('ij,ij->i', v, v))
     v = np.divide(v, np.maximum(width, CLOSEST)[:, None], out=found[:, 1])
     u, v = u.T, v.T
-    # The product of both, written out: `np.cross` takes as long as all the rest.
+    # Their product, written out: `np.cross` takes several times as long.
     found[:, 2, 0] = signs * (u[1] * v[2] - u[2] * v[1])
     found[:, 2, 1] = signs * (u[2] * v[0] - u[0] * v[2])
     found[:, 2, 2] = signs * (u[0] * v[1] - u[1] * v[0])
@@ -210,9 +196,11 @@ def _rows(layout: _Layout, joints: Array) -> Array:
     spans = joints[layout.ends[:, :, 1]] - joints[layout.ends[:, :, 0]]
     limbs = spans[layout.is_limb, 0]
     along = limbs / np.maximum(np.sqrt((limbs * limbs).sum(axis=1)), CLOSEST)[:, None]
-    # The left of a limb, turned from hanging the shortest way.
-    share = (along @ LEFT) / np.maximum(1.0 + along @ HANGING, 1e-12)
-    spans[layout.is_limb, 1] = LEFT - share[:, None] * (HANGING + along)
+    # A side of each limb, turned with it from its rest the shortest way.
+    rests, sides = layout.rests, layout.rest_sides
+    near = 1.0 + np.einsum('ij,ij->i', along, rests)
+    share = np.einsum('ij,ij->i', along, sides) / np.maximum(near, 1e-12)
+    spans[layout.is_limb, 1] = sides - share[:, None] * (rests + along)
     axes, is_clear = _axes(spans, layout.order, layout.signs)
     margins = layout.margins
     surrounded = joints[layout.part_joints]
@@ -254,6 +242,10 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
     kinds = [part.axes or BASE_AXES for part in skeleton.parts]
     order, signs = _ordered(kinds)
     ends = [[[row[d.start], row[d.end]] for d in (*axes, axes[0])[:2]] for axes in kinds]
+    limbs = [part for part, axes in zip(skeleton.parts, kinds, strict=True) if len(axes) == 1]
+    rests = np.array([part.rest / np.linalg.norm(part.rest) for part in limbs]).reshape(-1, 3)
+    # Any side will do, as long as it is always the same.
+    sides = [np.cross(rest, np.eye(3)[np.abs(rest).argmin()]) for rest in rests]
     margins = np.array([part.margins for part in skeleton.parts])
     return _Layout(
         points=points,
@@ -269,6 +261,8 @@ def _layout(skeleton: Skeleton, names: tuple[str, ...]) -> _Layout:
         part_joints=_padded([[row[name] for name in part.joints] for part in skeleton.parts]),
         ends=np.array(ends),
         is_limb=np.array([len(axes) == 1 for axes in kinds]),
+        rests=rests,
+        rest_sides=np.array([side / np.linalg.norm(side) for side in sides]).reshape(-1, 3),
         order=order,
         signs=signs,
         margins=margins,

@@ -4,7 +4,7 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
@@ -14,8 +14,13 @@ from rrth_planner.model.errors import printable, SceneError, shown
 AXES = ('forward', 'left', 'up')
 # The joint that every skeleton has: the origin of the base frame. No joint is called like an axis.
 BASE = 'base'
+# Shorter directions are none.
+SHORTEST = 1e-6
 # Axes of a frame are perpendicular up to this.
 ORTHOGONAL = 1e-6
+# Where a limb points whose box is turned least, unless its part says so: forward and down. No
+# leg points the opposite way.
+REST = (1.0, 0.0, -1.0)
 # Nothing on a wearer is longer [m].
 LONGEST = 5.0
 
@@ -102,11 +107,15 @@ class Part:
         None: the box keeps the axes of the base frame. One: that is an axis of the box, which is
         turned round it the shortest way: for limbs that are as wide as deep. Two: the first is an
         axis of the box, the second another one once it is made perpendicular.
+    rest : array_like, shape (3,)
+        The direction in the base frame from which a box with one direction is turned. Where a
+        limb passes the opposite direction, its box turns round it suddenly, so no limb should.
 
     Raises
     ------
     SceneError
-        No joint, more directions, two of the same axis, or margins that leave no box.
+        No joint, more directions, two of the same axis, margins that leave no box, a rest of no
+        length.
 
     """
 
@@ -114,6 +123,7 @@ class Part:
     joints: tuple[str, ...]
     margins: Array
     axes: tuple[Direction, ...] = ()
+    rest: Array = field(default_factory=lambda: np.array(REST))
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -127,6 +137,9 @@ class Part:
                 'each pair > 0 [m]'
             )
         _check_axes(self.axes, label)
+        _freeze(self, 'rest', (3,), f'{label}: rest', '-')
+        if np.linalg.norm(self.rest) < SHORTEST:
+            raise SceneError(f'{label}: rest {self.rest.tolist()}, expected a direction [-]')
 
 
 @dataclass(frozen=True, slots=True, eq=False)

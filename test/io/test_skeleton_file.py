@@ -40,6 +40,7 @@ def test_a_ready_made_skeleton_has_both_sides_alike(name):
             mirrored[1] = mirrored[1, ::-1]
             np.testing.assert_array_equal(part.margins, mirrored)
             assert [joint.replace('left', 'right') for joint in part.joints] == [*other.joints]
+            np.testing.assert_array_equal(part.rest * [1, -1, 1], other.rest)
     for joint in skeleton.joints:
         if joint.offset is not None and joint.name.startswith('left '):
             (other,) = (
@@ -126,8 +127,8 @@ def drop(*keys):
             r'joint "nose": offset: .*expected numbers of shape \(3\) \[m\]',
         ),
         (
-            lambda d: d['joints']['nose'].update(ofset=1),
-            'joint "nose": ofset, expected only frame, offset',
+            lambda d: d['joints']['nose'].update(shift=1),
+            'joint "nose": shift, expected only frame, offset',
         ),
         (lambda d: d.update(base='T8'), "base: 'T8', expected a mapping with origin, offset"),
         (lambda d: d['base'].update(origin='neck'), 'base: origin, expected only frame, offset'),

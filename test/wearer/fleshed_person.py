@@ -121,7 +121,7 @@ def trunk(person, rng, size):
     ellipsoid(person, rng, 'torso', 'base', [0.0, 0.0, 0.06], [0.15, 0.175, 0.19])
     for _, sign in SIDES:
         ellipsoid(person, rng, 'torso', 'base', [0.09, 0.08 * sign, 0.06], [0.075] * 3)
-    ellipsoid(person, rng, 'pelvis', 'pelvis', [-0.01, 0.0, 0.02], [0.155, 0.22, 0.15])
+    ellipsoid(person, rng, 'pelvis', 'pelvis', [-0.01, 0.0, 0.02], [0.155, 0.23, 0.15])
     ellipsoid(person, rng, 'pelvis', 'lumbar', [0.02, 0.0, 0.05], [0.18, 0.185, 0.13])
     ends = person.at('neck', [0.03, 0.0, 0.0]), person.at('head', [0.01, 0.0, 0.0])
     round_cone(person, rng, 'neck', ends, (0.07, 0.07))

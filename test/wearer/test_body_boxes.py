@@ -14,7 +14,7 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Box
-from rrth_planner.wearer.body_boxes import base_pose, body_boxes, jumped
+from rrth_planner.wearer.body_boxes import base_pose, body_boxes
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import Direction, FrameBase, Joint, JointBase, Part, Skeleton
 from worlds import examples
@@ -333,12 +333,3 @@ def test_an_offset_is_in_the_axes_of_the_wearer_and_a_mean_between_its_points():
     hand, pelvis = body_boxes(skeleton, posture)[0].boxes
     np.testing.assert_allclose(hand.center, [0.1, 0.02, -0.03], atol=1e-12)
     np.testing.assert_allclose(pelvis.center, (R @ axes).T @ [0.0, 0.4, 1.3], atol=1e-12)
-
-
-def test_points_that_jumped_are_named():
-    before = Posture(names=('a', 'b', 'c', 'd'), positions=np.zeros((4, 3)))
-    moved = np.array([[0.0, 0.0, 0.31], [0.2, 0.2, 0.0], [np.nan] * 3, [5.0, 0.0, 0.0]])
-    after = Posture(names=('c', 'a', 'b', 'new'), positions=moved)
-    assert jumped(before, after, 0.3) == ('c',)
-    assert jumped(before, after, 0.28) == ('c', 'a')
-    assert jumped(after, before, 0.3) == ('c',)

@@ -42,6 +42,7 @@ def test_a_skeleton_is_a_value_that_nobody_changes():
         (lambda: Part('arm', ('a',), 0 * MARGINS), 'part "arm": margins .*one of each pair > 0'),
         (lambda: Part('arm', ('a',), [0.1]), r'part "arm": margins: shape \(1,\), expected'),
         (lambda: Part('arm', ('a',), MARGINS, (UP, UP)), 'part "arm": axes up, up, expected'),
+        (lambda: Part('arm', ('a',), MARGINS, (UP,), [0, 0, 0]), 'part "arm": rest .*a direction'),
         (lambda: FrameBase('chest', [0, np.nan, 0]), r'base: offset: .*finite numbers \[m\]'),
         (lambda: JointBase('a', [0, 0, 0], (UP,)), 'base: 1 axes, expected two'),
         (lambda: skeleton((A, B, A)), 'joint "a": given twice'),
