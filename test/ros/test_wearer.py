@@ -20,11 +20,8 @@ from rrth_planner.io.motion_capture_file import load_person  # noqa: E402
 from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.ros.client.person_publisher import FORMS, PersonPublisher  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.tracked_person import (  # noqa: E402
-    boxes_to_msg,
-    points_to_msg,
-    poses_to_msg,
-)
+from rrth_planner.ros.messages.part_markers import PartMarkers  # noqa: E402
+from rrth_planner.ros.messages.tracked_person import points_to_msg, poses_to_msg  # noqa: E402
 from rrth_planner.wearer.body_boxes import body_boxes  # noqa: E402
 from rrth_planner.wearer.posture import Posture  # noqa: E402
 from rrth_planner.wearer.recorded_person import posture_at  # noqa: E402
@@ -57,6 +54,11 @@ def wearer(*arguments):
 def seconds(stamp):
     """Return a stamp of a message [s]."""
     return stamp.sec + 1e-9 * stamp.nanosec
+
+
+def part_markers(skeleton):
+    """Return what makes markers of the parts of a skeleton."""
+    return PartMarkers([part.name for part in skeleton.parts], 0.5)
 
 
 def posture_of(names=('a', 'b'), lost=False):
@@ -96,7 +98,7 @@ def test_what_is_published_is_what_was_measured_at_its_stamp(form, spinning, wai
             return None
         stamp = headers[0].stamp
         if form == 'boxes':
-            return boxes_to_msg(body_boxes(skeleton, posture)[0], skeleton, 'torso', stamp)
+            return part_markers(skeleton).message(body_boxes(skeleton, posture)[0], 'torso', stamp)
         if form == 'markers':
             return points_to_msg(posture, skeleton, 'tracker', stamp)
         return poses_to_msg(posture, 'tracker', stamp)
@@ -120,14 +122,14 @@ def test_the_boxes_are_a_wearer_for_the_planner():
     for time_s in (0.0, 1.7, 5.2):
         scene, missing = body_boxes(skeleton, posture_at(person, time_s))
         assert not missing
-        msg = boxes_to_msg(scene, skeleton, 'torso', PoseArray().header.stamp)
+        msg = part_markers(skeleton).message(scene, 'torso', PoseArray().header.stamp)
         body = body.apply(msg, 10.0 + time_s, 'torso')
         found = scene_of(body)
         assert [box.name for box in found.boxes] == [box.name for box in scene.boxes]
         np.testing.assert_allclose(found.numbers, scene.numbers, atol=1e-9)
     # Each marker ends by itself.
     assert not body.at(20.0).parts
-    assert set(body.at(20.0).expired_names.split(', ')) == {f'"{b.name}"' for b in scene.boxes}
+    assert set(body.at(20.0).lost_names().split(', ')) == {f'"{b.name}"' for b in scene.boxes}
 
 
 def test_a_part_that_is_lost_keeps_its_id_and_is_left_out():
@@ -139,8 +141,8 @@ def test_a_part_that_is_lost_keeps_its_id_and_is_left_out():
     ids = []
     for posture in (seen, lost):
         scene, missing = body_boxes(skeleton, posture)
-        msg = boxes_to_msg(scene, skeleton, 'torso', PoseArray().header.stamp)
-        ids.append({m.text: m.id for m in msg.markers})
+        msg = part_markers(skeleton).message(scene, 'torso', PoseArray().header.stamp)
+        ids.append({m.text: (m.ns, m.id) for m in msg.markers})
         assert all(m.action == Marker.ADD and m.type == Marker.CUBE for m in msg.markers)
         assert all(seconds(m.lifetime) == 0.5 for m in msg.markers)
     assert missing
@@ -158,7 +160,7 @@ def test_points_have_the_ids_of_the_skeleton_and_lost_ones_are_left_out():
         assert marker.pose.position.y == 3.0 * k + 1.0
     # Where a skeleton has none, they are counted.
     other = points_to_msg(
-        posture_of(), load_skeleton('cmu_bvh'), 'tracker', PoseArray().header.stamp
+        posture_of(), load_skeleton('tum_bvh'), 'tracker', PoseArray().header.stamp
     )
     assert [m.id for m in other.markers] == [0, 1]
 
