@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo: planner and playback nodes, targets, a moving wearer; checked and drawn."""
+"""The demo: planner and playback nodes, targets, a person at work; checked and drawn."""
 
 import argparse
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ import sys
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
+import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.cli import ros_parsers
@@ -26,17 +27,21 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.client.planner_client import DemoClient, DemoError
 from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
+from rrth_planner.ros.messages.joint_state import configuration_from_msg
 from rrth_planner.ros.messages.message_file import message_from_file
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from rrth_planner.visualization.motion_figure import Motion, motion_figure
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 POINTING_TOLERANCE = 1e-3
 DOTS_PER_INCH = 110
-# The wearer raises an arm during the motion to the last of these targets, so long after its start
-# [s]. Up to 1.1 s the arm can still stop before it.
-RAISED, RAISED_TARGETS, RAISED_AFTER = 'body_arm_raised', ('left', 'low'), 0.4
+# Beside these seconds of a person at work the arm points at these targets; at other times he bends
+# forward so fast that his head would meet an arm that stands still.
+PERSON, PERSON_TARGETS = ('--begin', '1.2', '--end', '5.2'), ('low', 'front')
+# So many bodies are received before the first request.
+FIRST_BODIES = 30
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -95,8 +100,11 @@ def _run(options: argparse.Namespace) -> None:
         client.publish(body)
         lines, figure = _visit(client, settings, frame, body, targets)
         figure.savefig(options.output, dpi=DOTS_PER_INCH)
-        avoided = _raise_arm(client, settings, frame)
-    print('\n' + '\n'.join([HEADER, *lines, avoided]))
+        print('The wearer is now a person at work, as he was recorded.', flush=True)
+        child = ChildProcess('rrth_planner.cli.wearer', PERSON, partial(_show, 'wearer'))
+        children.append(stack.enter_context(child))
+        beside = _beside_a_person(client, settings, frame, body)
+    print('\n' + '\n'.join([HEADER, *lines, *beside]))
     print(f'\nEvery motion passed an independent collision check. Picture: {options.output}')
 
 
@@ -152,29 +160,63 @@ def _checked_error(client: DemoClient, name: str, target: Array) -> float:
     return error
 
 
-def _raise_arm(client: DemoClient, settings: PlanSettings, frame: str) -> str:
-    """Have the wearer raise an arm across a running motion; return the result in a sentence."""
-    raised = _example(RAISED, MarkerArray)
-    scene = scene_of(WearerBody().apply(raised, 0.0, frame))
-    for name in RAISED_TARGETS:
-        message = _example(f'target_{name}', PointStamped)
-        client.publish(message)
-        trajectory, _ = client.ask_for_motion()
-        if name != RAISED_TARGETS[-1]:
-            client.wait_for_arrival(trajectory)
-    print('The wearer raises an arm during the motion.', flush=True)
-    q = client.raise_arm(raised, trajectory.positions[0], RAISED_AFTER)
-    contact = first_contact(client.arm, scene, q, settings.ray_guard_length, 0.0)
-    if contact is not None:
-        raise DemoError(
-            f'bar {contact.bar} of the arm was in contact with {contact.box} after it was raised'
-        )
-    clearance = least_clearance(client.arm, scene, q, settings.ray_guard_length)
-    error = _checked_error(client, name, goal_from_msg(message, frame).target)
-    return (
-        f'{name:10} the wearer raised an arm during the motion: the arm stopped, avoided it with '
-        f'{clearance:.3f} m clearance, and its ray misses the target by {1e3 * error:.3f} mm'
+def _beside_a_person(
+    client: DemoClient, settings: PlanSettings, frame: str, before: MarkerArray
+) -> list[str]:
+    """Point beside a person at work who replaces the wearer before; return a line per target."""
+    client.wait_for(
+        lambda: client.count_publishers('body_boxes') > 1, 'the publisher of the person at work'
     )
+    client.publish(_without(before))
+    client.see_bodies()
+    client.wait_for(lambda: len(client.bodies) >= FIRST_BODIES, 'body_boxes of the person at work')
+    lines = []
+    for name in PERSON_TARGETS:
+        message = _example(f'target_{name}', PointStamped)
+        target = goal_from_msg(message, frame).target
+        client.publish(message)
+        client.observed = []
+        n_stops = client.point(partial(_aims_at, client, target))
+        clearance, n_bodies = _clearance_beside(client, settings, frame)
+        error = _checked_error(client, name, target)
+        lines.append(
+            f'{name:10} beside a person at work: {n_stops} stops, {clearance:.3f} m clearance at '
+            f'every instant from {n_bodies} bodies, and the ray misses the target by '
+            f'{1e3 * error:.3f} mm'
+        )
+    return lines
+
+
+def _aims_at(client: DemoClient, target: Array, q: Array) -> bool:
+    return pointing_error(client.arm, q, target) <= POINTING_TOLERANCE
+
+
+def _without(body: MarkerArray) -> MarkerArray:
+    """Return the array that deletes the boxes of another one, and nothing else."""
+    markers = [m for m in body.markers if m.action == Marker.ADD]
+    return MarkerArray(markers=[Marker(ns=m.ns, id=m.id, action=Marker.DELETE) for m in markers])
+
+
+def _clearance_beside(client: DemoClient, settings: PlanSettings, frame: str) -> tuple[float, int]:
+    """
+    Return the least clearance of all observed states, and from how many bodies.
+
+    Each is checked against the boxes of the newest body that was measured until then. Raises
+    DemoError where the arm or its ray was in contact with one.
+    """
+    arm, length = client.arm, settings.ray_guard_length
+    measured = np.array([seconds_of(msg.markers[0].header.stamp) for msg in client.bodies])
+    taken = np.array([seconds_of(msg.header.stamp) for msg in client.observed])
+    q = np.array([configuration_from_msg(msg, arm.joint_names) for msg in client.observed])
+    newest = np.searchsorted(measured, taken, side='right') - 1
+    clearances = []
+    for k in np.unique(newest):
+        scene = scene_of(WearerBody().apply(client.bodies[max(k, 0)], 0.0, frame))
+        contact = first_contact(arm, scene, q[newest == k], length, 0.0)
+        if contact is not None:
+            raise DemoError(f'bar {contact.bar} of the arm was in contact with {contact.box}')
+        clearances.append(least_clearance(arm, scene, q[newest == k], length))
+    return min(clearances), len(clearances)
 
 
 def _show(name: str, line: str) -> None:

@@ -62,6 +62,7 @@ def question_of(
         ray_guard_length=settings.ray_guard_length,
         seed=seed,
         escape_depth=settings.escape_depth,
+        reserve=settings.reserve,
     )
 
 

@@ -175,7 +175,9 @@ def wearer() -> argparse.ArgumentParser:
 
 def demo() -> argparse.ArgumentParser:
     """Return the parser of all arguments."""
-    command = command_parser('demo', 'Plan and play motions around a wearer, check and draw them.')
+    command = command_parser(
+        'demo', 'Plan and play motions around a wearer and a recorded person; check and draw them.'
+    )
     add = command.add_argument
     add('--output', type=Path, default=Path('demo.png'), help='picture file (%(default)s)')
     add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')

@@ -66,7 +66,7 @@ COMMANDS = {
         'ros,tools',
     ),
     'demo': Command(
-        'run both nodes with a moving wearer; check and draw the motions',
+        'run both nodes beside a person at work; check and draw the motions',
         'cli.demo',
         (ROS, 'matplotlib'),
         'ros',

@@ -91,7 +91,7 @@ def compare_checkers(
         reference=reference_checker.least_clearance(arm, scene, q_end[None], reach),
     )
     return MotionComparison(
-        is_proven=is_proven_free(world, trajectory, reach, escape_time),
+        is_proven=is_proven_free(world, trajectory, margin, reach, escape_time),
         violation=violation_seen(
             arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
         ),

@@ -9,6 +9,7 @@ from itertools import islice, pairwise
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel, bar_ends, forward_kinematics
@@ -204,22 +205,45 @@ def first_escape_violation(
     """
     Return the first violation of a motion that escapes from boxes, or None.
 
-    depths (m,): penetration depth at the start in each box, grown by the margin: by how much that
-    would have to shrink on every side for the arm to be clear [m]. No motion may exceed it; < 0:
-    clear. escape_time: when the escape ends; 0: there is none [s]. All else as for
-    `first_violation`.
+    depths (2, m): penetration depths at the start in each box, grown by the margin, of the bars
+    without the pointing ray and of the ray: by how much the box would have to shrink on every
+    side for them to be clear [m]; < 0: clear. No motion may exceed them, except in a box that the
+    ray is in itself, without the margin: that counts for the other bars alone. escape_time: when
+    the escape ends; 0: there is none [s]. All else as for `first_violation`.
     """
     if escape_time == 0.0:
         return None
-    boxes, kept = [], margin - np.maximum(depths, 0.0)
-    for box, by in zip(scene.boxes, kept.tolist(), strict=True):
-        size = box.size + 2.0 * (by - APART)
-        if not (size > 0.0).all():
-            return Violation(0.0, by, 'the arm', box.name)
-        boxes.append(Box(box.name, box.center, size, box.rotation))
     escape = part_of(trajectory, 0.0, escape_time)
-    violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray_guard_length, 0.0)
-    if violation is None:
-        return None
-    by = max(by for box, by in zip(boxes, kept.tolist(), strict=True) if box.name == violation.box)
-    return replace(violation, distance=violation.distance - APART + by)
+    is_void = _entered(arm, scene, trajectory.positions[0], ray_guard_length)
+    violations = []
+    for ray, depth in ((0.0, depths[0]), (ray_guard_length, depths.max(axis=0))):
+        boxes: list[Box] = []
+        kept: dict[str, float] = {}
+        for i, by in enumerate((margin - np.maximum(depth, 0.0)).tolist()):
+            box = scene.boxes[i]
+            if is_void[i] and ray > 0.0:
+                continue
+            size = box.size + 2.0 * (by - APART)
+            if not (size > 0.0).all():
+                return Violation(0.0, by, 'the arm', box.name)
+            boxes.append(Box(box.name, box.center, size, box.rotation))
+            kept[box.name] = max(by, kept.get(box.name, by))
+        violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray, 0.0)
+        if violation is not None:
+            distance = violation.distance - APART + kept[violation.box]
+            violations.append(replace(violation, distance=distance))
+    return min(violations, key=lambda violation: violation.time, default=None)
+
+
+def _entered(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> NDArray[np.bool_]:
+    """Return which boxes the pointing ray is in at q, shape (dof,)."""
+    # As in the separating axes, its radius grows the boxes.
+    radius = float(arm.radii[-1])
+    grown = [
+        Box(box.name, box.center, box.size + 2.0 * radius, box.rotation) for box in scene.boxes
+    ]
+    distances = np.full(len(grown), -math.inf)
+    ray = Bar(arm, len(bar_ends(arm)) - 1, ray_length)
+    ray.nearest(boxes_of(Scene(tuple(grown))), distances, q, forward_kinematics(arm, q))
+    found: NDArray[np.bool_] = distances <= DOUBT
+    return found

@@ -6,8 +6,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.world import World
+from rrth_planner.collision.world import without_ray, World
 from rrth_planner.kernels.collision.bar_box import depths
 from rrth_planner.kernels.layout import BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
@@ -41,53 +42,106 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
     return found if np.ndim(q) == 2 else found[0]
 
 
-def relaxed(world: World, by: Array) -> World | None:
-    """Return the world with boxes shrunk on every side, (m,) [m]; None where one vanishes."""
+def escape_depths(world: World, q: Array) -> Array:
+    """
+    Return the penetration depths in the grown boxes of the bars, the greatest, and of the ray.
+
+    The bars are those without the pointing ray, but with its beginning, the tool. (2, m) [m], as
+    `box_depths`; q (n, dof) or (dof,): of n configurations the result is (n, 2, m) [rad].
+    """
+    every = np.atleast_2d(q)
+    bars = box_depths(world, every, np.zeros(len(every))).max(axis=1)
+    found = np.stack([bars, box_depths(world, every)[:, -1]], axis=1)
+    return found if np.ndim(q) == 2 else found[0]
+
+
+def relaxed(world: World, by: Array) -> World:
+    """Return the world with its boxes shrunk on every side by (m,) [m]; some may vanish."""
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES).copy()
-    lanes = np.asarray(world.lanes, np.int64)
+    rows, lanes = _places(world)
     # The groups above bound the larger boxes, hence the smaller ones too.
-    rows = (len(obstacles) - 1) // LANES + lanes // LANES
-    for side in range(BOX_HALF, BOX_ROWS):
-        obstacles[rows, side, lanes % LANES] -= by
-        if (obstacles[rows, side, lanes % LANES] <= 0.0).any():
-            return None
+    halves = obstacles[rows, BOX_HALF:, lanes] - by[:, None]
+    is_left = (halves > 0.0).all(axis=1, keepdims=True)
+    obstacles[rows, BOX_HALF:, lanes] = np.where(is_left, halves, -np.inf)
     return replace(world, obstacles=obstacles.reshape(world.obstacles.shape))
 
 
-def leads_out(trajectory: Trajectory, world: World, end: float, begin: float = 0.0) -> bool:
+def _places(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return in which group of the obstacles, and in which of its lanes, each box is."""
+    lanes = np.asarray(world.lanes, np.int64)
+    return (len(world.obstacles) - 1) // LANES + lanes // LANES, lanes % LANES
+
+
+def half_widths(world: World) -> Array:
+    """Return by how much each grown box may shrink until it vanishes, (m,) [m]."""
+    rows, lanes = _places(world)
+    obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES)
+    halves: Array = obstacles[rows, BOX_HALF:, lanes].min(axis=1)
+    return halves
+
+
+def leads_out(
+    trajectory: Trajectory, world: World, margin: float, end: float, begin: float = 0.0
+) -> bool:
     """
     Return whether a motion is proven to escape from the boxes that the arm is in.
 
     The time is cut into intervals; from one to the next the penetration depth may increase in no
-    box. Within an interval the motion is proven free of the boxes shrunk by the depth at its
-    start; a box that the arm is not in, or has left, is not shrunk. At the end the arm is clear.
-    So the arm enters no other box, and nowhere gets deeper by more than `GAP` than at the start
-    of the interval.
+    box, neither that of the bars nor that of the pointing ray. Within an interval both are proven
+    free of the boxes shrunk by their depth at its start; a box that they are not in, or have left,
+    is not shrunk. At the end both are clear of all boxes. So the arm enters no other box, and
+    nowhere gets deeper by more than `GAP` than at the start of the interval.
 
-    The world has its boxes grown by the whole margin; end: when the arm has to be clear, begin:
+    The ray has no body: where it is deeper than the margin, and therefore in the wearer already,
+    that box does not count for it.
+
+    The world has its boxes grown by the margin [m]; end: when the arm has to be clear, begin:
     start of the part that is checked [s].
     """
     times = np.linspace(min(max(begin, 0.0), end), end, INTERVALS + 1)
-    deep = box_depths(world, positions_at(trajectory, times)).max(axis=1, initial=-np.inf)
+    deep = escape_depths(world, positions_at(trajectory, times))
     if deep.size == 0:
         return True
-    is_in = deep[0] > -GAP
-    if (deep[-1] > 0.0).any():
+    allowed = np.where(deep[0] > -GAP, _allowed_depths(deep), 0.0)
+    # The grown box vanishes where it does not count for the ray.
+    allowed[:, 1] = np.where(deep[:, 1] > margin, half_widths(world), allowed[:, 1])
+    of_bars, of_arm = allowed[:, 0], allowed.max(axis=1)
+    if (
+        (deep[-1] > 0.0).any()
+        or (np.diff(allowed, axis=0) > 0.0).any()
+        or (of_bars >= half_widths(world)).any()
+    ):
         return False
-    allowed = np.where(is_in, np.maximum(deep + GAP, 0.0), 0.0)
-    if (np.diff(allowed, axis=0) > 0.0).any():
-        return False
-    for by, (start, stop) in zip(allowed, pairwise(times.tolist()), strict=False):
+    bars = without_ray(world)
+    for i, (start, stop) in enumerate(pairwise(times.tolist())):
         if stop <= start:
             continue
-        smaller = relaxed(world, by)
-        if smaller is None:
-            return False
         # Once the arm is clear of all boxes, the remaining time is one interval.
-        is_out = not by.any()
+        is_out = not of_arm[i].any()
         part = part_of(trajectory, 0.0, end if is_out else stop)
-        if not certify(part, smaller, start).is_proven:
+        if not certify(part, relaxed(world, of_arm[i]), start).is_proven:
+            return False
+        if (of_bars[i] < of_arm[i]).any() and not certify(
+            part, relaxed(bars, of_bars[i]), start
+        ).is_proven:
             return False
         if is_out:
             break
     return True
+
+
+def gets_no_deeper(trajectory: Trajectory, world: World, begin: float) -> bool:
+    """
+    Return whether a motion is proven to get no deeper into any box than it is at a time [s].
+
+    Nor into the wearer with the ray: only where that is so deep that a box shrunk by its depth
+    vanishes does the box not count. What has left a box may come back as deep as it was.
+    """
+    deep = escape_depths(world, positions_at(trajectory, [begin])[0]).max(axis=0)
+    return certify(trajectory, relaxed(world, _allowed_depths(deep)), begin).is_proven
+
+
+def _allowed_depths(deep: Array) -> Array:
+    """Return how deep parts may be that are so deep in boxes, of any shape [m]."""
+    allowed: Array = np.where(deep > -GAP, np.maximum(deep + GAP, 0.0), 0.0)
+    return allowed

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.fcl_checker import first_escape_violation, first_violation
-from rrth_planner.collision.penetration import box_depths, leads_out
+from rrth_planner.collision.penetration import escape_depths, leads_out
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
@@ -15,17 +15,17 @@ from rrth_planner.model.trajectory import beyond, Trajectory
 
 
 def is_proven_free(
-    world: World, trajectory: Trajectory, reach: float, escape_time: float = 0.0
+    world: World, trajectory: Trajectory, margin: float, reach: float, escape_time: float = 0.0
 ) -> bool:
     """
     Return whether a motion is certified, and its end with the ray out to the target.
 
-    reach: how far the target is from the tool at the end [m]; escape_time: until then the motion
-    escapes from boxes that the arm was in [s].
+    margin: by which the world's boxes are grown; reach: how far the target is from the tool at the
+    end [m]; escape_time: until then the motion escapes from boxes that the arm was in [s].
     """
     return (
         world.is_valid(trajectory.positions[-1], reach)
-        and (escape_time == 0.0 or leads_out(trajectory, world, escape_time))
+        and (escape_time == 0.0 or leads_out(trajectory, world, margin, escape_time))
         and certify(trajectory, world, escape_time).is_proven
     )
 
@@ -47,7 +47,7 @@ def violation_seen(
     ray = ray_guard_length
     if escape_time > 0.0:
         world = arm_world(arm, scene, margin, ray)
-        depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+        depths = escape_depths(world, trajectory.positions[0])
         violation = first_escape_violation(
             arm, scene, depths, trajectory, escape_time, margin, ray
         )

@@ -181,6 +181,15 @@ def grown(world: World, by: float) -> World:
     return replace(world, obstacles=grown_groups(world.obstacles, by))
 
 
+@functools.lru_cache(maxsize=32)
+def without_ray(world: World) -> World:
+    """Return the same world with an arm whose pointing ray ends where it begins, at the tool."""
+    robot = world.robot.copy()
+    # The reaches stay those of the ray's end, which are upper bounds.
+    robot[-1, layout.D] = 0.0
+    return replace(world, robot=robot)
+
+
 @functools.lru_cache(maxsize=16)
 def arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
     """Return the rows of an arm, and its compiled chain."""

@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
-from rrth_planner.collision.penetration import leads_out
-from rrth_planner.collision.world import arm_rows, arm_world, mount_inverse, RESOLUTION, SLACK
+from rrth_planner.collision.penetration import gets_no_deeper, leads_out
+from rrth_planner.collision.world import (
+    arm_rows,
+    arm_world,
+    mount_inverse,
+    RESOLUTION,
+    SLACK,
+    without_ray,
+)
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.kernels.collision import trajectory_check
 from rrth_planner.model.arm import ArmModel
@@ -83,7 +90,7 @@ def is_remaining_free(
     trajectory, begin = running.trajectory, phase
     if phase < running.escape_time:
         world = arm_world(arm, scene, margin, ray_guard_length)
-        if not leads_out(trajectory, world, running.escape_time, phase):
+        if not leads_out(trajectory, world, margin, running.escape_time, phase):
             return False
         begin = running.escape_time
     if len(trajectory.times) == 1:
@@ -124,10 +131,11 @@ def escapes_by_continuing(
     """
     Return whether the arm violates the margin now, and is proven to escape by continuing.
 
-    Then no clearance decreases below its present value or below the margin, and the motion ends
-    clear of all boxes (`penetration.leads_out`), while a stop would stay in violation. Where the
-    violation lies ahead this is False: a stop, along the same path, is never nearer to it. The
-    parameters are those of `is_remaining_free`.
+    Then the bars escape (`penetration.leads_out`), the pointing ray gets no deeper than now and
+    into no other box (`penetration.gets_no_deeper`), and the motion ends clear of all boxes, while
+    a stop would stay in violation. The ray has no body: one that the wearer puts a hand into does
+    not stop an arm that takes it out again. Where the violation lies ahead this is False: a stop,
+    along the same path, is never nearer to it. The parameters are those of `is_remaining_free`.
     """
     trajectory = running.trajectory
     here = positions_at(trajectory, [phase])[0]
@@ -136,8 +144,11 @@ def escapes_by_continuing(
         return False
     world = arm_world(arm, scene, margin, ray_guard_length)
     reach = max(ray_guard_length, running.target_distance)
-    is_end_free = world.is_valid(trajectory.positions[-1], reach)
-    return is_end_free and leads_out(trajectory, world, trajectory.duration, phase)
+    return (
+        world.is_valid(trajectory.positions[-1], reach)
+        and leads_out(trajectory, without_ray(world), margin, trajectory.duration, phase)
+        and gets_no_deeper(trajectory, world, phase)
+    )
 
 
 def is_place_free(

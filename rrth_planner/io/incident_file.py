@@ -27,7 +27,7 @@ from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 # Version of the record's layout; others are rejected.
-FORMAT = 2
+FORMAT = 3
 MOST_FILES = 100
 PATTERN = 'incident-*.yaml'
 HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'

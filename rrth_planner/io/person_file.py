@@ -39,7 +39,7 @@ def write_person(person: RecordedPerson, path: Path, comments: Sequence[str] = (
         if rotations is not None and not np.isnan(rotations).all():
             names += [f'{name} {part}' for part in ROTATION]
             columns += list(np.array([_quaternion(r) for r in rotations]).T)
-            formats += ['%.5f'] * len(ROTATION)
+            formats += ['%.4f'] * len(ROTATION)
     text = io.StringIO()
     text.writelines(f'# {" ".join(line.split())}\n' for line in comments)
     writer = csv.writer(text, lineterminator='\n')

@@ -17,7 +17,7 @@ from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 LIMIT_UNITS = {'max_velocity': 'rad/s', 'max_acceleration': 'rad/s^2', 'max_jerk': 'rad/s^3'}
-LENGTHS = ('margin', 'ray_guard_length', 'escape_depth')
+LENGTHS = ('margin', 'ray_guard_length', 'escape_depth', 'reserve')
 LOWEST_LIMIT, HIGHEST_LIMIT = 1e-3, 1e6
 
 
@@ -29,6 +29,7 @@ class PlanSettings:
     margin: float
     ray_guard_length: float
     escape_depth: float
+    reserve: float
     limits: MotionLimits
     options: TreeOptions
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.collision.penetration import box_depths, leads_out
+from rrth_planner.collision.penetration import box_depths, GAP, half_widths, INTERVALS, leads_out
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
@@ -31,14 +31,14 @@ STEP = 1e-6
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Escape:
     """
-    A straight motion out of boxes grown by the margin.
+    A straight motion of bars and pointing ray out of boxes grown by the margin.
 
     Parameters
     ----------
     trajectory : Trajectory
         From rest at the start to rest clear of the boxes.
     sentence : str
-        The boxes, and the penetration depths at the start.
+        The boxes that bars and ray are in at the start, and how deep the bars are.
 
     """
 
@@ -80,48 +80,70 @@ def plan_escape(
 
     """
     escape_depth, limits = question.escape_depth, question.limits
+    of_bars = box_depths(world, q_start[None], np.zeros(1))[0]
     depths = box_depths(world, q_start)
-    sentence = depth_sentence(world, depths, question.margin)
-    if not max(0.0, float(depths.max())) < escape_depth:
+    deepest = float(of_bars.max())
+    sentence = depth_sentence(world, of_bars if deepest > 0.0 else depths, question.margin)
+    # The ray has no body: it may be in a box at any depth.
+    if not max(0.0, deepest) < escape_depth:
         return Rejection(
             PlanStatus.START_IN_COLLISION,
             f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
         )
     for spare in spares:
         roomy, rng = grown(world, spare), np.random.default_rng(question.seed)
-        best, longest = None, LONGEST
+        best, least, longest = None, (True, LONGEST), LONGEST
         # The direct solution is mostly the shortest escape.
         for search in (_pushed, _scattered):
             tries = list(search(roomy, q_start, spare, longest, rng, should_stop))
             if should_stop():
                 return CANCELLED
-            for q_end in sorted(tries, key=lambda q: float(np.linalg.norm(q - q_start))):
+            # Preferred are those on which the ray gets nowhere deeper within the wearer either.
+            keys = [(_rises(world, q_start, q), float(np.linalg.norm(q - q_start))) for q in tries]
+            for i in sorted(range(len(tries)), key=keys.__getitem__):
                 if should_stop():
                     return CANCELLED
-                trajectory = parameterize(Path(np.stack([q_start, q_end])), (), limits)
-                if leads_out(trajectory, world, trajectory.duration):
-                    best, longest = trajectory, float(np.linalg.norm(q_end - q_start))
+                if best is not None and keys[i] >= least:
+                    break
+                trajectory = parameterize(Path(np.stack([q_start, tries[i]])), (), limits)
+                if leads_out(trajectory, world, question.margin, trajectory.duration):
+                    best, least = trajectory, keys[i]
+                    longest = LONGEST if least[0] else least[1]
                     break
         if best is not None:
-            return Escape(trajectory=best, sentence=_escape_sentence(world, depths, spares[-1]))
+            return Escape(
+                trajectory=best, sentence=_escape_sentence(world, of_bars, depths[-1], spares[-1])
+            )
     return Rejection(
         PlanStatus.START_IN_COLLISION,
         f'{sentence}, and no straight escape is proven free; expected a start clear of the wearer',
     )
 
 
-def _escape_sentence(world: World, depths: Array, hair: float) -> str:
-    """Return the boxes with their penetration depths as a sentence, the deepest first."""
-    parts = []
-    for box in np.argsort(-depths.max(axis=0)).tolist():
-        bar = int(np.argmax(depths[:, box]))
-        if depths[bar, box] > -hair:
-            depth = max(0.0, float(depths[bar, box]))
+def _rises(world: World, q_start: Array, q_end: Array) -> bool:
+    """Return whether the depth of the ray in a box that it is in increases on an edge."""
+    shares = np.linspace(0.0, 1.0, INTERVALS + 1)[:, None]
+    deep = box_depths(world, q_start + shares * (q_end - q_start))[:, -1]
+    # Where the depth is that of the centre it is greatest.
+    deep = np.minimum(deep[:, deep[0] > 0.0], half_widths(world)[deep[0] > 0.0])
+    return bool((np.diff(np.maximum(deep, 0.0), axis=0) > GAP).any())
+
+
+def _escape_sentence(world: World, of_bars: Array, of_ray: Array, hair: float) -> str:
+    """Return the boxes as a sentence, those of the bars with their depths, the deepest first."""
+    parts, names = [], world.box_names
+    for box in np.argsort(-of_bars.max(axis=0)).tolist():
+        bar = int(np.argmax(of_bars[:, box]))
+        depth = float(of_bars[bar, box])
+        if depth > -hair:
             parts.append(
-                f'box "{world.box_names[box]}", penetration depth {depth:.4f} m at '
+                f'from box "{names[box]}", penetration depth {max(0.0, depth):.4f} m at '
                 f'{world.bar_names[bar]}'
             )
-    return f'escape from {" and ".join(parts)}'
+    entered = [f'box "{names[box]}"' for box in np.argsort(-of_ray) if of_ray[box] > -hair]
+    if entered:
+        parts.append(f'of the {world.bar_names[-1]} from {" and ".join(entered)}')
+    return f'escape {" and ".join(parts)}'
 
 
 def _pushed(

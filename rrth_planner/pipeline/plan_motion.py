@@ -57,6 +57,7 @@ def plan_motion(
     should_stop: Callable[[], bool] = lambda: False,
     moving: StartState | None = None,
     escape_depth: float = 0.05,
+    reserve: float = 0.0,
 ) -> MotionPlan:
     """
     Return a certified motion that ends with the tool pointing at the goal.
@@ -84,9 +85,13 @@ def plan_motion(
         state: the arm continues straight ahead, no further than it needs to stop, and blends
         into the path; or, where there is no room for that, it stops along its present motion.
     escape_depth : float
-        An arm at rest with a smaller penetration depth in the boxes grown by the margin escapes
-        first [m]; 0: never. The depth is by how much a box would have to be smaller on every
-        side.
+        An arm at rest whose bars have a smaller penetration depth in the boxes grown by the
+        margin escapes first [m]; 0: never. The depth is by how much a box would have to be
+        smaller on every side; that of the pointing ray, which has no body, may be any.
+
+    reserve : float
+        Clearance beyond the margin that path and goal are planned with where there is room [m]: a
+        wearer who moves by less invalidates nothing.
 
     Raises
     ------
@@ -106,6 +111,7 @@ def plan_motion(
         seed=seed,
         moving=moving,
         escape_depth=escape_depth,
+        reserve=reserve,
     )
     return plan_question(question, should_stop)
 

@@ -24,6 +24,9 @@ from rrth_planner.planning.pointing_goals import (
 # Clearance beyond the margin that the path is planned with, for its blends; in a narrow passage,
 # next to none [m].
 SPARES = (5e-3, 1e-5)
+# Shares of the reserve that are tried before, each with so many samples at most: where there is
+# room, few are needed.
+SHARES, FEW_SAMPLES = (1.0, 0.5, 0.25), 500
 
 
 def find_path(
@@ -52,7 +55,8 @@ def find_path(
     goals: GoalSet | None = None
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
-    for spare in (*SPARES, 0.0):
+    reserves = [share * question.reserve for share in SHARES]
+    for spare in (*(r for r in reserves if r > SPARES[0]), *SPARES, 0.0):
         roomy = grown(world, spare)
         # Without spare clearance only where the start has none: an arm that was in motion.
         if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
@@ -63,11 +67,13 @@ def find_path(
         if len(goals.q_goals) == 0:
             continue
         # Half of the time for the wide search, the rest for the narrow one.
-        share = 0.5 if spare == SPARES[0] else 1.0
+        share = 0.5 if spare >= SPARES[0] else 1.0
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
+        n_most = FEW_SAMPLES if spare > SPARES[0] else options.max_samples
+        limited = replace(options, time_limit=left, max_samples=min(n_most, options.max_samples))
         problem = pointing_problem(arm, goal, roomy, q_start, goals)
         rng = np.random.default_rng(question.seed)
-        result = plan(problem, replace(options, time_limit=left), rng, should_stop)
+        result = plan(problem, limited, rng, should_stop)
         n_samples += result.n_samples
         is_clocked |= result.status is PlanStatus.TIMEOUT
         if result.status in (PlanStatus.SOLVED, PlanStatus.CANCELLED):

@@ -26,7 +26,7 @@ class PlanQuestion:
         From 0 to 1e4 [m].
     seed : int
         >= 0.
-    escape_depth : float
+    escape_depth, reserve : float
         From 0 to 1e4 [m].
 
     Raises
@@ -47,6 +47,7 @@ class PlanQuestion:
     seed: int
     moving: StartState | None = None
     escape_depth: float = 0.05
+    reserve: float = 0.0
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -61,7 +62,7 @@ class PlanQuestion:
         for name, width in widths.items():
             if width != dof:
                 raise OptionsError(f'{name}: of {width} joints, expected those of the arm, {dof}')
-        for name in ('margin', 'ray_guard_length', 'escape_depth'):
+        for name in ('margin', 'ray_guard_length', 'escape_depth', 'reserve'):
             value = getattr(self, name)
             if not 0.0 <= value <= FARTHEST:
                 raise OptionsError(

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wearer who leaned into the arm: it comes out by a short way, and never goes in deeper."""
 
+from collections import Counter
 from dataclasses import replace
 import itertools
 import re
@@ -9,12 +10,18 @@ import re
 from hypothesis import given, strategies
 import numpy as np
 import pytest
-from rrth_planner.collision.penetration import box_depths, leads_out, relaxed
+from rrth_planner.collision.penetration import (
+    box_depths,
+    escape_depths,
+    half_widths,
+    leads_out,
+    relaxed,
+)
 from rrth_planner.collision.reference_checker import bar_box_contact, first_contact
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, grown
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import is_remaining_free
+from rrth_planner.execution.remaining_motion import escapes_by_continuing, is_remaining_free
 from rrth_planner.model.arm import bar_ends
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
@@ -31,6 +38,7 @@ from worlds import (
     limits,
     MARGIN,
     oracle_bars,
+    random_rotation,
     RAY,
     table_1_arm,
     varied_body,
@@ -46,6 +54,10 @@ ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
 OPTIONS = RRTHOptions(club_attempts=0, improve_time=1000.0, time_limit=1000.0, max_samples=3000)
 SEEDS = strategies.integers(0, 2**31)
 FREE = 1.0
+# A hand, a forearm, a head and a torso [m].
+SIZES = (0.2, 0.1, 0.1), (0.3, 0.1, 0.1), (0.26, 0.24, 0.3), (0.3, 0.46, 0.6)
+# Bars of an arm, the pointing ray being the last one.
+ARM, BARS, POINTING = slice(None), slice(-1), slice(-1, None)
 BODIES = [wearer(), *(varied_body(np.random.default_rng(k)) for k in range(5))]
 
 
@@ -65,10 +77,10 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
     )
 
 
-def collides(arm, box, q, growth):
-    """Return at which of the instants q, (n, dof), the reference finds the arm in a grown box."""
-    ends = oracle_bars(arm, q, RAY)
-    radii = [arm.radii[row] for row, _ in bar_ends(arm)]
+def collides(arm, box, q, growth, part=ARM):
+    """Return at which of the instants q, (n, dof), the reference finds a part in a grown box."""
+    ends = oracle_bars(arm, q, RAY)[:, part]
+    radii = [arm.radii[row] for row, _ in bar_ends(arm)][part]
     hits = [
         bar_box_contact(ends[:, k], box.center, box.rotation, 0.5 * box.size + growth + radius)
         for k, radius in enumerate(radii)
@@ -76,31 +88,31 @@ def collides(arm, box, q, growth):
     return np.any(hits, axis=0)
 
 
-def reference_depth(arm, box, q):
+def reference_depth(arm, box, q, part=ARM):
     """Return by how much the grown box would have to be smaller to be clear of q, (dof,) [m]."""
     low, high = -0.5 * box.size.min(), FREE
-    if not collides(arm, box, q[None], high)[0]:
+    if not collides(arm, box, q[None], high, part)[0]:
         return MARGIN - FREE
     for _ in range(48):
         middle = 0.5 * (low + high)
-        if collides(arm, box, q[None], middle)[0]:
+        if collides(arm, box, q[None], middle, part)[0]:
             high = middle
         else:
             low = middle
     return MARGIN - high
 
 
-def leaned(arm, scene, q, rng, depth):
-    """Return the scene with one box pushed into the arm so deep, or None."""
+def leaned(arm, scene, q, rng, depth, part):
+    """Return the scene with one box pushed into a part of the arm so deep, or None."""
     index = int(rng.integers(len(scene.boxes)))
     box = scene.boxes[index]
-    bar = oracle_bars(arm, q[None], RAY)[0, rng.choice([0, -1])]
+    bar = oracle_bars(arm, q[None], RAY)[0, part][rng.choice([0, -1])]
     towards = bar[0] + rng.uniform(0.2, 1.0) * (bar[1] - bar[0]) - box.center
     low, high = 0.0, 1.0
 
     def is_deeper(share):
         pushed = replace(box, center=box.center + share * towards)
-        return collides(arm, pushed, q[None], MARGIN - depth)[0]
+        return collides(arm, pushed, q[None], MARGIN - depth, part)[0]
 
     if is_deeper(low) or not is_deeper(high):
         return None
@@ -126,18 +138,18 @@ def is_shoulder_covered(arm, scene):
     )
 
 
-def leaned_case(seed, low, high):
-    """Return arm, wearer, start and reference depths of the boxes, the deepest within bounds."""
+def leaned_case(seed, low, high, part=ARM):
+    """Return arm, wearer, start and reference depths of a part, the deepest within bounds."""
     rng = np.random.default_rng(seed)
     while True:
         arm = table_1_arm(rng.choice([0.0, 0.02]))
         scene = BODIES[int(rng.integers(len(BODIES)))]
         world = arm_world(arm, scene, MARGIN, RAY)
         q = free_configuration(rng, world)
-        found = leaned(arm, scene, q, rng, rng.uniform(low, high))
+        found = leaned(arm, scene, q, rng, rng.uniform(low, high), part)
         if found is None or is_shoulder_covered(arm, found):
             continue
-        depths = np.array([reference_depth(arm, box, q) for box in found.boxes])
+        depths = np.array([reference_depth(arm, box, q, part) for box in found.boxes])
         if depths.max() < high:
             return arm, found, q, depths
 
@@ -156,9 +168,21 @@ def test_depths_are_those_of_the_reference(seed):
         if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
             assert depth == pytest.approx(expected, abs=1e-7)
     assert world.is_valid(q) == (depths.max() < 0.0)
-    if (smaller := relaxed(world, np.maximum(depths, 0.0) + 1e-7)) is not None:
-        assert smaller.is_valid(q)
+    assert relaxed(world, np.maximum(depths, 0.0) + 1e-7).is_valid(q)
+    if (depths < half_widths(world)).all():
         assert not relaxed(world, np.maximum(depths - 1e-7, -FREE)).is_valid(q)
+    for part, found in zip((BARS, POINTING), escape_depths(world, q), strict=True):
+        for box, depth in zip(scene.boxes, found, strict=True):
+            expected = reference_depth(arm, box, q, part)
+            if MARGIN - FREE < expected < 0.5 * box.size.min() + MARGIN - 1e-6:
+                assert depth == pytest.approx(expected, abs=1e-7)
+
+
+def escape_said(sentence):
+    """Return the boxes that a sentence says the bars are in, the deepest first, and the ray."""
+    escape = re.search(r', escape (.*)', sentence)[1].partition(';')[0]
+    of_bars, _, of_ray = escape.partition('of the pointing ray')
+    return [re.findall(r'box "(\w+)"', part) for part in (of_bars, of_ray)]
 
 
 @examples(50)
@@ -177,13 +201,14 @@ def test_an_arm_that_the_wearer_leaned_into_comes_out_and_stays_out(seed):
     assert np.array_equal(trajectory.positions[0], q_start)
     assert np.array_equal(plan.path.waypoints[0], q_start)
     assert out in trajectory.times
-    deepest = scene.boxes[int(np.argmax(depths))].name
-    said = re.search(
-        r'escape from box "(\w+)", penetration depth (\d\.\d+) m at ([\w ]+)', plan.sentence
-    )
-    assert said[1] == deepest
-    assert float(said[2]) == pytest.approx(depths.max(), abs=1e-3)
-    assert plan.sentence.count('penetration depth') == np.count_nonzero(depths > -1e-5)
+    said = escape_said(plan.sentence)
+    for part, k in ((BARS, 0), (POINTING, 1)):
+        inside = {box.name: reference_depth(arm, box, q_start, part) for box in scene.boxes}
+        assert set(said[k]) == {name for name, depth in inside.items() if depth > -1e-5}
+        if part is BARS and said[k]:
+            assert said[k][0] == max(inside, key=inside.get)
+            depth = re.search(r'penetration depth (\d\.\d+) m at link', plan.sentence)[1]
+            assert float(depth) == pytest.approx(max(inside.values()), abs=1e-3)
     assert plan.clearance >= MARGIN - 1e-6
     times = np.union1d(np.arange(0.0, trajectory.duration, 1e-3), [out, trajectory.duration])
     q, v, _ = sample(trajectory, times)
@@ -223,7 +248,7 @@ def test_an_arm_whose_shoulder_is_covered_has_no_escape():
 @examples(15)
 @given(SEEDS)
 def test_deeper_is_rejected_with_part_box_and_depth(seed):
-    arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06)
+    arm, scene, q_start, depths = leaned_case(seed, ESCAPE_DEPTH + 1e-4, 0.06, BARS)
     plan = ask(arm, scene, q_start)
     assert plan.status is PlanStatus.START_IN_COLLISION
     world = arm_world(arm, scene, MARGIN, RAY)
@@ -248,11 +273,137 @@ def test_deeper_is_rejected_with_part_box_and_depth(seed):
     assert 'escape_depth' not in plan.sentence
 
 
-def pressed(depth=0.03):
-    """Return the wearer with a plate pressed against the folded arm's tool from below."""
+def entered_case(seed):
+    """Return arm, wearer, world and start of an arm with only its ray in a box, at any depth."""
+    rng = np.random.default_rng(seed)
+    while True:
+        arm = table_1_arm(rng.choice([0.0, 0.02]))
+        scene = BODIES[int(rng.integers(len(BODIES)))]
+        q = free_configuration(rng, arm_world(arm, scene, MARGIN, RAY))
+        tool, tip = oracle_bars(arm, q[None], RAY)[0, -1]
+        size, rotation = np.array(SIZES[int(rng.integers(len(SIZES)))]), random_rotation(rng)
+        # A place on the ray is that of a random point of the box, which has the ray in it.
+        center = tool + rng.uniform(0.1, 0.9) * (tip - tool)
+        center = center - rotation @ (rng.uniform(-0.5, 0.5, 3) * (size + 2.0 * MARGIN))
+        scene = Scene((*scene.boxes, Box('entered', center, size, rotation)))
+        hits = [collides(arm, box, q[None], MARGIN, BARS)[0] for box in scene.boxes]
+        world = arm_world(arm, scene, MARGIN, RAY)
+        if not np.any(hits) and not world.is_valid(q) and not is_shoulder_covered(arm, scene):
+            return arm, scene, world, q
+
+
+def entry_faults(arm, scene, q):
+    """
+    Return what is wrong with an escape, densely sampled: q (n, dof); the ray alone is in boxes.
+
+    By the reference: `bars` or `ray` in a box that they are not in at first or any more, or the
+    ray, within the margin of a box, `deeper` than before.
+    """
+    faults = set()
+    for box in scene.boxes:
+        if collides(arm, box, q, MARGIN, BARS).any():
+            faults.add('bars')
+        is_hit = collides(arm, box, q, MARGIN, POINTING)
+        if (np.diff(is_hit.astype(int)) > 0).any() or is_hit[-1]:
+            faults.add('ray')
+        for at in np.flatnonzero(is_hit & ~collides(arm, box, q, 0.0, POINTING))[::8]:
+            depth = reference_depth(arm, box, q[at], POINTING)
+            if collides(arm, box, q[at:], MARGIN - depth - 2e-6, POINTING).any():
+                faults.add('deeper')
+    return faults
+
+
+@examples(40)
+@given(SEEDS)
+def test_a_ray_comes_out_of_a_box_from_any_depth(seed):
+    arm, scene, world, q_start = entered_case(seed)
+    # Into the next box, or round the wearer, not all of them can.
+    plan = ask(arm, scene, q_start)
+    if plan.status is PlanStatus.START_IN_COLLISION:
+        assert 'no straight escape is proven free' in plan.sentence
+        return
+    n_rays_out.append(seed)
+    if plan.status is not PlanStatus.SOLVED:
+        return
+    of_bars, of_ray = escape_said(plan.sentence)
+    assert of_bars == []
+    assert 'entered' in of_ray
+    trajectory, out = plan.trajectory, plan.escape_time
+    q = positions_at(trajectory, np.union1d(np.arange(0.0, out, 1e-3), [out]))
+    assert entry_faults(arm, scene, q) == set()
+    assert plan.clearance >= MARGIN - 1e-6
+    later = positions_at(trajectory, np.linspace(out, trajectory.duration, 300))
+    assert first_contact(arm, scene, later, RAY, MARGIN - 1e-6) is None
+
+
+n_rays_out: list[int] = []
+
+
+def test_nearly_all_rays_come_out():
+    assert len(n_rays_out) >= 39
+
+
+@examples(30)
+@given(SEEDS)
+def test_no_motion_is_proven_to_take_a_ray_out_that_does_not(seed):
+    arm, scene, world, q_start = entered_case(seed)
+    rng = np.random.default_rng(seed)
+    for _ in range(8):
+        way = rng.normal(size=4)
+        way *= rng.uniform(0.1, 0.8) / np.linalg.norm(way)
+        if not world.is_in_bounds(q_start + way):
+            continue
+        trajectory = parameterize(Path(np.stack([q_start, q_start + way])), (), limits())
+        q = positions_at(trajectory, np.arange(0.0, trajectory.duration, 2e-3))
+        is_out = leads_out(trajectory, world, MARGIN, trajectory.duration)
+        violation = second_opinion(arm, scene, world, trajectory)
+        faults = entry_faults(arm, scene, np.vstack([q, trajectory.positions[-1:]]))
+        n_verdicts[is_out, violation is None, not faults] += 1
+        if is_out:
+            assert faults == set()
+            assert violation is None
+        if 'bars' in faults:
+            # For python-fcl a bar is round, which takes off the corners of the grown box.
+            less = MARGIN - 3e-3 - (1.0 - 3.0**-0.5) * arm.radii[0]
+            is_hit = [collides(arm, box, q, less, BARS).any() for box in scene.boxes]
+            assert violation is not None or not any(is_hit)
+
+
+n_verdicts: Counter[tuple[bool, bool, bool]] = Counter()
+
+
+def test_both_checkers_find_good_and_bad_escapes_of_a_ray():
+    assert n_verdicts[True, True, True] >= 15, n_verdicts
+    assert n_verdicts[False, False, False] >= 5, n_verdicts
+    # What is good is mostly proven: the depths at the ends of intervals are the rest.
+    assert n_verdicts[False, True, True] <= 0.1 * n_verdicts[True, True, True], n_verdicts
+
+
+def test_a_ray_in_a_box_counts_for_nothing_beside_a_bar_in_one():
+    arm, scene = pressed(0.03, bar=0)
+    tool, tip = oracle_bars(arm, FOLDED[None], RAY)[0, -1]
+    deep = Box('deep', 0.5 * (tool + tip), [0.2, 0.2, 0.2], np.eye(3))
+    both = Scene((*scene.boxes, deep))
+    plan = ask(arm, both, FOLDED)
+    assert plan.status is PlanStatus.SOLVED, plan.sentence
+    assert escape_said(plan.sentence) == [['hand'], ['deep']]
+    assert 'escape from box "hand", penetration depth 0.0300 m at link 3' in plan.sentence
+    plan = ask(arm, both, FOLDED, escape_depth=0.02)
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert plan.sentence.startswith('link 3 is 0.0100 m inside box "hand"')
+    # The ray alone is no matter of depth; but an arm that never escapes does not.
+    plan = ask(arm, Scene((*wearer().boxes, deep)), FOLDED, escape_depth=1e-3)
+    assert plan.status is PlanStatus.SOLVED, plan.sentence
+    plan = ask(arm, Scene((*wearer().boxes, deep)), FOLDED, escape_depth=0.0)
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert plan.sentence.startswith('pointing ray is')
+
+
+def pressed(depth=0.03, bar=-1):
+    """Return the wearer with a plate pressed against a bar of the folded arm, or its ray."""
     arm = table_1_arm()
-    tip = oracle_bars(arm, FOLDED[None], RAY)[0, -1]
-    along = tip[1] - tip[0]
+    tip = oracle_bars(arm, FOLDED[None], RAY)[0, bar]
+    along = (tip[1] - tip[0]) / np.linalg.norm(tip[1] - tip[0])
     side = np.cross(along, [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
     rotation = np.stack([np.cross(side, along), side, along], axis=1)
@@ -298,8 +449,9 @@ def test_an_arm_beyond_its_limits_is_not_led_out():
     assert ask(arm, scene, q).status is PlanStatus.START_OUT_OF_BOUNDS
 
 
-def test_a_hand_that_is_closed_round_the_arm_is_rejected():
-    arm, scene = pressed()
+def closed(bar):
+    """Return the wearer with a hand closed round a bar of the folded arm, or its ray."""
+    arm, scene = pressed(bar=bar)
     hand = scene.boxes[-1]
     others = [
         replace(hand, name=f'finger_{i}', center=tip)
@@ -308,10 +460,21 @@ def test_a_hand_that_is_closed_round_the_arm_is_rejected():
             for offset in np.array([[0.0, 0.14, 0.0], [0.08, 0.07, 0.0], [-0.08, 0.07, 0.0]])
         )
     ]
-    plan = ask(arm, Scene((*scene.boxes, *others)), FOLDED)
+    return arm, Scene((*scene.boxes, *others))
+
+
+def test_a_hand_that_is_closed_round_the_arm_is_rejected():
+    plan = ask(*closed(bar=0), FOLDED)
     assert plan.status is PlanStatus.START_IN_COLLISION
     assert 'no straight escape is proven free' in plan.sentence
     assert '"hand"' in plan.sentence or '"finger_' in plan.sentence
+
+
+def test_a_hand_that_is_closed_round_the_ray_holds_nothing():
+    plan = ask(*closed(bar=-1), FOLDED)
+    assert plan.status is PlanStatus.SOLVED, plan.sentence
+    # Out through the hand, since the ray has no body; into no finger.
+    assert escape_said(plan.sentence) == [[], ['hand']]
 
 
 def test_the_same_seed_leads_out_the_same_way():
@@ -350,7 +513,7 @@ def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
 
 
 def second_opinion(arm, scene, world, trajectory):
-    depths = box_depths(world, trajectory.positions[0]).max(axis=0)
+    depths = escape_depths(world, trajectory.positions[0])
     return fcl_checker.first_escape_violation(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
@@ -368,7 +531,7 @@ def test_an_escape_with_a_violation_by_python_fcl_is_rejected(monkeypatch):
 
 
 def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
-    arm, scene = pressed()
+    arm, scene = pressed(bar=0)
     world = arm_world(arm, scene, MARGIN, RAY)
     plan = ask(arm, scene, FOLDED)
     way = plan.path.waypoints[1] - FOLDED
@@ -378,11 +541,11 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
         trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
         end = trajectory.duration
         violation = second_opinion(arm, scene, world, trajectory)
-        verdicts[share] = leads_out(trajectory, world, end), violation
+        verdicts[share] = leads_out(trajectory, world, MARGIN, end), violation
     assert verdicts[1.0] == (True, None)
     is_out, violation = verdicts[-0.2]
     assert not is_out
-    assert (violation.bar, violation.box) == ('pointing ray', 'hand')
+    assert (violation.bar, violation.box) == ('link 3', 'hand')
     # Half way it is no deeper but not out.
     assert verdicts[0.5] == (False, None)
     # A plate in the way, which the arm does not reach yet.
@@ -393,7 +556,7 @@ def test_a_way_that_goes_deeper_or_into_another_box_is_not_proven():
     trajectory = parameterize(Path(np.stack([FOLDED, q])), (), limits())
     if first_contact(arm, Scene((plate,)), FOLDED[None], RAY, MARGIN) is None:
         world = arm_world(arm, blocked, MARGIN, RAY)
-        assert not leads_out(trajectory, world, trajectory.duration)
+        assert not leads_out(trajectory, world, MARGIN, trajectory.duration)
         violation = second_opinion(arm, blocked, world, trajectory)
         assert violation.box == 'plate'
 
@@ -416,6 +579,68 @@ def test_a_running_escape_is_free_until_the_wearer_comes_nearer():
     near = replace(hand, center=hand.center + 0.04 * hand.rotation[:, 1])
     followed = Scene((*scene.boxes[:-1], near))
     assert not is_remaining_free(running, 0.5 * plan.escape_time, arm, followed, **kept)
+
+
+@examples(15)
+@given(SEEDS)
+def test_an_escape_goes_on_where_the_wearer_moves_in_the_ray(seed):
+    arm, scene, _, q_start = entered_case(seed)
+    plan = ask(arm, scene, q_start)
+    if plan.status is not PlanStatus.SOLVED:
+        return
+    trajectory, rng = plan.trajectory, np.random.default_rng(seed)
+    running = ExecutingMotion(
+        trajectory=trajectory,
+        start_time=0.0,
+        target_distance=plan.target_distance,
+        escape_time=plan.escape_time,
+    )
+    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    for _ in range(6):
+        phase, moved = rng.uniform(0.0, plan.escape_time), rng.normal(size=3)
+        box = scene.boxes[-1]
+        box = replace(box, center=box.center + 0.01 * moved / np.linalg.norm(moved))
+        now = Scene((*scene.boxes[:-1], box))
+        is_free = is_remaining_free(running, phase, arm, now, **kept)
+        goes_on = is_free or escapes_by_continuing(running, phase, arm, now, **kept)
+        n_moved[goes_on] += 1
+        n_moved['without proof'] += not is_free
+        if not goes_on:
+            continue
+        q = positions_at(trajectory, np.linspace(phase, trajectory.duration, 400))
+        assert first_contact(arm, now, q[-1:], plan.target_distance, MARGIN - 1e-6) is None
+        for box in now.boxes:
+            assert not collides(arm, box, q, MARGIN - 1e-6, BARS).any()
+            depth = max(0.0, reference_depth(arm, box, q[0], POINTING))
+            if depth < 0.5 * box.size.min() + MARGIN - 1e-5:
+                assert not collides(arm, box, q, MARGIN - depth - 3e-6, POINTING).any()
+
+
+n_moved: Counter[bool | str] = Counter()
+
+
+def test_most_escapes_go_on_where_the_wearer_moves_in_the_ray():
+    assert n_moved['without proof'] >= 5
+    assert n_moved[True] >= 0.9 * (n_moved[True] + n_moved[False])
+
+
+def test_a_hand_that_comes_into_the_way_of_a_bar_is_no_reason_to_go_on():
+    arm, scene = pressed()
+    plan = ask(arm, scene, FOLDED)
+    running = ExecutingMotion(
+        trajectory=plan.trajectory, start_time=0.0, escape_time=plan.escape_time
+    )
+    kept = {'margin': MARGIN, 'ray_guard_length': RAY}
+    later = positions_at(plan.trajectory, [0.7 * plan.trajectory.duration])
+    for bar, size, goes_on in ((0, 0.02, False), (-1, 1e-3, True)):
+        ends = oracle_bars(arm, later, RAY)[0, bar]
+        box = Box('late', ends.mean(axis=0), np.full(3, size), np.eye(3))
+        if goes_on:
+            # In the ray now, instead of later.
+            box = replace(box, center=oracle_bars(arm, FOLDED[None], RAY)[0, -1].mean(axis=0))
+        now = Scene((*scene.boxes, box))
+        assert not is_remaining_free(replace(running, escape_time=0.0), 0.0, arm, now, **kept)
+        assert escapes_by_continuing(running, 0.0, arm, now, **kept) == goes_on
 
 
 def test_an_empty_world_has_no_depth():

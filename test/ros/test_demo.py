@@ -35,8 +35,12 @@ def test_the_demo_points_at_three_targets_and_draws_them(tmp_path):
         assert row[2::2] == ['ms', 'rad', 's', 'm', 'mm']
         assert float(row[7]) >= 0.02
         assert float(row[9]) <= 1.0
-    (row,) = [line for line in table if 'the wearer raised an arm during the motion' in line]
-    assert 'the arm stopped, avoided it with 0.' in row
+    beside = [line.split() for line in table if 'beside a person at work' in line]
+    assert [row[0] for row in beside] == ['low', 'front']
+    for row in beside:
+        assert int(row[6]) >= 0
+        assert float(row[8]) > 0.0
+        assert float(row[-2]) <= 1.0
     pixels = image.imread(path)
     assert pixels.std() > 0.05
     assert np.ptp(pixels[..., :3]) > 0.9

@@ -78,14 +78,16 @@ def test_the_clearance_of_a_stop_that_is_not_free_is_reported(monitored):
     assert float(said.removesuffix(' m')) == pytest.approx(least, abs=2e-4)
 
 
-def test_an_arm_that_violates_the_margin_continues_where_that_escapes(monitored):
-    monitored.see(monitored.hand(0.0, 0.045))
+# Within the margin, and with the ray in the hand.
+@pytest.mark.parametrize('away', [0.045, 0.01])
+def test_an_arm_that_violates_the_margin_continues_where_that_escapes(monitored, away):
+    monitored.see(monitored.hand(0.0, away))
     assert monitored.published == []
     state, sentence = monitored.reporter.monitor_state
     assert state == MonitorState.MONITORING.value
     assert 'it escapes and a stop would not' in sentence
     # But not into something else.
-    monitored.see(monitored.hand(0.0, 0.045), monitored.hand(0.6, 0.0))
+    monitored.see(monitored.hand(0.0, away), monitored.hand(0.6, 0.0))
     assert len(monitored.published) == 1
 
 

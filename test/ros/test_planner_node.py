@@ -29,11 +29,15 @@ from rclpy.qos import (  # noqa: E402
     QoSProfile,
     ReliabilityPolicy,
 )
-from rrth_planner.collision import trajectory_validation  # noqa: E402
+from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
-from rrth_planner.model.arm import pointing_error, tool_pose  # noqa: E402
+from rrth_planner.model.arm import (  # noqa: E402
+    forward_kinematics,
+    pointing_error,
+    tool_pose,
+)
 from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -281,18 +285,33 @@ def leaned(deeper=0.0):
     return body
 
 
-def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(start):
+def pressed(deeper=0.0):
+    """Return a wearer whose hand the third link of the folded arm is in, so much deeper [m]."""
+    arm, body = load_arm(), wearer()
+    poses = forward_kinematics(arm, np.array(FOLDED))
+    middle = poses[2, :3, 3] - 0.5 * arm.dh[2, 3] * poses[2, :3, 2]
+    # Beside the link, which is upright to y.
+    center = middle - np.array([0.0, 0.05 + 0.02 - 0.0275 - deeper, 0.0])
+    body.markers.append(box('hand', center=tuple(center), size=(0.1, 0.1, 0.1)))
+    return body
+
+
+@pytest.mark.parametrize(
+    ('body', 'sentence'),
+    [
+        (pressed, ', escape from box "hand/0", penetration depth 0.0275 m at link 3'),
+        (leaned, ', escape of the pointing ray from box "hand/0"'),
+    ],
+)
+def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(start, body, sentence):
     planner, stranger = start(seed=3)
-    say_all(planner, stranger, body_boxes=leaned())
+    say_all(planner, stranger, body_boxes=body())
     response = stranger.answer()
     assert response.success, response.message
-    assert (
-        ', escape from box "hand/0", penetration depth 0.0275 m at pointing ray'
-        in response.message
-    )
+    assert sentence in response.message
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     # The present body, published again, does not stop it.
-    stranger.publishers['body_boxes'].publish(leaned())
+    stranger.publishers['body_boxes'].publish(body())
     stranger.wait_until(lambda: stranger.value('last code') == 'SUCCESS (1)')
     (msg,) = stranger.received['joint_trajectory']
     trajectory = joint_trajectory_from_msg(msg, JOINTS)
@@ -357,13 +376,31 @@ def test_a_wearer_who_always_moves_into_the_motion_is_reported_after_the_time_li
     assert not stranger.received['joint_trajectory']
 
 
+def test_a_hand_that_rests_in_the_ray_of_an_arm_at_rest_is_no_reason_to_stay(start):
+    planner, stranger = start(seed=3)
+    # In the middle of the hand, deeper than `escape_depth`.
+    say_all(planner, stranger, body_boxes=leaned(0.04))
+    response = stranger.answer()
+    assert response.success, response.message
+    assert ', escape of the pointing ray from box "hand/0"' in response.message
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    (msg,) = stranger.received['joint_trajectory']
+    trajectory = joint_trajectory_from_msg(msg, JOINTS)
+    q = positions_at(trajectory, np.arange(0.0, trajectory.duration, 5e-3))
+    arm, scene = load_arm(), scene_of(inputs_of(planner).body.value.at(0.0))
+    assert reference_checker.least_clearance(arm, scene, q[:1], 1.0) == 0.0
+    # The bars keep the margin, and at the end the ray does.
+    assert reference_checker.least_clearance(arm, scene, q, 0.0) > 0.02 - 1e-5
+    assert reference_checker.least_clearance(arm, scene, q[-1:], 1.0) > 0.02 - 1e-5
+
+
 def test_deeper_than_escape_depth_is_rejected(start):
     planner, stranger = start(escape_depth=0.01)
-    say_all(planner, stranger, body_boxes=leaned())
+    say_all(planner, stranger, body_boxes=pressed())
     response = stranger.answer()
     assert not response.success
     assert response.message.startswith(
-        'START_STATE_IN_COLLISION (-10): pointing ray is 0.0075 m inside box "hand/0": '
+        'START_STATE_IN_COLLISION (-10): link 3 is 0.0075 m inside box "hand/0": '
         'penetration depth 0.0275 m including the margin, expected less than 0.01 m (escape_depth)'
     )
     planner.set_parameters([Parameter(name='escape_depth', value=0.03)])
@@ -398,12 +435,12 @@ def test_no_escape_is_published_once_the_arm_is_too_deep(
 ):
     # It is 0.0275 m deep at first.
     planner, stranger = start(escape_depth=depth)
-    say_all(planner, stranger, body_boxes=leaned())
+    say_all(planner, stranger, body_boxes=pressed())
     inputs, plan_motion = inputs_of(planner), in_process_planner.plan_question
 
     def plan_while_the_wearer_leans(*args, **kwargs):
         plan, body = plan_motion(*args, **kwargs), inputs.body.value
-        stranger.publishers['body_boxes'].publish(leaned(0.001))
+        stranger.publishers['body_boxes'].publish(pressed(0.001))
         wait_until(lambda: inputs.body.value is not body)
         return plan
 

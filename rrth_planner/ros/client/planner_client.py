@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -182,6 +182,7 @@ class DemoClient(PlannerClient):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__('rrth_demo', timeout, check)
         self.arm = arm
+        self.bodies: list[MarkerArray] = []
 
     def wait_for_nodes(self) -> None:
         """Wait for the planner, for joint states, and for a subscriber of the motions."""
@@ -211,29 +212,40 @@ class DemoClient(PlannerClient):
             trajectory.duration + self.timeout,
         )
 
-    def raise_arm(self, body: MarkerArray, q_start: Array, after: float) -> Array:
-        """
-        Publish another body so long after the arm set off [s]; return its states from then on.
+    def see_bodies(self) -> None:
+        """Keep every body that is published from now on, in `bodies`."""
+        many = QoSProfile(depth=1000)
+        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, many)
 
-        Waits until the arm has left q_start, (dof,) [rad], and then until it was stopped, got a
-        new motion, and has arrived at its end.
+    def point(self, q_aims: Callable[[Array], bool]) -> int:
         """
-        self.wait_for(
-            lambda: np.abs(self.positions() - q_start).max() > ARRIVED, 'the arm in motion'
-        )
-        self.receive_for(after)
-        n = len(self.commanded)
-        self.observed = []
-        self.publish(body)
-        # The stop begins in motion, what comes after it at rest.
-        self.wait_for(
-            lambda: (
-                len(self.commanded) > n + 1 and not any(self.commanded[-1].points[0].velocities)
-            ),
-            'a stop and a new motion',
-        )
-        self.wait_for_arrival(joint_trajectory_from_msg(self.commanded[-1], self.joint_names))
-        return np.array([configuration_from_msg(m, self.joint_names) for m in self.observed])
+        Request a motion beside a wearer who moves, and again until the arm aims; return its stops.
+
+        `q_aims` says whether a configuration, (dof,) [rad], aims at the target that was published.
+        While he is in the way requests are rejected, or the planner stops the arm and replans.
+        """
+        end = time.monotonic() + self.timeout
+        self.commanded = []
+        sentence = 'none was planned'
+        while time.monotonic() < end:
+            response = self.ask(self.timeout)
+            sentence = response.message
+            moved = time.monotonic()
+            # The planner may be about to plan again: it is asked once it leaves the arm at rest.
+            while time.monotonic() - moved < PAUSE:
+                self.take_messages()
+                if not self._is_at_end():
+                    moved = time.monotonic()
+                elif q_aims(self.positions()):
+                    return sum(any(msg.points[0].velocities) for msg in self.commanded)
+        raise DemoError(f'the arm did not aim at its target within {self.timeout:g} s: {sentence}')
+
+    def _is_at_end(self) -> bool:
+        """Return whether the arm stands still at the end of the last commanded motion."""
+        if not self.commanded:
+            return True
+        motion = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
+        return self.is_still_at(motion.positions[-1], ARRIVED, STILL)
 
 
 def is_matched(node: Node, publisher: Publisher) -> bool:

@@ -32,7 +32,8 @@ def declared(dof: int) -> tuple[Setting, ...]:
     limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
     timeout = (0.0, LONGEST_TIMEOUT)
     ray = 'length of the pointing ray kept clear in motion'
-    escape = 'greatest penetration depth, margin included, to escape from; 0: none'
+    reserve = 'clearance beyond the margin that is planned with where there is room'
+    escape = 'greatest depth of a bar in a box, margin included, to escape from; 0: none'
     latency = 'age at reception of a body without stamp'
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
@@ -42,6 +43,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('seed', -1, '-', 'random seed; -1: a new one each time', -1, 2**31 - 1),
         Setting('margin', 0.02, 'm', 'clearance kept from every box', 0.0, 1.0),
         Setting('ray_guard_length', 1.0, 'm', ray, 0.0, 100.0),
+        Setting('reserve', 0.05, 'm', reserve, 0.0, 1.0),
         Setting('escape_depth', 0.05, 'm', escape, 0.0, 1.0),
         Setting('max_velocity', [1.5] * dof, 'rad/s', f'greatest velocity {each}', *limit),
         Setting(

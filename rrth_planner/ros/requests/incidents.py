@@ -97,5 +97,6 @@ def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
         ray_guard_length=ray,
         seed=max(0, parameters.seed),
         escape_depth=parameters.escape_depth,
+        reserve=parameters.reserve,
     )
     return disagreement_incident(question, Disagreement(trajectory, violation))

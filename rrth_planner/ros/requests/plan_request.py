@@ -182,4 +182,5 @@ def _question(
         seed=secrets.randbelow(2**31) if parameters.seed < 0 else parameters.seed,
         moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
+        reserve=parameters.reserve,
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.collision.penetration import box_depths
+from rrth_planner.collision.penetration import escape_depths
 from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world
@@ -128,10 +128,10 @@ class Revalidation:
         escape_time = self.plan.escape_time
         is_too_deep = (
             escape_time > 0.0
-            and box_depths(world, self._motion.positions[0]).max() >= parameters.escape_depth
+            and escape_depths(world, self._motion.positions[0])[0].max() >= parameters.escape_depth
         )
         if is_too_deep or not is_proven_free(
-            world, self._motion, self._target_distance, escape_time
+            world, self._motion, parameters.margin, self._target_distance, escape_time
         ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,

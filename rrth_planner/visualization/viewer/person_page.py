@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of a recorded person at work: the arm moves beside him, and plans again and again."""
 
+from contextlib import suppress
 from html import escape
 from threading import Lock
 import time
@@ -85,11 +86,9 @@ class PersonPage:
 
     def draw(self, now: float) -> None:
         """Move wearer and arm to a time [s], and draw them."""
-        try:
+        # Where the tracker had lost him the last boxes stay.
+        with suppress(SceneError):
             self._scene, _ = body_boxes(self._skeleton, posture_at(self._person, now))
-        except SceneError:
-            # The tracker had lost him: the last boxes stay.
-            pass
         with self._lock:
             aimed, self._aimed = self._aimed, None
         if aimed is not None:

@@ -1,0 +1,232 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Part three of the soak: recorded people wear the arm while it is asked for one target after another."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+import os
+from pathlib import Path
+import sys
+import time
+
+import numpy as np
+from rclpy.serialization import deserialize_message
+from rrth_planner.io.arm_file import load_arm
+from rrth_planner.model.arm import ArmModel, pointing_error
+from rrth_planner.model.scene import Scene
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
+from rrth_planner.ros.middleware.child_process import ChildProcess
+from tqdm import tqdm
+from visualization_msgs.msg import MarkerArray
+
+from benchmarks.common.client import FRAME, ros_client
+from benchmarks.soak.client import brakes_in, SoakClient
+from benchmarks.soak.judge import RAY
+from benchmarks.soak.monitor import ARGUMENTS, PLANNER, PLAYBACK
+
+WEARER = 'rrth_planner.cli.wearer'
+# Targets low in front of the wearer, where his hands work: lower and upper corner [m].
+LOW_IN_FRONT = np.array([[0.5, -0.6, -0.8], [1.5, 0.6, -0.1]])
+# An arm that aims this near to its target has arrived [m]; a request has so long for that [s].
+AIMS, PATIENCE = 0.02, 6.0
+# A slower arm is at rest [rad/s].
+REST = 1e-3
+# A tracker publishes so often [1/s].
+FPS = 60
+
+
+@dataclass(slots=True)
+class PersonRecord:
+    """
+    What was seen of an arm on a recorded person.
+
+    Parameters
+    ----------
+    name : str
+        Of the recording.
+    rate : float
+        How fast it was played.
+    seconds : float
+        How long [s].
+    n_requests, n_aimed : int
+        Targets asked for; those that the arm aimed at in time.
+    answers : Counter
+        Of the codes of the answers, and of what followed a success.
+    n_contacts : int
+        Times at which the arm, in motion, came into contact with a box as recorded.
+    contacts : list of str
+        When, which bar and which box.
+    ray_seconds : float
+        How long the pointing ray of the arm in motion crossed a box [s].
+    brakes : list of float
+        How long after its body each fail-safe stop was published [ms].
+    is_interrupted : bool
+
+    """
+
+    name: str
+    rate: float
+    seconds: float = 0.0
+    n_requests: int = 0
+    n_aimed: int = 0
+    answers: Counter = field(default_factory=Counter)
+    n_contacts: int = 0
+    contacts: list[str] = field(default_factory=list)
+    ray_seconds: float = 0.0
+    brakes: list[float] = field(default_factory=list)
+    is_interrupted: bool = False
+
+
+class PeopleClient(SoakClient):
+    """A client that also keeps what the tracker publishes."""
+
+    def __init__(self, folder: Path) -> None:
+        """Subscribe to bodies, which are read later."""
+        super().__init__(folder)
+        self.bodies: list[bytes] = []
+        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, 10, raw=True)
+
+
+def soak_person(
+    file: Path | None, rate: float, seconds: float, folder: Path, begin: float = 0.0, seed: int = 1
+) -> PersonRecord:
+    """
+    Return what was seen of an arm on a recorded person for a time [s].
+
+    file: the recording; None for that of the package. rate: how fast it is played, to and fro,
+    from a time `begin` on [s].
+    """
+    record = PersonRecord('construction work' if file is None else file.stem, rate)
+    options = ['--rate', f'{rate:g}', '--fps', f'{FPS}', '--begin', f'{begin:g}']
+    options += ['--skeleton', 'tum_bvh' if file is not None and 'tum' in file.stem else 'cmu_bvh']
+
+    def listen(line: str) -> None:
+        record.brakes += [took for _, took in brakes_in(line)]
+
+    with (
+        ros_client(lambda: PeopleClient(folder)) as client,
+        ChildProcess(PLANNER, [*ARGUMENTS, *os.environ.get('EXTRA', '').split()], listen) as one,
+        ChildProcess(PLAYBACK, [], lambda _: None) as other,
+        ChildProcess(
+            WEARER, [*([] if file is None else [str(file)]), *options], lambda _: None
+        ) as wearer,
+    ):
+        client.listen_to_states()
+        client.wait_for_service(one)
+        client.hear(30.0, lambda: client.states and client.bodies)
+        try:
+            _ask(client, record, seconds, seed, (one, other, wearer))
+        except KeyboardInterrupt:
+            record.is_interrupted = True
+    client.close()
+    _judge(record, client)
+    return record
+
+
+def _ask(
+    client: PeopleClient,
+    record: PersonRecord,
+    seconds: float,
+    seed: int,
+    children: tuple[ChildProcess, ...],
+) -> None:
+    """Ask for one target after the other."""
+    arm, rng = load_arm(), np.random.default_rng(seed)
+    begin = time.monotonic()
+    with tqdm(total=round(seconds), unit='s', desc=record.name, file=sys.stderr) as bar:
+        while (passed := time.monotonic() - begin) < seconds:
+            bar.update(int(passed) - bar.n)
+            for child in children:
+                child.check()
+            target = rng.uniform(*LOW_IN_FRONT)
+            client.publish_target(target)
+            asked = time.monotonic()
+            _, answer = client.question()
+            record.n_requests += 1
+            word = 'no answer' if answer is None else answer.message.partition(' ')[0]
+            if answer is not None and answer.success:
+
+                def aims(target: np.ndarray = target) -> bool:
+                    _, q, v = client.states[-1]
+                    is_at_rest = max(map(abs, v)) < REST
+                    return is_at_rest and pointing_error(arm, np.array(q), target) < AIMS
+
+                if client.hear(PATIENCE - (time.monotonic() - asked), aims):
+                    record.n_aimed += 1
+                else:
+                    word += f', then {client.figures.get("last code", "")}'
+            record.answers[word] += 1
+            client.hear(0.02)
+        record.seconds = time.monotonic() - begin
+
+
+def _judge(record: PersonRecord, client: PeopleClient) -> None:
+    """Judge the arm at each of its states by the body as it was recorded then."""
+    arm, body = load_arm(), WearerBody()
+    scenes: list[tuple[int, Scene]] = []
+    for data in client.bodies:
+        msg = deserialize_message(data, MarkerArray)
+        stamp = nanoseconds_of(msg.markers[-1].header.stamp)
+        body = body.apply(msg, stamp / NANOSECONDS, FRAME)
+        scenes.append((stamp, scene_of(body)))
+    scenes.sort(key=lambda item: item[0])
+    stamps = np.array([stamp for stamp, _ in scenes])
+    was_in, before = False, None
+    for sent, q, v in client.states:
+        k = int(np.searchsorted(stamps, sent)) - 1
+        is_moving = max(map(abs, v)) >= REST
+        if k < 0 or not is_moving:
+            was_in, before = False, sent
+            continue
+        bars, ray = _crossed(arm, scenes[k][1], np.array([q]))
+        if bars and not was_in:
+            record.n_contacts += 1
+            record.contacts.append(f'{(sent - stamps[0]) * 1e-9:.2f} s: {bars}')
+        was_in = bool(bars)
+        if ray and before is not None:
+            record.ray_seconds += min(0.05, (sent - before) * 1e-9)
+        before = sent
+
+
+def _crossed(arm: ArmModel, scene: Scene, q: np.ndarray) -> tuple[str, bool]:
+    """Return what is in contact with a bar of the arm, and whether its ray crosses a box."""
+    from rrth_planner.collision.reference_checker import first_contact
+
+    found = first_contact(arm, scene, q, 0.0, 0.0)
+    bars = '' if found is None else f'bar {found.bar} and box "{found.box}"'
+    return bars, first_contact(arm, scene, q, RAY, 0.0) is not None
+
+
+def main() -> None:
+    """Soak."""
+    import tempfile
+
+    files = [Path(name) for name in sys.argv[3:]]
+    total = Counter()
+    seconds = requests = aimed = ray = contacts = brakes = 0
+    for k, file in enumerate(files):
+        with tempfile.TemporaryDirectory() as folder:
+            r = soak_person(
+                file, float(sys.argv[1]), float(sys.argv[2]), Path(folder), 0.1, seed=k
+            )
+        print(
+            r.name,
+            f'{r.n_aimed} of {r.n_requests} aimed; contacts {r.n_contacts}; ray {r.ray_seconds:.2f} s; stops {len(r.brakes)}; {dict(r.answers)}',
+            r.contacts[:5],
+            flush=True,
+        )
+        total += r.answers
+        seconds += r.seconds
+        requests += r.n_requests
+        aimed += r.n_aimed
+        ray += r.ray_seconds
+        contacts += r.n_contacts
+        brakes += len(r.brakes)
+    print(
+        f'ALL {seconds:.0f} s: {aimed} of {requests} aimed ({100 * aimed / requests:.1f} %), contacts {contacts}, ray {ray:.2f} s, stops {brakes}, {dict(total)}'
+    )
+
+
+if __name__ == '__main__':
+    main()
