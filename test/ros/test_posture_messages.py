@@ -12,6 +12,7 @@ pytest.importorskip('yourdfpy')
 
 from builtin_interfaces.msg import Time  # noqa: E402
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.io.urdf.tree import link_tree_from_urdf  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import rotation_matrix  # noqa: E402
@@ -29,6 +30,7 @@ from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 NAMES = ('a', 'b', 'c')
 STAMP = Time(sec=12, nanosec=34)
 NANOSECONDS = 12_000_000_034
+UNORDERED = load_skeleton('tum_bvh')
 TREE = link_tree_from_urdf(human_urdf(), 'robot_description')
 
 
@@ -92,7 +94,7 @@ def test_poses_come_back_as_they_were_written_lost_ones_too(seed, lost):
         positions[k] = np.nan
         rotations[(k + 1) % 3] = np.nan
     given_posture = Posture(names=NAMES, positions=positions, rotations=rotations)
-    found = posture_from_poses(poses_to_msg(given_posture, 'world', STAMP), NAMES)
+    found = posture_from_poses(poses_to_msg(given_posture, UNORDERED, 'world', STAMP), NAMES)
     assert (found.stamp, found.frame) == (NANOSECONDS, 'world')
     np.testing.assert_array_equal(found.posture.positions, positions)
     np.testing.assert_allclose(found.posture.rotations, rotations, atol=1e-12)
@@ -100,7 +102,7 @@ def test_poses_come_back_as_they_were_written_lost_ones_too(seed, lost):
 
 def test_poses_that_are_no_person_are_rejected():
     posture = Posture(names=NAMES, positions=np.zeros((3, 3)), rotations=np.stack([np.eye(3)] * 3))
-    array = poses_to_msg(posture, 'world', STAMP)
+    array = poses_to_msg(posture, UNORDERED, 'world', STAMP)
     with pytest.raises(MessageError, match='3 poses, expected 2, as the skeleton has names_by_id'):
         posture_from_poses(array, NAMES[:2])
     with pytest.raises(MessageError, match='0 poses, expected 3'):

@@ -101,7 +101,7 @@ def test_what_is_published_is_what_was_measured_at_its_stamp(form, spinning, wai
             return part_markers(skeleton).message(body_boxes(skeleton, posture)[0], 'torso', stamp)
         if form == 'markers':
             return points_to_msg(posture, skeleton, 'tracker', stamp)
-        return poses_to_msg(posture, 'tracker', stamp)
+        return poses_to_msg(posture, skeleton, 'tracker', stamp)
 
     def places(msg):
         poses = msg.poses if form == 'poses' else [m.pose for m in msg.markers]
@@ -109,7 +109,7 @@ def test_what_is_published_is_what_was_measured_at_its_stamp(form, spinning, wai
 
     def is_equal(msg, number):
         other = expected(number)
-        return other is not None and np.array_equal(places(msg), places(other))
+        return other is not None and np.array_equal(places(msg), places(other), equal_nan=True)
 
     first = next(k for k in range(2000) if is_equal(received[0][0], k))
     for (msg, _), number in zip(received, numbers, strict=True):
@@ -166,10 +166,21 @@ def test_points_have_the_ids_of_the_skeleton_and_lost_ones_are_left_out():
 
 
 def test_poses_that_are_lost_are_no_numbers():
-    msg = poses_to_msg(posture_of(lost=True), 'tracker', PoseArray().header.stamp)
+    unordered = load_skeleton('tum_bvh')
+    msg = poses_to_msg(posture_of(lost=True), unordered, 'tracker', PoseArray().header.stamp)
     assert [pose.position.x for pose in msg.poses[:1]] == [0.0]
     assert np.isnan(msg.poses[1].position.x)
     assert np.isnan(msg.poses[0].orientation.w)
+
+
+def test_poses_are_in_the_order_of_the_skeleton_and_what_it_has_not_is_left_out():
+    xsens = load_skeleton('xsens')
+    names = ('hat', *reversed(xsens.names_by_id[1:]))
+    msg = poses_to_msg(posture_of(names), xsens, 'tracker', PoseArray().header.stamp)
+    assert len(msg.poses) == len(xsens.names_by_id)
+    assert np.isnan(msg.poses[0].position.x)
+    for name, pose in zip(xsens.names_by_id[1:], msg.poses[1:], strict=True):
+        assert pose.position.x == 3.0 * names.index(name)
 
 
 def test_a_person_without_a_base_frame_is_not_published(wait_until, spinning):

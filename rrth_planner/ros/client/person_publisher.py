@@ -52,4 +52,4 @@ class PersonPublisher(Node):
         elif self._form == 'markers':
             self.publisher.publish(points_to_msg(posture, self._skeleton, TRACKER_FRAME, stamp))
         else:
-            self.publisher.publish(poses_to_msg(posture, TRACKER_FRAME, stamp))
+            self.publisher.publish(poses_to_msg(posture, self._skeleton, TRACKER_FRAME, stamp))

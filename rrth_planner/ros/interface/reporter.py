@@ -7,7 +7,7 @@ from pathlib import Path
 from threading import Lock
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.errors import one_line
@@ -15,6 +15,7 @@ from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.diagnostics import status_to_msg
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
 # Diagnostics are published at least this often [s].
@@ -159,14 +160,8 @@ class Reporter:
             values[f'rejected messages, {name}'] = topic.n_rejected
             values[f'last rejection, {name}'] = topic.rejection or ''
         level, message = summary(now, self._inputs, self.parameters, report)
-        status = DiagnosticStatus(
-            level=level,
-            name=f'{self._node.get_fully_qualified_name().lstrip("/")}: planning',
-            hardware_id='rrth_planner',
-            message=message,
-        )
-        status.values = [KeyValue(key=k, value=one_line(str(v))) for k, v in values.items()]
-        return status
+        name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
+        return status_to_msg(name, level, message, values)
 
     def _warn_of_lost(self, now: float) -> None:
         """Log each lost part once."""

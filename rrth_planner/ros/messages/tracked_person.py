@@ -38,12 +38,17 @@ def points_to_msg(posture: Posture, skeleton: Skeleton, frame: str, stamp: Time)
     return MarkerArray(markers=markers)
 
 
-def poses_to_msg(posture: Posture, frame: str, stamp: Time) -> PoseArray:
-    """Return the pose of each point, in the order of their names; what is lost is NaN."""
+def poses_to_msg(posture: Posture, skeleton: Skeleton, frame: str, stamp: Time) -> PoseArray:
+    """Return the pose of each point, in the order of the skeleton; what is lost is NaN."""
     message = PoseArray(header=Header(frame_id=frame, stamp=stamp))
-    for k, position in enumerate(posture.positions.tolist()):
-        quaternion = [math.nan] * 4
-        if posture.rotations is not None and not np.isnan(posture.rotations[k]).any():
+    place = {name: k for k, name in enumerate(posture.names)}
+    # Trackers without numbers count their points.
+    for name in skeleton.names_by_id or posture.names:
+        position, quaternion = [math.nan] * 3, [math.nan] * 4
+        k = place.get(name)
+        if k is not None:
+            position = posture.positions[k].tolist()
+        if k is not None and posture.rotations is not None:
             quaternion = quaternion_xyzw(posture.rotations[k]).tolist()
         pose = Pose()
         p, o = pose.position, pose.orientation
