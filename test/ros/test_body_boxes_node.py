@@ -45,6 +45,8 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 pytestmark = pytest.mark.usefixtures('ros_context')
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Boxes that come close behind one another are all heard.
+ALL = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 MODULE = [sys.executable, '-m', 'rrth_planner.ros.body_boxes_node']
 # Each ready-made skeleton, and what a tracker of its kind publishes.
 TRACKERS = [
@@ -135,12 +137,8 @@ class Tracker(Node):
         self.node = BodyBoxesNode(
             parameter_overrides=[Parameter(k, value=v) for k, v in values.items()]
         )
-        warning = self.node.get_logger().warning
-        self.node.get_logger().warning = lambda words, **options: (
-            self.logs.append(words),
-            warning(words, **options),
-        )
-        self.create_subscription(MarkerArray, 'body_boxes', self.boxes.append, BEST_EFFORT)
+        self.node.get_logger().warning = lambda words, **_: self.logs.append(words)
+        self.create_subscription(MarkerArray, 'body_boxes', self.boxes.append, ALL)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         kinds = {'markers': MarkerArray, 'poses': PoseArray, 'joint_states': JointState}
         self.publishers_of = {}
@@ -300,7 +298,7 @@ def test_joint_states_of_a_person_with_a_urdf_become_boxes(start):
     publisher.publish(msg)
     seen = {m.ns for m in tracker.wait_for(NOW + STEP).markers}
     parts = {part.name for part in tracker.skeleton.parts}
-    assert parts - seen == {'left upper arm', 'left forearm', 'left hand'}
+    assert parts - seen == {'left forearm', 'left hand'}
 
 
 def test_without_a_stamp_boxes_have_the_time_of_reception(start):
@@ -410,6 +408,7 @@ def test_a_rigid_body_that_is_lost_delays_no_other(start):
     expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
     # Its absence is noticed by the next measurement, and is known from then on.
     tracker.send(lost, NOW + STEP)
+    wait_until(lambda: len(tracker.node._input._poses) == len(points_of(tracker.skeleton)) - 1)
     for k in range(2, 5):
         tracker.send(lost, NOW + k * STEP)
         expect(tracker.wait_for(NOW + (k - 1) * STEP), tracker.skeleton, lost)
@@ -508,7 +507,7 @@ def test_beside_a_recorded_person_the_planner_plans_by_what_a_tracker_sees(
     wait_until, send, ask, spinning
 ):
     pytest.importorskip('fcl')
-    client, said = Node('client'), []
+    client, said, of_node = Node('client'), [], []
     target = client.create_publisher(type(samples.target()), 'target', LATCHED)
     plan = client.create_client(Trigger, 'rrth_planner/plan')
     seen = []
@@ -517,7 +516,7 @@ def test_beside_a_recorded_person_the_planner_plans_by_what_a_tracker_sees(
     required = "required_boxes:=['torso','head','left hand','right hand','left foot']"
     with (
         ChildProcess('rrth_planner.cli.wearer', ['--as', 'poses', '--rate', '0'], said.append),
-        ChildProcess('rrth_planner.ros.body_boxes_node', tracked, said.append) as node,
+        ChildProcess('rrth_planner.ros.body_boxes_node', tracked, of_node.append) as node,
         ChildProcess('rrth_planner.ros.playback_node', [], said.append),
         ChildProcess(
             'rrth_planner.ros.planner_node',
@@ -534,4 +533,4 @@ def test_beside_a_recorded_person_the_planner_plans_by_what_a_tracker_sees(
     assert answer.success, (answer.message, said)
     assert answer.message.startswith('SUCCESS (1): ')
     assert len(seen[-1].markers) == len(load_skeleton('cmu_bvh').parts)
-    assert not [line for line in said if 'rejected' in line or 'ERROR' in line]
+    assert not of_node
