@@ -43,6 +43,9 @@ LATE = round(LONGEST_GAP * NANOSECONDS)
 # A frame that TF has not heard of for so long is lost, and the others do not wait for it [ns].
 LONGEST_BEHIND = 100_000_000
 
+# A node that is late skips what is outdated: so many messages wait for it.
+NEWEST = 1
+
 # Takes what reads a posture, or raises MessageError, and the time of arrival [ns].
 Take = Callable[[Callable[[], TrackedPosture], int], None]
 
@@ -76,8 +79,15 @@ def _subscribe(
     def on_message(msg: Any, arrival: Arrival) -> None:
         take(lambda: read(msg), arrival.received)
 
-    on_rejection = partial(_reject, take)
-    return OpenSubscription(node, kind, topic, on_message, on_rejection, decode=fast_decoder(kind))
+    return OpenSubscription(
+        node,
+        kind,
+        topic,
+        on_message,
+        partial(_reject, take),
+        decode=fast_decoder(kind),
+        depth=NEWEST,
+    )
 
 
 def _reject(take: Take, problem: MessageError) -> None:
@@ -139,6 +149,7 @@ class BodyInput:
                     partial(self._on_pose, name),
                     partial(_reject, take),
                     decode=fast_decoder(PoseStamped),
+                    depth=NEWEST,
                 )
                 for name in self._names
             ]

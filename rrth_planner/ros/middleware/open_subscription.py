@@ -138,6 +138,8 @@ class OpenSubscription:
         Turns the bytes of a message into one; without, rclpy does.
     takes_late : bool, optional
         Without, late messages are dropped, since the last one wins.
+    depth : int, optional
+        How many messages may wait; 1 where nobody wants one that is not the newest.
 
     """
 
@@ -151,13 +153,15 @@ class OpenSubscription:
         on_error: Callable[[str], None] = lambda what: None,
         decode: Callable[[bytes], Any] | None = None,
         takes_late: bool = False,
+        depth: int = DEPTH,
     ) -> None:
         """Subscribe."""
         self._node, self._msg_type, self._topic = node, msg_type, topic
         self._on_message, self._on_rejection, self._on_error = on_message, on_rejection, on_error
         self._decode, self._copies = decode, Copies(takes_late)
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
-        profile = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._depth = depth
+        profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
         try:
             on_match = SubscriptionEventCallbacks(
                 matched=lambda _: self.match_publishers(), use_default_callbacks=False
@@ -180,7 +184,7 @@ class OpenSubscription:
                 and qos.durability not in self._reliable
             ):
                 profile = QoSProfile(
-                    depth=DEPTH, reliability=qos.reliability, durability=qos.durability
+                    depth=self._depth, reliability=qos.reliability, durability=qos.durability
                 )
                 events = SubscriptionEventCallbacks(use_default_callbacks=False)
                 self._reliable[qos.durability] = self._subscribe(profile, qos.durability, events)
