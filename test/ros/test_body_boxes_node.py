@@ -406,18 +406,50 @@ def test_a_rigid_body_that_is_lost_delays_no_other(start):
         rotations=posture.rotations[keep],
     )
     expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
-    # Its absence is noticed by the next measurement, and is known from then on.
-    tracker.send(lost, NOW + STEP)
-    wait_until(lambda: len(tracker.node._input._poses) == len(points_of(tracker.skeleton)) - 1)
-    for k in range(2, 5):
+    # For a tenth of a second the others wait for it.
+    for k in range(1, 9):
         tracker.send(lost, NOW + k * STEP)
-        expect(tracker.wait_for(NOW + (k - 1) * STEP), tracker.skeleton, lost)
+        wait_until(
+            lambda k=k: set(tracker.node._input._measured.values()) == {NOW, NOW + k * STEP}
+        )
+    for k in range(6, 9):
         expect(tracker.wait_for(NOW + k * STEP), tracker.skeleton, lost)
-    # It is back: from the measurement after the first one on.
-    tracker.send(posture, NOW + 5 * STEP)
-    tracker.wait_for(NOW + 5 * STEP)
-    tracker.send(posture, NOW + 6 * STEP)
-    expect(tracker.wait_for(NOW + 6 * STEP), tracker.skeleton, posture)
+    assert len(tracker.boxes) == 4
+    # It is back: at the latest from the second measurement on.
+    tracker.send(posture, NOW + 9 * STEP)
+    tracker.wait_for(NOW + 9 * STEP)
+    wait_until(lambda: set(tracker.node._input._measured.values()) == {NOW + 9 * STEP})
+    expect(tracker.hear(posture, NOW + 10 * STEP), tracker.skeleton, posture)
+
+
+def test_rigid_bodies_of_two_measurements_are_not_mixed(start):
+    tracker = start('tum_bvh', 'bodies')
+    posture = person_of('tum_bvh')
+    later = replace(posture, positions=posture.positions + [0.05, 0.0, 0.0])
+    # Topics overtake each other.
+    first = points_of(tracker.skeleton)[0]
+    tracker.send(posture, NOW)
+    tracker.wait_for(NOW)
+    for part, stamp in ((later, NOW + 2 * STEP), (posture, NOW + STEP)):
+        k = part.names.index(first)
+        one = Posture(
+            names=(first,),
+            positions=part.positions[k : k + 1],
+            rotations=part.rotations[k : k + 1],
+        )
+        tracker.send(one, stamp)
+        wait_until(lambda s=stamp: tracker.node._input._measured[first] == s)
+    rest = [k for k, name in enumerate(later.names) if name != first]
+    tracker.hear(
+        Posture(
+            names=tuple(later.names[k] for k in rest),
+            positions=later.positions[rest],
+            rotations=later.rotations[rest],
+        ),
+        NOW + 2 * STEP,
+    )
+    expect(tracker.wait_for(NOW + 2 * STEP), tracker.skeleton, later)
+    assert len(tracker.boxes) == 2
 
 
 @pytest.mark.usefixtures('tf')

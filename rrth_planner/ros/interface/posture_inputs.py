@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subscriptions to what trackers publish of a person, each kind of which becomes postures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 import time
@@ -40,11 +40,8 @@ SAME_MEASUREMENT = 2_000_000
 # Messages whose stamps are so much older than the last ones are late; older ones are of a clock
 # that was set back [ns].
 LATE = round(LONGEST_GAP * NANOSECONDS)
-# A frame that TF has not heard of for so long is lost, and the others do not wait for it [ns].
+# A frame or body that is not heard of for so long is lost: others do not wait for it [ns].
 LONGEST_BEHIND = 100_000_000
-
-# A node that is late skips what is outdated: so many messages wait for it.
-NEWEST = 1
 
 # Takes what reads a posture, or raises MessageError, and the time of arrival [ns].
 Take = Callable[[Callable[[], TrackedPosture], int], None]
@@ -86,7 +83,7 @@ def _subscribe(
         on_message,
         partial(_reject, take),
         decode=fast_decoder(kind),
-        depth=NEWEST,
+        is_stream=True,
     )
 
 
@@ -127,19 +124,19 @@ class BodyInput:
     """
     A topic for each rigid body, of which those that were measured at once are a posture.
 
-    It is complete when all bodies have come that were part of the one before; one that is lost
-    delays no other.
+    It is handed on as soon as it is complete. One that is not heard of for 0.1 s is lost: the
+    others wait for it no longer.
     """
 
     def __init__(self, node: Node, parameters: TrackerParameters, take: Take) -> None:
         """Subscribe."""
         self._node, self._take = node, take
         self._names = points_of(parameters.skeleton)
-        # Of the present measurement: since when it counts [ns], its poses and frames.
-        self._begin, self._poses, self._frames = 0, dict[str, Any](), set[str]()
-        self._is_taken = True
-        # What it is complete with, and what came too late for it.
-        self._expected, self._late = set(self._names), set[str]()
+        # Of measurements that are not complete, by when they were [ns]: poses, and frames of them.
+        self._open: dict[int, tuple[dict[str, Any], set[str]]] = {}
+        # When each body was measured last, and when the last measurement was that is complete.
+        self._measured: dict[str, int] = {}
+        self._last = 0
         try:
             self._subscriptions = [
                 OpenSubscription(
@@ -149,7 +146,7 @@ class BodyInput:
                     partial(self._on_pose, name),
                     partial(_reject, take),
                     decode=fast_decoder(PoseStamped),
-                    depth=NEWEST,
+                    is_stream=True,
                 )
                 for name in self._names
             ]
@@ -161,36 +158,29 @@ class BodyInput:
 
     def _on_pose(self, name: str, msg: Any, arrival: Arrival) -> None:
         stamp = nanoseconds_of(msg.header.stamp) or self._node.get_clock().now().nanoseconds
-        ahead = stamp - self._begin
-        is_same = abs(ahead) <= SAME_MEASUREMENT
-        if -LATE < ahead < 0 and not is_same:
-            self._late.add(name)
+        if not self._measured:
+            self._measured = dict.fromkeys(self._names, stamp)
+        self._measured[name] = stamp
+        if -SAME_MEASUREMENT <= self._last - stamp < LATE:
+            # It has been handed on without this one, or a newer one has.
             return
-        if not is_same or name in self._poses:
-            if not self._is_taken:
-                self._complete(arrival.received)
-            self._expected = {*self._poses, *self._late} or set(self._names)
-            self._begin, self._is_taken = stamp, False
-            self._poses, self._frames, self._late = {}, set(), set()
-        elif self._is_taken:
-            self._late.add(name)
-            return
-        self._poses[name] = msg.pose
-        self._frames.add(msg.header.frame_id)
-        self._begin = min(self._begin, stamp)
-        if self._expected <= set(self._poses):
-            self._complete(arrival.received)
+        self._open = {t: found for t, found in self._open.items() if abs(stamp - t) < LATE}
+        time_of = next((t for t in self._open if abs(stamp - t) <= SAME_MEASUREMENT), stamp)
+        poses, frames = self._open.setdefault(time_of, ({}, set()))
+        poses[name] = msg.pose
+        frames.add(msg.header.frame_id)
+        if all(
+            other in poses or abs(stamp - t) > LONGEST_BEHIND
+            for other, t in self._measured.items()
+        ):
+            self._last = time_of
+            self._open = {t: found for t, found in self._open.items() if t > time_of}
+            self._take(lambda: self._read(poses, frames, time_of), arrival.received)
 
-    def _complete(self, received: int) -> None:
-        poses, frames, begin = self._poses, self._frames, self._begin
-        self._is_taken = True
-
-        def read() -> TrackedPosture:
-            if len(frames) > 1:
-                raise MessageError(f'frames {sorted(frames)}, expected one for all rigid bodies')
-            return TrackedPosture(posture_of_poses(poses, self._names), begin, *frames)
-
-        self._take(read, received)
+    def _read(self, poses: Mapping[str, Any], frames: set[str], stamp: int) -> TrackedPosture:
+        if len(frames) > 1:
+            raise MessageError(f'frames {sorted(frames)}, expected one for all rigid bodies')
+        return TrackedPosture(posture_of_poses(poses, self._names), stamp, *frames)
 
 
 class JointInput:
