@@ -67,6 +67,7 @@ node = [line for line in needed if line.startswith(NODE)]
 executables = [
     'planner_node = rrth_planner.ros.planner_node:main',
     'playback_node = rrth_planner.ros.playback_node:main',
+    'body_boxes_node = rrth_planner.ros.body_boxes_node:main',
     'demo = rrth_planner.cli.demo:main',
     'plan = rrth_planner.cli.plan:main',
     'plot = rrth_planner.cli.plot:main',

@@ -55,6 +55,13 @@ COMMANDS = {
         'ros',
         'config/playback.yaml',
     ),
+    'body_boxes_node': Command(
+        'make boxes of a tracked wearer as a ROS node',
+        'ros.body_boxes_node',
+        (ROS,),
+        'ros',
+        'config/body_boxes.yaml',
+    ),
     'point_at': Command(
         'point the arm and wait until it has arrived', 'cli.point_at', (ROS, 'tqdm'), 'ros,tools'
     ),
@@ -114,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     lists: dict[str, list[str]] = {}
     for name, command in COMMANDS.items():
         title = 'commands that need ROS 2 Jazzy' if ROS in command.needs else 'commands'
-        lists.setdefault(title, []).append(f'  {name:14} {command.summary}')
+        lists.setdefault(title, []).append(f'  {name:16} {command.summary}')
     epilog = '\n\n'.join('\n'.join([f'{title}:', *lines]) for title, lines in lists.items())
     parser = argparse.ArgumentParser(
         prog='rrth',

@@ -208,10 +208,15 @@ def load_xml(path: str | Path) -> ElementTree.Element:
     Raise ModelError where it cannot be read, is no XML, is too long or too deep, or declares a
     document type.
     """
+    return parse_xml(read_bytes(path), f'file {path}')
+
+
+def parse_xml(data: bytes, name: str) -> ElementTree.Element:
+    """Return the root of XML, as `load_xml` does; name: what sentences call it."""
     parser = ElementTree.XMLParser(target=_Tree())
     try:
-        parser.feed(read_bytes(path))
+        parser.feed(data)
         root: ElementTree.Element = parser.close()
     except (SyntaxError, LookupError, ValueError) as problem:
-        raise ModelError(f'file {path}: {problem}; expected a readable XML file') from problem
+        raise ModelError(f'{name}: {problem}; expected a readable XML file') from problem
     return root

@@ -10,7 +10,16 @@ from rrth_planner.model.arrays import Array
 def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
     """Return the rotation of a quaternion of any positive length, shape (3, 3)."""
     q = np.asarray(quaternion_xyzw, dtype=np.float64)
-    x, y, z, w = q / np.linalg.norm(q)
+    return _matrix(*(q / np.linalg.norm(q)))
+
+
+def rotation_matrices(quaternions_xyzw: ArrayLike) -> Array:
+    """Return the rotations of quaternions of any positive lengths, (n, 4) -> (n, 3, 3)."""
+    q = np.asarray(quaternions_xyzw, dtype=np.float64)
+    return np.moveaxis(_matrix(*(q.T / np.linalg.norm(q, axis=1))), -1, 0)
+
+
+def _matrix(x: Array, y: Array, z: Array, w: Array) -> Array:
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -21,9 +30,9 @@ def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
 
 
 def quaternion_xyzw(rotation: Array) -> Array:
-    """Return the unit quaternion (x, y, z, w) of a rotation, w >= 0 (Shepperd 1978)."""
-    r = rotation
-    xx, yy, zz = np.diag(r)
+    """Return unit quaternions of rotations, (..., 3, 3) -> (..., 4), w >= 0 (Shepperd 1978)."""
+    r = np.moveaxis(rotation, (-2, -1), (0, 1))
+    xx, yy, zz = r[0, 0], r[1, 1], r[2, 2]
     xy, xz, yz = r[0, 1] + r[1, 0], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1]
     wx, wy, wz = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
     # Four times each product of two components.
@@ -36,9 +45,10 @@ def quaternion_xyzw(rotation: Array) -> Array:
         ]
     )
     # The largest of the four squares is far from zero, so the division below is safe.
-    q = table[int(np.argmax(np.diag(table)))]
-    q = q / np.linalg.norm(q)
-    return -q if q[3] < 0 else q
+    largest = np.argmax(np.einsum('ii...->i...', table), axis=0)
+    q = np.take_along_axis(table, largest[None, None], axis=0)[0]
+    q = q / np.linalg.norm(q, axis=0)
+    return np.moveaxis(np.where(q[3] < 0, -q, q), 0, -1)
 
 
 def roll_pitch_yaw(rotation: Array) -> Array:

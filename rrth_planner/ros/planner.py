@@ -2,13 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planner as a ROS 2 node: its services, start and shutdown."""
 
-import gc
 from importlib.util import find_spec
 import signal
-import sys
 from threading import Event
 import time
-import traceback
 from typing import Any, TYPE_CHECKING
 
 from geometry_msgs.msg import PointStamped, Pose
@@ -16,11 +13,10 @@ from nav_msgs.srv import GetPlan
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.model.errors import MessageError, ModelError, one_line, RrthError
+from rrth_planner.model.errors import MessageError, ModelError, RrthError
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.ros.interface.parameters import (
     current_parameters,
@@ -28,7 +24,7 @@ from rrth_planner.ros.interface.parameters import (
     PlannerParameters,
 )
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
-from rrth_planner.ros.middleware.executor import OneThreadExecutor
+from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
 
@@ -39,8 +35,6 @@ if TYPE_CHECKING:
 
 NAME = 'rrth_planner'
 BEGIN = time.monotonic()
-# After so long a thread lets another one run [s].
-SWITCH_INTERVAL = 5e-4
 
 
 class PlannerNode(Node):
@@ -193,12 +187,13 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = PlannerNode(worker=worker)
-        _settle_interpreter()
+        settle_interpreter()
         is_shutting_down = Event()
         # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: is_shutting_down.set())
-        _spin(node, is_shutting_down)
+        # The timers of the node wake it up often enough to see the signal.
+        spin(node, node.fail, is_shutting_down.is_set)
     except KeyboardInterrupt:
         pass
     except (RrthError, ParameterException, RuntimeError) as problem:
@@ -212,29 +207,3 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
             node.destroy_node()
         rclpy.try_shutdown()
     return 0
-
-
-def _spin(node: PlannerNode, is_shutting_down: Event) -> None:
-    """Run the node until a signal; an error in a callback stops the arm, not the node."""
-    executor = OneThreadExecutor()
-    executor.add_node(node)
-    # The timers of the node wake it up often enough to see the signal.
-    while rclpy.ok() and not is_shutting_down.is_set():
-        try:
-            executor.spin_once()
-        except ExternalShutdownException:
-            return
-        except Exception as problem:
-            if not rclpy.ok():
-                return
-            node.get_logger().error(traceback.format_exc())
-            node.fail(one_line(f'{type(problem).__name__}: {problem}'))
-
-
-def _settle_interpreter() -> None:
-    """Shorten the pauses of garbage collector and thread switches."""
-    # Half a million objects of numba and ROS live as long as the node: the collector skips them.
-    gc.collect()
-    gc.freeze()
-    # Worker and executor share the interpreter; the default is 5 ms.
-    sys.setswitchinterval(SWITCH_INTERVAL)

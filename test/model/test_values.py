@@ -17,7 +17,12 @@ from rrth_planner.model.arrays import FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
-from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
+from rrth_planner.model.rotation import (
+    pose_matrix,
+    quaternion_xyzw,
+    rotation_matrices,
+    rotation_matrix,
+)
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.planning.options import RRTHOptions
@@ -453,6 +458,17 @@ def test_a_quaternion_comes_back_from_its_rotation(parts):
     assert back[3] >= 0.0
     assert min(np.abs(back - unit).max(), np.abs(back + unit).max()) < 1e-9
     assert np.abs(rotation_matrix(back) - R).max() < 1e-12
+
+
+@examples(100)
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(0, 5))
+def test_many_rotations_and_quaternions_are_those_of_each(seed, n):
+    quaternions = np.random.default_rng(seed).standard_normal((n, 4))
+    many = rotation_matrices(quaternions)
+    each = [rotation_matrix(q) for q in quaternions]
+    np.testing.assert_allclose(many, np.reshape(each, (n, 3, 3)), rtol=0, atol=1e-14)
+    back = [quaternion_xyzw(R) for R in many]
+    np.testing.assert_allclose(quaternion_xyzw(many), np.reshape(back, (n, 4)), atol=1e-14)
 
 
 @examples(100)

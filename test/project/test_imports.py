@@ -75,6 +75,7 @@ LATE = {
     'rrth_planner.ros.planner',
     'rrth_planner.ros.planner_node',
     'rrth_planner.execution.playback',
+    'rrth_planner.ros.interface.posture_inputs',
     *(
         f'rrth_planner.cli.{name}'
         for name in (

@@ -13,12 +13,17 @@ from rclpy.expand_topic_name import expand_topic_name  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
+from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
 from rrth_planner.ros.messages.frames import tf2_ros  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
-NODES = {'/rrth_planner': PlannerNode, '/arm_playback': PlaybackNode}
+NODES = {
+    '/rrth_planner': PlannerNode,
+    '/arm_playback': PlaybackNode,
+    '/body_boxes_node': BodyBoxesNode,
+}
 # What is done with topics and services, and how a node names its own.
 DEEDS = {
     ('topics', 'publish'): 'publisher',
@@ -29,7 +34,8 @@ DEEDS = {
 TF = {'/tf', '/tf_static'} if tf2_ros is None else set()
 # These decide whether the arm is safe: only their owner may publish them.
 ONE_SPEAKER = {
-    '/body_boxes': '/wearer',
+    '/markers': '/wearer',
+    '/body_boxes': '/body_boxes_node',
     '/target': '/operator',
     '/joint_states': '/arm_playback',
     '/joint_trajectory': '/rrth_planner',

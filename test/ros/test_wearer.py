@@ -20,11 +20,8 @@ from rrth_planner.io.motion_capture_file import load_person  # noqa: E402
 from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.ros.client.person_publisher import FORMS, PersonPublisher  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
-from rrth_planner.ros.messages.tracked_person import (  # noqa: E402
-    boxes_to_msg,
-    points_to_msg,
-    poses_to_msg,
-)
+from rrth_planner.ros.messages.part_markers import PartMarkers  # noqa: E402
+from rrth_planner.ros.messages.tracked_person import points_to_msg, poses_to_msg  # noqa: E402
 from rrth_planner.wearer.body_boxes import body_boxes  # noqa: E402
 from rrth_planner.wearer.posture import Posture  # noqa: E402
 from rrth_planner.wearer.recorded_person import posture_at  # noqa: E402
@@ -57,6 +54,11 @@ def wearer(*arguments):
 def seconds(stamp):
     """Return a stamp of a message [s]."""
     return stamp.sec + 1e-9 * stamp.nanosec
+
+
+def part_markers(skeleton):
+    """Return what makes markers of the parts of a skeleton."""
+    return PartMarkers([part.name for part in skeleton.parts], 0.5)
 
 
 def posture_of(names=('a', 'b'), lost=False):
@@ -96,10 +98,10 @@ def test_what_is_published_is_what_was_measured_at_its_stamp(form, spinning, wai
             return None
         stamp = headers[0].stamp
         if form == 'boxes':
-            return boxes_to_msg(body_boxes(skeleton, posture)[0], skeleton, 'torso', stamp)
+            return part_markers(skeleton).message(body_boxes(skeleton, posture)[0], 'torso', stamp)
         if form == 'markers':
             return points_to_msg(posture, skeleton, 'tracker', stamp)
-        return poses_to_msg(posture, 'tracker', stamp)
+        return poses_to_msg(posture, skeleton, 'tracker', stamp)
 
     def places(msg):
         poses = msg.poses if form == 'poses' else [m.pose for m in msg.markers]
@@ -107,7 +109,7 @@ def test_what_is_published_is_what_was_measured_at_its_stamp(form, spinning, wai
 
     def is_equal(msg, number):
         other = expected(number)
-        return other is not None and np.array_equal(places(msg), places(other))
+        return other is not None and np.array_equal(places(msg), places(other), equal_nan=True)
 
     first = next(k for k in range(2000) if is_equal(received[0][0], k))
     for (msg, _), number in zip(received, numbers, strict=True):
@@ -120,14 +122,14 @@ def test_the_boxes_are_a_wearer_for_the_planner():
     for time_s in (0.0, 1.7, 5.2):
         scene, missing = body_boxes(skeleton, posture_at(person, time_s))
         assert not missing
-        msg = boxes_to_msg(scene, skeleton, 'torso', PoseArray().header.stamp)
+        msg = part_markers(skeleton).message(scene, 'torso', PoseArray().header.stamp)
         body = body.apply(msg, 10.0 + time_s, 'torso')
         found = scene_of(body)
         assert [box.name for box in found.boxes] == [box.name for box in scene.boxes]
         np.testing.assert_allclose(found.numbers, scene.numbers, atol=1e-9)
     # Each marker ends by itself.
     assert not body.at(20.0).parts
-    assert set(body.at(20.0).expired_names.split(', ')) == {f'"{b.name}"' for b in scene.boxes}
+    assert set(body.at(20.0).lost_names().split(', ')) == {f'"{b.name}"' for b in scene.boxes}
 
 
 def test_a_part_that_is_lost_keeps_its_id_and_is_left_out():
@@ -139,8 +141,8 @@ def test_a_part_that_is_lost_keeps_its_id_and_is_left_out():
     ids = []
     for posture in (seen, lost):
         scene, missing = body_boxes(skeleton, posture)
-        msg = boxes_to_msg(scene, skeleton, 'torso', PoseArray().header.stamp)
-        ids.append({m.text: m.id for m in msg.markers})
+        msg = part_markers(skeleton).message(scene, 'torso', PoseArray().header.stamp)
+        ids.append({m.text: (m.ns, m.id) for m in msg.markers})
         assert all(m.action == Marker.ADD and m.type == Marker.CUBE for m in msg.markers)
         assert all(seconds(m.lifetime) == 0.5 for m in msg.markers)
     assert missing
@@ -158,16 +160,27 @@ def test_points_have_the_ids_of_the_skeleton_and_lost_ones_are_left_out():
         assert marker.pose.position.y == 3.0 * k + 1.0
     # Where a skeleton has none, they are counted.
     other = points_to_msg(
-        posture_of(), load_skeleton('cmu_bvh'), 'tracker', PoseArray().header.stamp
+        posture_of(), load_skeleton('tum_bvh'), 'tracker', PoseArray().header.stamp
     )
     assert [m.id for m in other.markers] == [0, 1]
 
 
 def test_poses_that_are_lost_are_no_numbers():
-    msg = poses_to_msg(posture_of(lost=True), 'tracker', PoseArray().header.stamp)
+    unordered = load_skeleton('tum_bvh')
+    msg = poses_to_msg(posture_of(lost=True), unordered, 'tracker', PoseArray().header.stamp)
     assert [pose.position.x for pose in msg.poses[:1]] == [0.0]
     assert np.isnan(msg.poses[1].position.x)
     assert np.isnan(msg.poses[0].orientation.w)
+
+
+def test_poses_are_in_the_order_of_the_skeleton_and_what_it_has_not_is_left_out():
+    xsens = load_skeleton('xsens')
+    names = ('hat', *reversed(xsens.names_by_id[1:]))
+    msg = poses_to_msg(posture_of(names), xsens, 'tracker', PoseArray().header.stamp)
+    assert len(msg.poses) == len(xsens.names_by_id)
+    assert np.isnan(msg.poses[0].position.x)
+    for name, pose in zip(xsens.names_by_id[1:], msg.poses[1:], strict=True):
+        assert pose.position.x == 3.0 * names.index(name)
 
 
 def test_a_person_without_a_base_frame_is_not_published(wait_until, spinning):

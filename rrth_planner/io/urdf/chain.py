@@ -87,9 +87,9 @@ class UrdfChain:
             if joint.origin is not None:
                 T = T @ joint.origin
             if joint.type == 'prismatic':
-                T = T @ transformations.translation_matrix(next(values) * _axis(joint))
+                T = T @ transformations.translation_matrix(next(values) * joint_axis(joint))
             elif joint.type != 'fixed':
-                T = T @ transformations.rotation_matrix(next(values), _axis(joint))
+                T = T @ transformations.rotation_matrix(next(values), joint_axis(joint))
         return np.asarray(T)
 
 
@@ -115,9 +115,7 @@ def read_chain(
     require('tools', *TOOLS)
     if ray not in RAYS:
         raise ModelError(f'ray: {ray!r}, expected one of +x, -x, +y, -y, +z, -z')
-    model = _load(Path(path))
-    for element in (model.robot, *model.robot.links, *model.robot.joints):
-        printable(element.name, 'name', ModelError)
+    model = urdf_model(load_xml(path), f'file {path}')
     joints, base, tool = _between(model, base, tool)
     T, frames, moving = np.eye(4), [], []
     for joint in joints:
@@ -130,7 +128,7 @@ def read_chain(
         raise ModelError(
             f'URDF {path}: no joint moves between "{base}" and "{tool}", expected one'
         )
-    axes = [R[:3, :3] @ _axis(joint) for R, joint in zip(frames, moving, strict=True)]
+    axes = [R[:3, :3] @ joint_axis(joint) for R, joint in zip(frames, moving, strict=True)]
     limits = [_limits(joint) for joint in moving]
     return UrdfChain(
         name=str(model.robot.name),
@@ -146,22 +144,23 @@ def read_chain(
     )
 
 
-def _load(path: Path) -> Any:
+def urdf_model(root: ElementTree.Element, label: str) -> Any:
+    """Return the robot of a URDF without meshes, or raise ModelError naming it by a label."""
     logging.getLogger('yourdfpy').setLevel(logging.CRITICAL)
     # Strictly, where yourdfpy would make something of any file.
-    root = load_xml(path)
     if any('xacro' in element.tag for element in root.iter()):
-        raise ModelError(
-            f'file {path}: a xacro file, expected a URDF (xacro {path.name} > arm.urdf)'
-        )
+        raise ModelError(f'{label}: a xacro file, expected a URDF (xacro FILE > arm.urdf)')
     for origin in root.iter('origin'):
-        _check_origin(origin, f'file {path}: origin')
+        _check_origin(origin, f'{label}: origin')
     try:
         text = io.BytesIO(ElementTree.tostring(root))
-        return yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False)
+        model = yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False)
     except NO_URDF as problem:
         said = ' '.join(f'{type(problem).__name__}: {problem}'.split())
-        raise ModelError(f'file {path}: no URDF ({said}), expected one') from problem
+        raise ModelError(f'{label}: no URDF ({said}), expected one') from problem
+    for element in (model.robot, *model.robot.links, *model.robot.joints):
+        printable(element.name, 'name', ModelError)
+    return model
 
 
 def _check_origin(origin: ElementTree.Element, label: str) -> None:
@@ -226,7 +225,8 @@ def _only(links: list[str], option: str) -> str:
     return links[0]
 
 
-def _axis(joint: Any) -> Array:
+def joint_axis(joint: Any) -> Array:
+    """Return the unit axis of a joint, or raise ModelError."""
     label = f'joint "{joint.name}": axis'
     axis = frozen_array(joint.axis, (3,), label, '-', ModelError, FARTHEST)
     length = float(np.linalg.norm(axis))

@@ -9,7 +9,8 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rrth_planner.model.errors import SceneError
-from rrth_planner.ros.messages.tracked_person import boxes_to_msg, points_to_msg, poses_to_msg
+from rrth_planner.ros.messages.part_markers import PartMarkers
+from rrth_planner.ros.messages.tracked_person import LIFETIME, points_to_msg, poses_to_msg
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import Skeleton
@@ -32,6 +33,7 @@ class PersonPublisher(Node):
         """Create the publisher."""
         super().__init__('rrth_wearer')
         self._skeleton, self._form = skeleton, form
+        self._parts = PartMarkers((part.name for part in skeleton.parts), LIFETIME)
         topic, kind = FORMS[form]
         # As of trackers, the last one counts, and for those only who are there.
         self.publisher = self.create_publisher(kind, topic, QoSProfile(depth=1))
@@ -46,9 +48,8 @@ class PersonPublisher(Node):
         if self._form == 'boxes':
             with suppress(SceneError):
                 scene, _ = body_boxes(self._skeleton, posture)
-                message = boxes_to_msg(scene, self._skeleton, BASE_FRAME, stamp)
-                self.publisher.publish(message)
+                self.publisher.publish(self._parts.message(scene, BASE_FRAME, stamp))
         elif self._form == 'markers':
             self.publisher.publish(points_to_msg(posture, self._skeleton, TRACKER_FRAME, stamp))
         else:
-            self.publisher.publish(poses_to_msg(posture, TRACKER_FRAME, stamp))
+            self.publisher.publish(poses_to_msg(posture, self._skeleton, TRACKER_FRAME, stamp))

@@ -3,18 +3,19 @@
 """Report the outcomes of requests and the state of the monitor: log and diagnostics."""
 
 from dataclasses import dataclass, replace
-import math
 from pathlib import Path
 from threading import Lock
 import time
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.errors import one_line
+from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.diagnostics import status_to_msg
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 
 # Diagnostics are published at least this often [s].
@@ -23,8 +24,6 @@ PERIOD = 1.0
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
 SHORTEST_PERIOD = 0.1
-# Durations are counted in bins: bins in a decade, decades, and where the first begins [s].
-BINS, DECADES, SHORTEST = 48, 8, 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,41 +58,6 @@ class PlanReport:
     duration: float = float('nan')
     length: float = float('nan')
     clearance: float = float('nan')
-
-
-class Figures:
-    """A count, and statistics of a duration: the last, quantiles, the greatest [s]."""
-
-    def __init__(self) -> None:
-        """Begin with nothing done."""
-        self.n, self.last, self.most = 0, 0.0, 0.0
-        # Of constant size, however long the node runs.
-        self._counts = [0] * (BINS * DECADES)
-
-    def add(self, elapsed: float) -> None:
-        """Count one more, with its duration [s]."""
-        self.n, self.last, self.most = self.n + 1, elapsed, max(self.most, elapsed)
-        ratio = min(max(elapsed / SHORTEST, 1.0), 10.0**DECADES)
-        self._counts[min(math.ceil(BINS * math.log10(ratio)), len(self._counts) - 1)] += 1
-
-    def quantile(self, share: float) -> float:
-        """Return what a share of the durations do not exceed, rounded up by at most 5 % [s]."""
-        wanted, seen = share * self.n, 0
-        for k, count in enumerate(self._counts):
-            seen += count
-            if count and seen >= wanted:
-                return min(self.most, SHORTEST * 10.0 ** (k / BINS))
-        return self.most
-
-    def __str__(self) -> str:
-        """Return the figures in a line."""
-        shown = {
-            'last': self.last,
-            'p50': self.quantile(0.5),
-            'p99': self.quantile(0.99),
-            'at most': self.most,
-        }
-        return ', '.join([str(self.n), *(f'{k} {1e3 * v:.3f} ms' for k, v in shown.items())])
 
 
 class Reporter:
@@ -196,14 +160,8 @@ class Reporter:
             values[f'rejected messages, {name}'] = topic.n_rejected
             values[f'last rejection, {name}'] = topic.rejection or ''
         level, message = summary(now, self._inputs, self.parameters, report)
-        status = DiagnosticStatus(
-            level=level,
-            name=f'{self._node.get_fully_qualified_name().lstrip("/")}: planning',
-            hardware_id='rrth_planner',
-            message=message,
-        )
-        status.values = [KeyValue(key=k, value=one_line(str(v))) for k, v in values.items()]
-        return status
+        name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
+        return status_to_msg(name, level, message, values)
 
     def _warn_of_lost(self, now: float) -> None:
         """Log each lost part once."""

@@ -77,11 +77,20 @@ class Frames:
         t, r = stamped.transform.translation, stamped.transform.rotation
         return pose_matrix((t.x, t.y, t.z), (r.x, r.y, r.z, r.w))
 
-    def _is_late(self, frame: str, stamp: int) -> bool:
-        """Return whether a frame is known, but not yet at a time [ns]."""
+    def newest(self, frame: str) -> int:
+        """Return when a frame's pose was known last [ns], 0 where it is fixed; or FrameError."""
         assert self._buffer is not None
         try:
             newest = self._buffer.get_latest_common_time(self._base_frame, frame)
-        except tf2_ros.TransformException:
+        except tf2_ros.TransformException as problem:
+            raise FrameError(
+                f'frame "{frame}", expected a frame that TF knows: {problem}'
+            ) from problem
+        return int(newest.nanoseconds)
+
+    def _is_late(self, frame: str, stamp: int) -> bool:
+        """Return whether a frame is known, but not yet at a time [ns]."""
+        try:
+            return self.newest(frame) < stamp
+        except FrameError:
             return False
-        return bool(newest.nanoseconds < stamp)

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""A tracked person as messages: his boxes, or the points and frames of his skeleton."""
+"""A tracked person as messages: the points and frames of his skeleton."""
 
 import math
 
@@ -8,29 +8,14 @@ from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Pose, PoseArray
 import numpy as np
 from rrth_planner.model.rotation import quaternion_xyzw
-from rrth_planner.model.scene import Scene
 from rrth_planner.ros.messages.body_writer import COLOR
-from rrth_planner.ros.messages.plan_markers import box_marker
 from rrth_planner.wearer.posture import Posture
 from rrth_planner.wearer.skeleton import Skeleton
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-# A part that is not seen for so long is lost [s]; so wide is a point [m].
+# A point that is not seen for so long is lost [s]; so wide is it [m].
 LIFETIME, WIDTH = 0.5, 0.05
-
-
-def boxes_to_msg(scene: Scene, skeleton: Skeleton, frame: str, stamp: Time) -> MarkerArray:
-    """
-    Return a CUBE for each part that is seen, in a frame; the id of a part is always the same.
-
-    Parts that are missing are left out: where they were they stay until their lifetime has passed.
-    """
-    numbers = {part.name: k for k, part in enumerate(skeleton.parts)}
-    markers = [box_marker('body', numbers[box.name], box, COLOR) for box in scene.boxes]
-    for marker, box in zip(markers, scene.boxes, strict=True):
-        marker.text = box.name
-    return _complete(markers, frame, stamp)
 
 
 def points_to_msg(posture: Posture, skeleton: Skeleton, frame: str, stamp: Time) -> MarkerArray:
@@ -47,15 +32,23 @@ def points_to_msg(posture: Posture, skeleton: Skeleton, frame: str, stamp: Time)
             s.x = s.y = s.z = WIDTH
             c.r, c.g, c.b, c.a = COLOR
             markers.append(marker)
-    return _complete(markers, frame, stamp)
+    for marker in markers:
+        marker.header.frame_id, marker.header.stamp = frame, stamp
+        marker.lifetime = Duration(nanosec=round(1e9 * LIFETIME))
+    return MarkerArray(markers=markers)
 
 
-def poses_to_msg(posture: Posture, frame: str, stamp: Time) -> PoseArray:
-    """Return the pose of each point, in the order of their names; what is lost is NaN."""
+def poses_to_msg(posture: Posture, skeleton: Skeleton, frame: str, stamp: Time) -> PoseArray:
+    """Return the pose of each point, in the order of the skeleton; what is lost is NaN."""
     message = PoseArray(header=Header(frame_id=frame, stamp=stamp))
-    for k, position in enumerate(posture.positions.tolist()):
-        quaternion = [math.nan] * 4
-        if posture.rotations is not None and not np.isnan(posture.rotations[k]).any():
+    place = {name: k for k, name in enumerate(posture.names)}
+    # Trackers without numbers count their points.
+    for name in skeleton.names_by_id or posture.names:
+        position, quaternion = [math.nan] * 3, [math.nan] * 4
+        k = place.get(name)
+        if k is not None:
+            position = posture.positions[k].tolist()
+        if k is not None and posture.rotations is not None:
             quaternion = quaternion_xyzw(posture.rotations[k]).tolist()
         pose = Pose()
         p, o = pose.position, pose.orientation
@@ -63,10 +56,3 @@ def poses_to_msg(posture: Posture, frame: str, stamp: Time) -> PoseArray:
         o.x, o.y, o.z, o.w = quaternion
         message.poses.append(pose)
     return message
-
-
-def _complete(markers: list[Marker], frame: str, stamp: Time) -> MarkerArray:
-    for marker in markers:
-        marker.header.frame_id, marker.header.stamp = frame, stamp
-        marker.lifetime = Duration(nanosec=round(1e9 * LIFETIME))
-    return MarkerArray(markers=markers)

@@ -1,0 +1,105 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node `body_boxes_node`: boxes round a wearer whom a tracker sees."""
+
+from collections.abc import Callable
+import sys
+from typing import Any
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.time import Time
+from rrth_planner.model.errors import MessageError, RrthError, SceneError
+from rrth_planner.ros.interface.posture_inputs import create_input
+from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
+from rrth_planner.ros.interface.tracker_reporter import TrackerReporter
+from rrth_planner.ros.messages.fields import NANOSECONDS
+from rrth_planner.ros.messages.part_markers import PartMarkers
+from rrth_planner.ros.messages.posture import TrackedPosture
+from rrth_planner.ros.middleware.executor import settle_interpreter, spin
+from rrth_planner.wearer.body_boxes import body_boxes
+from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
+from visualization_msgs.msg import MarkerArray
+
+NAME = 'body_boxes_node'
+
+
+class BodyBoxesNode(Node):
+    """Publishes the boxes of each posture that comes, in the base frame, with its stamp."""
+
+    def __init__(self, **options: Any) -> None:
+        """Declare parameters and interfaces; bad values raise, naming the parameter."""
+        super().__init__(NAME, **options)
+        self._settings = declare_tracker_parameters(self)
+        self._before: FilteredPosture | None = None
+        names = (part.name for part in self._settings.skeleton.parts)
+        self._markers = PartMarkers(names, self._settings.lifetime)
+        # The last body counts, and for those only who are there.
+        self._publisher = self.create_publisher(MarkerArray, 'body_boxes', QoSProfile(depth=1))
+        self._reporter = TrackerReporter(self, self._settings.input, self._settings.lifetime)
+        self._input = create_input(self, self._settings, self._take)
+
+    def _take(self, read: Callable[[], TrackedPosture], arrived: int) -> None:
+        """Publish the boxes of what `read` returns; arrived [ns]."""
+        self._reporter.received()
+        try:
+            tracked = read()
+            # Without a stamp it is as old as it is here.
+            measured = tracked.stamp or self.get_clock().now().nanoseconds
+            msg, lost = self._boxes_of(tracked, measured)
+        except (MessageError, SceneError) as problem:
+            self._reporter.rejected(problem)
+            return
+        self._publisher.publish(msg)
+        self._reporter.published(measured, arrived, lost)
+
+    def _boxes_of(
+        self, tracked: TrackedPosture, measured: int
+    ) -> tuple[MarkerArray, tuple[str, ...]]:
+        """Return the boxes of a posture measured at a time [ns], and the parts that are lost."""
+        settings = self._settings
+        self._before = without_jumps(
+            self._before, tracked.posture, measured / NANOSECONDS, settings.max_jump
+        )
+        self._reporter.jumped(self._before.n_held)
+        scene, lost = body_boxes(settings.skeleton, self._before.posture)
+        if not scene.boxes:
+            raise SceneError(
+                'all parts of the wearer are lost, expected the points of at least one'
+            )
+        # A tracker that reports in the base frame has its own name for it.
+        own = tracked.frame if settings.skeleton.base is None else ''
+        stamp = Time(nanoseconds=measured).to_msg()
+        return self._markers.message(scene, own or settings.base_frame, stamp), lost
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until a signal; return the exit code."""
+    node = None
+    try:
+        rclpy.init(args=args)
+        node = BodyBoxesNode()
+        settle_interpreter()
+        spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (RrthError, ParameterException) as problem:
+        get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
+        return 1
+    except Exception:
+        # A signal between two statements of a callback leaves publishers without a context.
+        if rclpy.ok():
+            raise
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,81 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of the node that makes boxes of a tracked skeleton."""
+
+from dataclasses import dataclass, replace
+
+from rclpy.node import Node
+from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.model.errors import OptionsError
+from rrth_planner.ros.messages.posture import ONLY
+from rrth_planner.ros.middleware.parameter_declaration import declare, reject_unknown, Setting
+from rrth_planner.wearer.skeleton import Skeleton
+
+# What a tracker publishes, and which of these have numbers in place of names.
+INPUTS = ('markers', 'poses', 'bodies', 'joint_states', 'tf')
+NUMBERED = ('markers', 'poses')
+# What stands for the name of a rigid body in the name of its topic.
+NAME = '{name}'
+
+# None changes while the node runs.
+SETTINGS = tuple(
+    replace(setting, is_read_only=True)
+    for setting in (
+        Setting(
+            'skeleton', 'azure_kinect', 'name or path', 'of config/skeletons, or a .yaml file'
+        ),
+        Setting('input', 'markers', ' or '.join(INPUTS), 'what the tracker publishes'),
+        Setting(
+            'person', ONLY, '-', 'number of the wearer among markers; -1: the only one', -1, 10**7
+        ),
+        Setting(
+            'pose_topic', f'{NAME}/pose', 'name', 'topic of each rigid body; {name} is its name'
+        ),
+        Setting('rate', 120.0, 'Hz', 'how often TF is looked up', 1.0, 1000.0),
+        Setting('base_frame', 'torso', 'frame id', 'frame of the boxes'),
+        Setting('lifetime', 0.2, 's', 'a part that is not seen for so long is lost', 0.001, 60.0),
+        Setting('max_jump', 0.3, 'm', 'a point that moves further is held back', 0.01, 100.0),
+    )
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class TrackerParameters:
+    """All parameters, checked: as `SETTINGS`, and the skeleton read."""
+
+    skeleton: Skeleton
+    input: str
+    person: int
+    pose_topic: str
+    rate: float
+    base_frame: str
+    lifetime: float
+    max_jump: float
+
+
+def declare_tracker_parameters(node: Node) -> TrackerParameters:
+    """
+    Declare all parameters on a node, none of which changes while it runs, and return them.
+
+    Raises
+    ------
+    RrthError
+        A value that is rejected, or a skeleton that cannot be read or does not fit the input.
+
+    """
+    reject_unknown(node, SETTINGS)
+    declare(node, SETTINGS)
+    values = {setting.name: node.get_parameter(setting.name).value for setting in SETTINGS}
+    if values['input'] not in INPUTS:
+        raise OptionsError(f'input: "{values["input"]}", expected one of {", ".join(INPUTS)}')
+    if not values['base_frame']:
+        raise OptionsError('base_frame: empty, expected the name of the frame of the boxes')
+    if NAME not in values['pose_topic']:
+        raise OptionsError(f'pose_topic: "{values["pose_topic"]}", expected a name with {NAME}')
+    skeleton = load_skeleton(values['skeleton'])
+    if values['input'] in NUMBERED and not skeleton.names_by_id:
+        raise OptionsError(
+            f'input: {values["input"]}, which have no names; expected a skeleton with '
+            f'names_by_id, which "{values["skeleton"]}" has not'
+        )
+    return TrackerParameters(**{**values, 'skeleton': skeleton})
