@@ -109,7 +109,7 @@ def soak_person(
     """
     Return what was seen of an arm on a recorded person for a time [s].
 
-    file: the recording; None for that of the package. rate: how fast it is played, to and fro.
+    file: the recording; None for that of the package. rate: how fast it is played, back and forth.
     """
     record = PersonRecord('construction work' if file is None else file.stem, rate)
     begin = 0.0 if file is None else T_POSE

@@ -57,7 +57,7 @@ METHOD = """\
 - `--awake`: a process of idle priority keeps each processor out of idle states, as `idle=poll`
   of the kernel does. `--alone`: the planner node runs on the last processor, all else on the
   others, as with `taskset`; without, all run where the system puts them.
-- **Recorded people** (one comes with the package) are played to and fro, as 60 bodies a second
+- **Recorded people** (one comes with the package) are played back and forth, as 60 bodies a second
   with the lifetime and the stamps that `wearer` gives them. The arm is asked for targets low in
   front, one after the other: aimed in time is a request after which the arm rests and aims
   within 6 s. Its joint states, at 100 Hz while it moves, are checked against the boxes of that
