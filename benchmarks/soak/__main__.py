@@ -18,6 +18,7 @@ MISSING = """{}: not installed, and nothing can be soaked without; install what 
 PLANS, QUICK = 100_000, 500
 HANDS, QUICK_HANDS = 300, 15
 FLOODED, QUICK_FLOODED = 200, 20
+PEOPLE, QUICK_PEOPLE = 40.0, 10.0
 FOREVER = 1e9
 SWITCH_INTERVAL = 2e-4
 
@@ -47,6 +48,7 @@ def _run(options: argparse.Namespace) -> int:
     from benchmarks.common.standstill import StandstillWatch
     from benchmarks.soak.flood import FloodRecord, soak_floods
     from benchmarks.soak.monitor import soak_monitor
+    from benchmarks.soak.people import PersonRecord, soak_people
     from benchmarks.soak.plans import soak_plans
     from benchmarks.soak.report import draw_memory, report
 
@@ -59,9 +61,11 @@ def _run(options: argparse.Namespace) -> int:
     n_plans = QUICK if options.quick else options.plans
     n_hands = QUICK_HANDS if options.quick else options.hands
     n_flooded = QUICK_FLOODED if options.quick else options.flooded
+    seconds = QUICK_PEOPLE if options.quick else options.people
     longest = 60.0 * options.minutes if options.minutes else FOREVER
     plans = monitor = None
     floods: list[FloodRecord] = []
+    people: list[PersonRecord] = []
     watch = StandstillWatch()
     with (
         OnEachProcessor(stay_awake) if options.awake else nullcontext(),
@@ -76,16 +80,18 @@ def _run(options: argparse.Namespace) -> int:
         parts = [part for part in (plans, monitor) if part]
         if n_flooded and not any(part.is_interrupted for part in parts):
             floods = soak_floods(n_flooded, Path(name), is_alone=options.alone)
+        if seconds and not any(part.is_interrupted for part in (*parts, *floods)):
+            people = soak_people(options.recordings, seconds, Path(name))
     default = Path('build/reliability.md' if options.quick else 'docs/reliability.md')
     target = options.output or default
     target.parent.mkdir(parents=True, exist_ok=True)
     if plans and plans.memory:
         draw_memory(plans.memory, target.parent / 'images' / 'reliability')
-    text = report(plans, monitor, _command(options), options.remark, watch.found, floods)
+    text = report(plans, monitor, _command(options), options.remark, watch.found, floods, people)
     replace_file(target, lambda path: path.write_text(text, encoding='utf-8'))
     print(text.partition('## Plans')[0])
     print(f'{target}: written')
-    return 130 if any(part.is_interrupted for part in (*parts, *floods)) else 0
+    return 130 if any(part.is_interrupted for part in (*parts, *floods, *people)) else 0
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -95,6 +101,8 @@ def _command(options: argparse.Namespace) -> str:
     parts += [f'--plans {options.plans}'] if options.plans != PLANS else []
     parts += [f'--hands {options.hands}'] if options.hands != HANDS else []
     parts += [f'--flooded {options.flooded}'] if options.flooded != FLOODED else []
+    parts += [f'--people {options.people:g}'] if options.people != PEOPLE else []
+    parts += ['--recordings ...'] if options.recordings else []
     parts += ['--awake'] if options.awake else []
     parts += ['--alone'] if options.alone else []
     parts += [f'--minutes {options.minutes:g}'] if options.minutes else []
@@ -106,7 +114,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--quick',
         action='store_true',
-        help=f'{QUICK} plans, {QUICK_HANDS} hands, {QUICK_FLOODED} requests: two minutes',
+        help=f'{QUICK} plans, {QUICK_HANDS} hands, {QUICK_FLOODED} requests, {QUICK_PEOPLE:g} s a '
+        'person: three minutes',
     )
     parser.add_argument(
         '--plans', type=_count, default=PLANS, metavar='N', help=f'how many ({PLANS}; 0: none)'
@@ -124,6 +133,21 @@ def _parser() -> argparse.ArgumentParser:
         default=FLOODED,
         metavar='N',
         help=f'requests while a topic is flooded, for each ({FLOODED}; 0: none)',
+    )
+    parser.add_argument(
+        '--people',
+        type=float,
+        default=PEOPLE,
+        metavar='S',
+        help=f'how long recorded people wear the arm, each [s] ({PEOPLE:g}; 0: none)',
+    )
+    parser.add_argument(
+        '--recordings',
+        type=Path,
+        nargs='*',
+        default=[],
+        metavar='FILE',
+        help='further recordings, in the layouts of CMU or TUM',
     )
     parser.add_argument('--minutes', type=float, help='the longest time for plans, and for hands')
     parser.add_argument(

@@ -1,16 +1,18 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Part three of the soak: recorded people wear the arm while it is asked for one target after another."""
+"""Part three of the soak: recorded people wear the arm, which is asked for target after target."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-import os
 from pathlib import Path
 import sys
 import time
+from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
+from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel, pointing_error
 from rrth_planner.model.scene import Scene
@@ -27,13 +29,15 @@ from benchmarks.soak.monitor import ARGUMENTS, PLANNER, PLAYBACK
 
 WEARER = 'rrth_planner.cli.wearer'
 # Targets low in front of the wearer, where his hands work: lower and upper corner [m].
-LOW_IN_FRONT = np.array([[0.5, -0.6, -0.8], [1.5, 0.6, -0.1]])
+LOW_IN_FRONT = np.array([[0.8, -0.6, -0.6], [1.6, 0.6, 0.0]])
 # An arm that aims this near to its target has arrived [m]; a request has so long for that [s].
 AIMS, PATIENCE = 0.02, 6.0
 # A slower arm is at rest [rad/s].
 REST = 1e-3
-# A tracker publishes so often [1/s].
-FPS = 60
+# A tracker publishes so often [1/s]; recordings begin with a T-pose of so long [s].
+FPS, T_POSE = 60, 0.1
+# The recording of the package is played at these rates.
+RATES = (1.0, 1.5)
 
 
 @dataclass(slots=True)
@@ -78,6 +82,17 @@ class PersonRecord:
     is_interrupted: bool = False
 
 
+def soak_people(recordings: Sequence[Path], seconds: float, folder: Path) -> list[PersonRecord]:
+    """Return what was seen of an arm on the person of the package, and on recorded ones."""
+    cases = [(None, rate) for rate in RATES] + [(file, 1.0) for file in recordings]
+    records: list[PersonRecord] = []
+    for seed, (file, rate) in enumerate(cases):
+        records.append(soak_person(file, rate, seconds, folder, seed))
+        if records[-1].is_interrupted:
+            break
+    return records
+
+
 class PeopleClient(SoakClient):
     """A client that also keeps what the tracker publishes."""
 
@@ -89,15 +104,15 @@ class PeopleClient(SoakClient):
 
 
 def soak_person(
-    file: Path | None, rate: float, seconds: float, folder: Path, begin: float = 0.0, seed: int = 1
+    file: Path | None, rate: float, seconds: float, folder: Path, seed: int = 1
 ) -> PersonRecord:
     """
     Return what was seen of an arm on a recorded person for a time [s].
 
-    file: the recording; None for that of the package. rate: how fast it is played, to and fro,
-    from a time `begin` on [s].
+    file: the recording; None for that of the package. rate: how fast it is played, to and fro.
     """
     record = PersonRecord('construction work' if file is None else file.stem, rate)
+    begin = 0.0 if file is None else T_POSE
     options = ['--rate', f'{rate:g}', '--fps', f'{FPS}', '--begin', f'{begin:g}']
     options += ['--skeleton', 'tum_bvh' if file is not None and 'tum' in file.stem else 'cmu_bvh']
 
@@ -106,7 +121,7 @@ def soak_person(
 
     with (
         ros_client(lambda: PeopleClient(folder)) as client,
-        ChildProcess(PLANNER, [*ARGUMENTS, *os.environ.get('EXTRA', '').split()], listen) as one,
+        ChildProcess(PLANNER, ARGUMENTS, listen) as one,
         ChildProcess(PLAYBACK, [], lambda _: None) as other,
         ChildProcess(
             WEARER, [*([] if file is None else [str(file)]), *options], lambda _: None
@@ -120,7 +135,7 @@ def soak_person(
         except KeyboardInterrupt:
             record.is_interrupted = True
     client.close()
-    _judge(record, client)
+    judge_person(record, client.bodies, client.states)
     return record
 
 
@@ -161,11 +176,18 @@ def _ask(
         record.seconds = time.monotonic() - begin
 
 
-def _judge(record: PersonRecord, client: PeopleClient) -> None:
-    """Judge the arm at each of its states by the body as it was recorded then."""
+def judge_person(
+    record: PersonRecord, bodies: Sequence[bytes], states: Sequence[tuple[int, Any, Any]]
+) -> None:
+    """
+    Count contacts and crossings of the ray at each state of the arm, by the body of that time.
+
+    bodies: serialized MarkerArrays, with stamps. states: when each was sent [ns], positions and
+    velocities.
+    """
     arm, body = load_arm(), WearerBody()
     scenes: list[tuple[int, Scene]] = []
-    for data in client.bodies:
+    for data in bodies:
         msg = deserialize_message(data, MarkerArray)
         stamp = nanoseconds_of(msg.markers[-1].header.stamp)
         body = body.apply(msg, stamp / NANOSECONDS, FRAME)
@@ -173,7 +195,7 @@ def _judge(record: PersonRecord, client: PeopleClient) -> None:
     scenes.sort(key=lambda item: item[0])
     stamps = np.array([stamp for stamp, _ in scenes])
     was_in, before = False, None
-    for sent, q, v in client.states:
+    for sent, q, v in states:
         k = int(np.searchsorted(stamps, sent)) - 1
         is_moving = max(map(abs, v)) >= REST
         if k < 0 or not is_moving:
@@ -191,42 +213,6 @@ def _judge(record: PersonRecord, client: PeopleClient) -> None:
 
 def _crossed(arm: ArmModel, scene: Scene, q: np.ndarray) -> tuple[str, bool]:
     """Return what is in contact with a bar of the arm, and whether its ray crosses a box."""
-    from rrth_planner.collision.reference_checker import first_contact
-
     found = first_contact(arm, scene, q, 0.0, 0.0)
     bars = '' if found is None else f'bar {found.bar} and box "{found.box}"'
     return bars, first_contact(arm, scene, q, RAY, 0.0) is not None
-
-
-def main() -> None:
-    """Soak."""
-    import tempfile
-
-    files = [Path(name) for name in sys.argv[3:]]
-    total = Counter()
-    seconds = requests = aimed = ray = contacts = brakes = 0
-    for k, file in enumerate(files):
-        with tempfile.TemporaryDirectory() as folder:
-            r = soak_person(
-                file, float(sys.argv[1]), float(sys.argv[2]), Path(folder), 0.1, seed=k
-            )
-        print(
-            r.name,
-            f'{r.n_aimed} of {r.n_requests} aimed; contacts {r.n_contacts}; ray {r.ray_seconds:.2f} s; stops {len(r.brakes)}; {dict(r.answers)}',
-            r.contacts[:5],
-            flush=True,
-        )
-        total += r.answers
-        seconds += r.seconds
-        requests += r.n_requests
-        aimed += r.n_aimed
-        ray += r.ray_seconds
-        contacts += r.n_contacts
-        brakes += len(r.brakes)
-    print(
-        f'ALL {seconds:.0f} s: {aimed} of {requests} aimed ({100 * aimed / requests:.1f} %), contacts {contacts}, ray {ray:.2f} s, stops {brakes}, {dict(total)}'
-    )
-
-
-if __name__ == '__main__':
-    main()

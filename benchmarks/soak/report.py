@@ -17,11 +17,13 @@ from benchmarks.soak.flood import FloodRecord
 from benchmarks.soak.judge import name_of
 from benchmarks.soak.looks import heard_by, Look, losses
 from benchmarks.soak.monitor import MonitorRecord
+from benchmarks.soak.people import PersonRecord
 from benchmarks.soak.plans import PlansRecord
 from benchmarks.soak.targets import (
     flood_target,
     monitor_targets,
     MOST_AGE,
+    people_targets,
     plan_targets,
     running_target,
 )
@@ -55,6 +57,12 @@ METHOD = """\
 - `--awake`: a process of idle priority keeps each processor out of idle states, as `idle=poll`
   of the kernel does. `--alone`: the planner node runs on the last processor, all else on the
   others, as with `taskset`; without, all run where the system puts them.
+- **Recorded people** (one comes with the package) are played to and fro, as 60 bodies a second
+  with the lifetime and the stamps that `wearer` gives them. The arm is asked for targets low in
+  front, one after the other: aimed in time is a request after which the arm rests and aims
+  within 6 s. Its joint states, at 100 Hz while it moves, are checked against the boxes of that
+  time: contacts of the bars, without margin, and how long the first metre of the ray crosses a
+  box.
 - **Flooded**: another process repeats one message 2,000 times a second while the client asks
   for plans from where the arm is to a target, 20 ms after each answer."""
 
@@ -66,6 +74,7 @@ def report(
     remark: str = '',
     still: Standstills | None = None,
     floods: Sequence[FloodRecord] = (),
+    people: Sequence[PersonRecord] = (),
 ) -> str:
     """Return the report in Markdown; a part that was not run is left out."""
     made = origin()
@@ -76,6 +85,7 @@ def report(
         *(monitor_targets(monitor) if monitor else []),
         *([running_target(brakes, still)] if brakes and still else []),
         *([flood_target(floods)] if floods else []),
+        *(people_targets(people) if people else []),
     ]
     parts = [
         '# Reliability',
@@ -84,7 +94,7 @@ def report(
         f'{made["numba_version"]}{commit}. Client and nodes run {scheduling()}.',
         *(
             ['**Interrupted**: these are the figures up to then.']
-            if any(part and part.is_interrupted for part in (plans, monitor, *floods))
+            if any(part and part.is_interrupted for part in (plans, monitor, *floods, *people))
             else []
         ),
         *([still.sentence()] if still else []),
@@ -99,6 +109,8 @@ def report(
         parts += ['## Hands in the path of running motions', _monitor_text(monitor, still)]
     if floods:
         parts += ['## Topics that are flooded', _flood_text(floods)]
+    if people:
+        parts += ['## Recorded people', _people_text(people)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
 
 
@@ -195,6 +207,27 @@ def _flood_text(floods: Sequence[FloodRecord]) -> str:
         for flood in floods
     ]
     return markdown_table(('topic', 'messages [1/s]', *('p50', 'p90', 'p99', 'most [ms]')), rows)
+
+
+def _people_text(people: Sequence[PersonRecord]) -> str:
+    rows = [
+        [
+            person.name,
+            f'{person.rate:g}',
+            f'{person.seconds:.0f}',
+            f'{person.n_aimed} of {person.n_requests}',
+            f'{60.0 * person.n_aimed / max(person.seconds, 1e-9):.0f}',
+            str(person.n_contacts),
+            f'{person.ray_seconds:.2f}',
+            str(len(person.brakes)),
+            ', '.join(f'{word} {n}' for word, n in person.answers.most_common()),
+        ]
+        for person in people
+    ]
+    head = ('person', 'rate', 'time [s]', 'aimed in time', 'targets per minute', 'contacts')
+    table = markdown_table((*head, 'ray crossed [s]', 'stops', 'answers'), rows)
+    contacts = [f'- {person.name}, {words}' for person in people for words in person.contacts]
+    return '\n\n'.join([table, *(['\n'.join(contacts)] if contacts else [])])
 
 
 def _stillness(still: Standstills | None, begin: int, end: int) -> str:

@@ -12,11 +12,14 @@ from benchmarks.soak.flood import FloodRecord
 from benchmarks.soak.judge import FREE, growth_of
 from benchmarks.soak.looks import heard_by
 from benchmarks.soak.monitor import MonitorRecord
+from benchmarks.soak.people import PersonRecord
 from benchmarks.soak.plans import PlansRecord
 
 # A brake came while the machine ran where nothing stood still from so long before its body, whose
 # time is known from the log a little late, until so long after [ns].
 EARLIER, MOMENT = 5_000_000, 5_000_000
+# Shares of the time that the ray may cross a recorded person, and of the requests that succeed.
+CROSSED, AIMED = 0.3 / 240.0, 0.95
 MOST_GROWTH, MOST_AGE, RECERTIFIED, BRAKED, ANSWERED = 5.0, 0.05, 0.3, 5.0, 0.1
 
 
@@ -89,6 +92,33 @@ def flood_target(floods: Sequence[FloodRecord]) -> list[str]:
         f'{1e3 * slowest:.1f} ms, {missing} without',
         slowest <= ANSWERED and missing == 0,
     )
+
+
+def people_targets(people: Sequence[PersonRecord]) -> list[list[str]]:
+    """Return the lines of targets of the recorded people."""
+    seconds = sum(person.seconds for person in people)
+    ray = sum(person.ray_seconds for person in people)
+    n_contacts = sum(person.n_contacts for person in people)
+    n_asked = sum(person.n_requests for person in people)
+    n_aimed = sum(person.n_aimed for person in people)
+    aimed = n_aimed / n_asked if n_asked else np.nan
+    return [
+        _line(
+            'contacts of the moving arm with a recorded person', '0', n_contacts, not n_contacts
+        ),
+        _line(
+            'pointing ray of the moving arm across a recorded person',
+            f'{100.0 * CROSSED:.3f} % of the time',
+            f'{ray:.2f} of {seconds:.0f} s',
+            ray <= CROSSED * seconds,
+        ),
+        _line(
+            'requests beside recorded people after which the arm aims within 6 s',
+            f'{100.0 * AIMED:g} %',
+            f'{n_aimed} of {n_asked}',
+            aimed >= AIMED,
+        ),
+    ]
 
 
 def _brake_line(what: str, figures: Mapping[str, str]) -> list[str]:

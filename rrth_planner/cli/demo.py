@@ -13,6 +13,7 @@ from typing import Any
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
+from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.cli import ros_parsers
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED
@@ -40,8 +41,8 @@ DOTS_PER_INCH = 110
 # Beside these seconds of a person at work the arm points at these targets; at other times he bends
 # forward so fast that his head would meet an arm that stands still.
 PERSON, PERSON_TARGETS = ('--begin', '1.2', '--end', '5.2'), ('low', 'front')
-# So many bodies are received before the first request.
-FIRST_BODIES = 30
+# Until a new publisher is known to all nodes [s]; so many bodies come before the first request.
+MATCHED, FIRST_BODIES = 1.0, 30
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -167,6 +168,8 @@ def _beside_a_person(
     client.wait_for(
         lambda: client.count_publishers('body_boxes') > 1, 'the publisher of the person at work'
     )
+    # The planner, too, is to have found it before the other body is deleted.
+    client.receive_for(MATCHED)
     client.publish(_without(before))
     client.see_bodies()
     client.wait_for(lambda: len(client.bodies) >= FIRST_BODIES, 'body_boxes of the person at work')
@@ -205,18 +208,31 @@ def _clearance_beside(client: DemoClient, settings: PlanSettings, frame: str) ->
     DemoError where the arm or its ray was in contact with one.
     """
     arm, length = client.arm, settings.ray_guard_length
-    measured = np.array([seconds_of(msg.markers[0].header.stamp) for msg in client.bodies])
-    taken = np.array([seconds_of(msg.header.stamp) for msg in client.observed])
-    q = np.array([configuration_from_msg(msg, arm.joint_names) for msg in client.observed])
+    states = client.observed[:]
+    taken = np.array([seconds_of(msg.header.stamp) for msg in states])
+    q = np.array([configuration_from_msg(msg, arm.joint_names) for msg in states])
+    # Bodies that were measured until the last state may still be on their way.
+    client.wait_for(lambda: _measured(_body(client.bodies[-1])) >= taken[-1], 'body_boxes')
+    bodies = [_body(data) for data in client.bodies]
+    measured = np.array([_measured(body) for body in bodies])
     newest = np.searchsorted(measured, taken, side='right') - 1
     clearances = []
     for k in np.unique(newest):
-        scene = scene_of(WearerBody().apply(client.bodies[max(k, 0)], 0.0, frame))
+        scene = scene_of(WearerBody().apply(bodies[max(k, 0)], 0.0, frame))
         contact = first_contact(arm, scene, q[newest == k], length, 0.0)
         if contact is not None:
             raise DemoError(f'bar {contact.bar} of the arm was in contact with {contact.box}')
         clearances.append(least_clearance(arm, scene, q[newest == k], length))
     return min(clearances), len(clearances)
+
+
+def _body(data: bytes) -> MarkerArray:
+    return deserialize_message(data, MarkerArray)
+
+
+def _measured(body: MarkerArray) -> float:
+    """Return when a body was measured [s]."""
+    return seconds_of(body.markers[0].header.stamp)
 
 
 def _show(name: str, line: str) -> None:

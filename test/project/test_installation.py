@@ -37,6 +37,8 @@ names = (*names, 'config/human.yaml', 'config/skeletons/xsens.yaml')
 for name in (*names, 'msg_examples/body.yaml', 'urdf/arm.urdf', 'rviz/rrth_planner.rviz'):
     assert resource_path(name) == here / name
 assert rrth.load_settings(rrth.load_arm().dof) and rrth.load_body()
+from rrth_planner.io.motion_capture_file import load_person
+assert load_person().rate == 30.0
 """
 
 

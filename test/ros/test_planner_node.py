@@ -323,7 +323,8 @@ def test_an_arm_that_the_wearer_leaned_into_escapes_and_the_answer_says_so(start
 @pytest.fixture(name='one_try')
 def _one_try(monkeypatch):
     """Have a request planned once, however wearer and arm move."""
-    monkeypatch.setattr(PlanOutcome, 'may_change', False)
+    monkeypatch.setattr(PlanOutcome, 'is_outdated', False)
+    monkeypatch.setattr(PlanOutcome, 'is_in_the_way', False)
 
 
 def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, wait_until):

@@ -37,13 +37,16 @@ from benchmarks.soak.client import brakes_in  # noqa: E402
 from benchmarks.soak.flood import FloodRecord  # noqa: E402
 from benchmarks.soak.looks import Look, look_at, Loss, losses  # noqa: E402
 from benchmarks.soak.monitor import MonitorRecord  # noqa: E402
+from benchmarks.soak.people import judge_person, PersonRecord  # noqa: E402
 from benchmarks.soak.plans import free_starts, PlansRecord  # noqa: E402
 from benchmarks.soak.report import draw_memory, report  # noqa: E402
-from benchmarks.soak.targets import monitor_targets, plan_targets  # noqa: E402
+from benchmarks.soak.targets import monitor_targets, people_targets, plan_targets  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
+from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.ros.messages.body_writer import body_to_msg  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
 import worlds  # noqa: E402
 
@@ -497,3 +500,43 @@ def test_requests_under_a_flood_are_timed(tmp_path):
     floods = soak_flood.soak_floods(2, tmp_path)
     assert [flood.topic for flood in floods] == ['body_boxes', 'joint_states', 'target']
     assert all(len(flood.calls) == 2 and flood.rate > 0.0 for flood in floods)
+
+
+def person_bodies(*boxes):
+    """Return a body as a tracker publishes it at 10 s."""
+    msg = body_to_msg(Scene(boxes), 'torso')
+    for marker in msg.markers:
+        marker.header.stamp.sec = 10
+    return [serialize_message(msg)]
+
+
+def test_contacts_and_crossings_of_a_person_are_counted_while_the_arm_moves():
+    q = np.array([0.0, -0.35, np.pi / 2, np.pi / 2])
+    T = reference_checker.frames(ARM, q[None])[0, -1]
+    far = Box('far', [0.0, 0.0, -9.0], np.full(3, 0.1), np.eye(3))
+    on_arm = Box('head', T[:3, 3], np.full(3, 0.05), np.eye(3))
+    in_ray = Box('hand', T[:3, 3] + 0.5 * T[:3, 2], np.full(3, 0.05), np.eye(3))
+    times = [10_010_000_000 + 10_000_000 * k for k in range(11)]
+    for box, speed, n_contacts, crossed in (
+        (far, 1.0, 0, 0.0),
+        (on_arm, 1.0, 1, 0.1),
+        (on_arm, 0.0, 0, 0.0),
+        (in_ray, 1.0, 0, 0.1),
+        (in_ray, 0.0, 0, 0.0),
+    ):
+        record = PersonRecord('someone', 1.0)
+        states = [(then, q.tolist(), [speed, 0.0, 0.0, 0.0]) for then in times]
+        judge_person(record, person_bodies(box), states)
+        assert record.n_contacts == len(record.contacts) == n_contacts
+        assert record.ray_seconds == pytest.approx(crossed)
+
+
+def test_targets_of_recorded_people_are_met_or_not():
+    good = PersonRecord('a', 1.0, seconds=40.0, n_requests=20, n_aimed=19, ray_seconds=0.04)
+    assert [line[-1] for line in people_targets([good])] == ['yes'] * 3
+    bad = PersonRecord('b', 1.5, 40.0, 20, 18, n_contacts=1, ray_seconds=0.07, contacts=['so'])
+    assert [line[-1] for line in people_targets([bad])] == ['**no**'] * 3
+    assert [line[-1] for line in people_targets([PersonRecord('c', 1.0)])][2] == '**no**'
+    text = report(None, None, 'command', people=[good, bad])
+    assert '## Recorded people' in text
+    assert '- b, so' in text

@@ -182,7 +182,7 @@ class DemoClient(PlannerClient):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__('rrth_demo', timeout, check)
         self.arm = arm
-        self.bodies: list[MarkerArray] = []
+        self.bodies: list[bytes] = []
 
     def wait_for_nodes(self) -> None:
         """Wait for the planner, for joint states, and for a subscriber of the motions."""
@@ -213,9 +213,10 @@ class DemoClient(PlannerClient):
         )
 
     def see_bodies(self) -> None:
-        """Keep every body that is published from now on, in `bodies`."""
-        many = QoSProfile(depth=1000)
-        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, many)
+        """Keep every body that is published from now on, serialized, in `bodies`."""
+        # To decode them takes longer than the arm's states leave time for.
+        many, keep = QoSProfile(depth=1000), self.bodies.append
+        self.create_subscription(MarkerArray, 'body_boxes', keep, many, raw=True)
 
     def point(self, q_aims: Callable[[Array], bool]) -> int:
         """

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The latest good body, target and joint positions, and the last rejections."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+import time
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -27,6 +29,8 @@ T = TypeVar('T')
 # A message measured further ahead of now than this came before the clock was set back: its age is
 # unknown [s].
 CLOCK_STEP = 0.1
+# A wearer moves whose boxes have changed by so much [m] within so long [s]; of so many bodies.
+MOVED, LATELY, REMEMBERED = 0.01, 0.25, 64
 
 
 class RequestError(RrthError):
@@ -108,10 +112,7 @@ class InputSnapshot:
 
     def is_moving(self, now: float) -> bool:
         """Return whether the arm moves at a time [s]."""
-        joints = self.joints
-        return now <= joints.velocities_expire and not bool(
-            (np.abs(joints.velocities) <= REST_SPEED).all()
-        )
+        return self.joints.is_moving(now)
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
@@ -189,6 +190,21 @@ class Inputs:
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
         # Why the last message with all joints was rejected; None: it was not.
         self.joint_rejection: MessageError | None = None
+        # The last bodies, and when they came by the monotonic clock [s].
+        self._bodies: deque[tuple[float, WearerBody]] = deque(maxlen=REMEMBERED)
+
+    def body_came(self) -> None:
+        """Remember the present body, to see whether the wearer moves."""
+        self._bodies.append((time.monotonic(), self.body.value))
+
+    def is_wearer_moving(self) -> bool:
+        """Return whether a box has moved lately by more than a tracker's noise."""
+        since = time.monotonic() - LATELY
+        scenes = [scene_of(body) for came, body in tuple(self._bodies) if came >= since]
+        if len(scenes) < 2:
+            return False
+        now, before = scenes[-1].numbers, scenes[0].numbers
+        return now.shape != before.shape or bool(np.abs(now - before).max(initial=0.0) > MOVED)
 
     @property
     def all(self) -> dict[str, Input[Any]]:
@@ -209,7 +225,7 @@ class Inputs:
         """
         body = self.body_at(now, parameters)
         goal = self._goal() if goal is None else goal
-        return InputSnapshot(scene_of(body), goal, self._joints_at(now, parameters.joint_timeout))
+        return InputSnapshot(scene_of(body), goal, self.joints_at(now, parameters.joint_timeout))
 
     def body_at(
         self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0
@@ -253,10 +269,11 @@ class Inputs:
 
     def require_fresh(self, now: float, parameters: PlannerParameters) -> WearerBody:
         """Return the present body [s] for a motion in progress; raise RequestError if stale."""
-        self._joints_at(now, parameters.joint_timeout)
+        self.joints_at(now, parameters.joint_timeout)
         return self.body_at(now, parameters, parameters.keep_lost)
 
-    def _joints_at(self, now: float, timeout: float) -> JointReading:
+    def joints_at(self, now: float, timeout: float) -> JointReading:
+        """Return the present joint positions [s], or raise RequestError where there are none."""
         rejection = self.joint_rejection
         if rejection is not None:
             # Earlier positions say nothing about the present ones.

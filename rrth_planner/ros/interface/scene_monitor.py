@@ -132,6 +132,7 @@ class SceneMonitor:
 
         measured = measured_at(edits, now - self._latency)
         self._take(body, read, measured, is_news=arrival.is_newer is None)
+        self._inputs.body_came()
         self._notify_body(body.value, arrived)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import MessageError
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.messages.fields import seconds_of
 from sensor_msgs.msg import JointState
 
@@ -72,6 +73,11 @@ class JointReading:
     taken: float
     received: float
     velocities_expire: float
+
+    def is_moving(self, now: float) -> bool:
+        """Return whether the arm moves at a time [s]."""
+        is_slow = (np.abs(self.velocities) <= REST_SPEED).all()
+        return now <= self.velocities_expire and not bool(is_slow)
 
 
 def joint_reading(

@@ -43,8 +43,8 @@ class PlanOutcome:
     incident: Incident | None = None
 
     @property
-    def may_change(self) -> bool:
-        """Whether the same request may be solved soon: wearer or arm have moved, or move on."""
+    def is_outdated(self) -> bool:
+        """Whether wearer or arm have moved meanwhile, or the arm still moves."""
         if self.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE:
             return True
         is_start = self.code in (
@@ -52,6 +52,15 @@ class PlanOutcome:
             ErrorCode.START_STATE_INVALID,
         )
         return is_start and self.handover is not None
+
+    @property
+    def is_in_the_way(self) -> bool:
+        """Whether the wearer is in the way, who may move on."""
+        return self.code in (
+            ErrorCode.START_STATE_IN_COLLISION,
+            ErrorCode.GOAL_IN_COLLISION,
+            ErrorCode.PLANNING_FAILED,
+        )
 
     @property
     def trajectory(self) -> Trajectory | None:

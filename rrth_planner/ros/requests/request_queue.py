@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+import math
 import time
 import traceback
 
@@ -15,6 +16,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import REST_SPEED, Trajectory
 from rrth_planner.pipeline.planning_process import Planner
@@ -22,6 +24,7 @@ from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import PlanReport, Reporter
+from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
@@ -35,8 +38,12 @@ from trajectory_msgs.msg import JointTrajectory
 PERIOD, SHORTEST_SHOW = 0.05, 0.2
 # An arm may come to rest so much later than its commanded stop [s].
 LONGEST_SETTLING = 1.0
-# A request whose motion became invalid is planned again after this time [s].
-AGAIN = 0.005
+# A request that the wearer was in the way of is planned again after this time [s].
+AGAIN = 0.01
+# A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
+RAY_PATIENCE = 1.0
+# After a stop the same goal is tried for so long, so often [s].
+PATIENCE, RESUME_PERIOD = 5.0, 0.2
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -76,11 +83,15 @@ class _Resumption:
 
     ticket: _Ticket
     goal: PointingGoal
+    # Numbers of motions and requests until then.
     n_motions: int
+    n_requests: int
     # When the stop ends [s], and until when to wait for the rest by the monotonic clock, since a
-    # simulated one may stand still.
+    # simulated one may stand still; and until when to try again while the wearer is in the way.
     stopped: float
     latest: float
+    end: float
+    is_first: bool = True
 
     def is_due(self, joints: JointReading | None) -> bool:
         """Return whether the arm rests by a reading after the end of its stop, or time is up."""
@@ -124,6 +135,7 @@ class PlanQueue:
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
+        self._n_requests = 0
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
@@ -131,6 +143,7 @@ class PlanQueue:
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
         future, ticket = Future(), _Ticket()
+        self._n_requests += 1
         begin = time.perf_counter()
 
         def work() -> None:
@@ -188,11 +201,14 @@ class PlanQueue:
         begin: float,
         ticket: _Ticket,
         settle: Callable[[Response], None],
-    ) -> None:
+        patience: float | None = None,
+    ) -> bool:
         """
         Plan, publish and settle a request; called in the worker's thread.
 
         The request is settled as soon as its motion is published, in the node's own thread.
+        patience: how long to plan again while the wearer moves [s]; None: `time_limit`. Return
+        whether the wearer is in the way of it, or has moved.
         """
         parameters = self._reporter.parameters
 
@@ -200,9 +216,9 @@ class PlanQueue:
             settle(self._response(outcome, parameters, begin))
 
         try:
-            outcome = self._plan(goal, ticket, parameters, settle_published)
+            outcome = self._plan(goal, ticket, parameters, settle_published, patience)
             if outcome.trajectory is not None:
-                return
+                return False
             if ticket.is_cancelled and outcome.code is not ErrorCode.PREEMPTED:
                 outcome = replace(outcome, code=CANCELLED[0], sentence=CANCELLED[1])
         except Exception as problem:
@@ -216,6 +232,7 @@ class PlanQueue:
             outcome = replace(outcome, sentence=outcome.sentence + noted)
             self._reporter.incident(file)
         settle(self._response(outcome, parameters, begin))
+        return outcome.is_outdated or outcome.is_in_the_way
 
     def _plan(
         self,
@@ -223,13 +240,16 @@ class PlanQueue:
         ticket: _Ticket,
         parameters: PlannerParameters,
         settle_published: Callable[[PlanOutcome], None],
+        patience: float | None,
     ) -> PlanOutcome:
         """
-        Return the outcome of a request, planned again while the wearer moves into its motions.
+        Return the outcome of a request, planned again while a wearer who moves is in its way.
 
-        After `time_limit` the last outcome stands.
+        After a time [s], or `time_limit`, the last outcome stands.
         """
-        monitor, end = self._monitor, time.monotonic() + parameters.options.time_limit
+        longest = parameters.options.time_limit if patience is None else patience
+        monitor, end = self._monitor, time.monotonic() + longest
+        self._await_clear_ray(parameters, ticket)
         while True:
             n_stops, running = monitor.n_stops, monitor.running
 
@@ -267,9 +287,41 @@ class PlanQueue:
                 goal,
                 running,
             )
-            if not outcome.may_change or ticket.is_cancelled or time.monotonic() >= end:
+            may_change = outcome.is_outdated or (
+                outcome.is_in_the_way and self._inputs.is_wearer_moving()
+            )
+            if not may_change or ticket.is_cancelled or time.monotonic() >= end:
                 return outcome
             time.sleep(AGAIN)
+
+    def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
+        """
+        Let a wearer who moves take a hand out of the pointing ray of an arm at rest.
+
+        Whatever the arm did, its ray would sweep over the hand first.
+        """
+        end = time.monotonic() + RAY_PATIENCE
+        while (
+            self._is_ray_crossed(parameters)
+            and self._inputs.is_wearer_moving()
+            and time.monotonic() < end
+            and not ticket.is_cancelled
+        ):
+            time.sleep(AGAIN)
+
+    def _is_ray_crossed(self, parameters: PlannerParameters) -> bool:
+        """Return whether the arm rests, clear of the wearer but for its pointing ray."""
+        now, arm = self._now(), parameters.arm
+        try:
+            joints = self._inputs.joints_at(now, parameters.joint_timeout)
+            scene = scene_of(self._inputs.body_at(now, parameters))
+        except RequestError:
+            return False
+        if joints.is_moving(now):
+            return False
+        q, margin, length = joints.positions, parameters.margin, parameters.ray_guard_length
+        is_free = is_place_free(q, arm, scene, margin, length)
+        return not is_free and is_place_free(q, arm, scene, margin, 0.0)
 
     def _response(
         self, outcome: PlanOutcome, parameters: PlannerParameters, begin: float
@@ -357,19 +409,25 @@ class PlanQueue:
                     _Ticket(),
                     stop.goal,
                     stop.n_motions,
+                    self._n_requests,
                     self._now() + duration,
                     time.monotonic() + duration + LONGEST_SETTLING,
+                    time.monotonic() + duration + PATIENCE,
                 )
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
         if resumption is None:
             return
-        if resumption.n_motions != self._monitor.n_motions:
-            # A motion that was requested since then has priority.
+        if self._is_overtaken(resumption):
             self._discard_resumption()
         elif resumption.is_due(self._inputs.joints.value):
             self._resumption = None
             self.prepare(partial(self._resume, resumption))
+
+    def _is_overtaken(self, resumption: _Resumption) -> bool:
+        """Return whether one was commanded since its stop, or requested since its first try."""
+        is_requested = resumption.n_requests != self._n_requests and not resumption.is_first
+        return is_requested or resumption.n_motions != self._monitor.n_motions
 
     def _discard_resumption(self) -> None:
         if self._resumption is not None:
@@ -379,16 +437,28 @@ class PlanQueue:
     def _resume(self, resumption: _Resumption) -> None:
         """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
         ticket = resumption.ticket
-        if ticket.is_cancelled or resumption.n_motions != self._monitor.n_motions:
+        if ticket.is_cancelled or self._is_overtaken(resumption):
             self._open.discard(ticket)
             return
         responses: list[Response] = []
-        self._work(resumption.goal, time.perf_counter(), ticket, responses.append)
-        self._open.discard(ticket)
+        begin, present = time.perf_counter(), time.monotonic()
+        n_requests = resumption.n_requests if not resumption.is_first else self._n_requests
+        is_blocked = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
         response = responses[-1]
-        response.conclude()
-        if not response.is_solved:
+        if response.is_solved or resumption.is_first:
+            response.conclude()
+        if not response.is_solved and resumption.is_first:
             self._monitor.hold(response.text)
+        if is_blocked and present < resumption.end:
+            self._resumption = replace(
+                resumption,
+                n_requests=n_requests,
+                stopped=math.inf,
+                latest=present + RESUME_PERIOD,
+                is_first=False,
+            )
+        else:
+            self._open.discard(ticket)
 
     def _check_stop(self, stop: Stop) -> None:
         """Have the second checker check a stop that was published as proven free."""
