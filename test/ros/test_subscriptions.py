@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Copies of messages: each counts once, and what was sent last stays last."""
 
+import time
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -9,6 +11,7 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from hypothesis import given, settings, strategies as st  # noqa: E402
 from rclpy.node import Node  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input  # noqa: E402
@@ -259,3 +262,26 @@ def test_without_velocities_the_change_of_the_positions_counts():
     assert second.velocities_expire == 10.5
     at_once = joint_reading(JointState(name=JOINTS, position=moved), JOINTS, 10.0, first)
     assert at_once.velocities[0] > 1e6
+
+
+@pytest.mark.usefixtures('ros_context')
+def test_of_a_stream_only_the_newest_message_is_read_from_every_publisher(wait_until, spinning):
+    node, sender, received = Node('subscriber'), Node('sender'), []
+    stream = OpenSubscription(
+        node, PointStamped, 'stream', lambda msg, _: received.append(msg.point.x), is_stream=True
+    )
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    live = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publishers = [sender.create_publisher(PointStamped, 'stream', q) for q in (latched, live)]
+    for publisher in publishers:
+        wait_until(lambda p=publisher: p.get_subscription_count() == 1)
+    # The node is late: nobody has read the first ones.
+    for x in (1.0, 2.0, 3.0):
+        publishers[0].publish(target(x))
+    time.sleep(0.2)
+    with spinning(node):
+        wait_until(lambda: received)
+        publishers[1].publish(target(4.0))
+        wait_until(lambda: 4.0 in received)
+    assert received == [3.0, 4.0]
+    assert not stream._reliable
