@@ -133,6 +133,34 @@ def test_a_wearer_who_moves_into_the_way_stops_the_arm_and_it_goes_round(
     wait_until(lambda: client.figures['fail-safe stops'].startswith('1,'))
 
 
+def test_a_hand_that_is_lost_in_the_way_of_a_motion_is_not_driven_into(
+    scene_of_a_motion, wait_until
+):
+    client, _ = scene_of_a_motion()
+    n, hand = len(client.states), in_the_way(client, 1.6)
+    msg, scene = body(hand)
+    # The tracker sees it once, and never again.
+    msg.markers[-1].lifetime.nanosec = 10**8
+    client.body.publish(msg)
+    wait_until(lambda: len(client.motions) == 2)
+    wait_until(lambda: client.figures.get('lost parts') == '"hand/0"')
+    wait_until(lambda: client.speed() == 0.0)
+    # Where it is nobody knows: the arm stays.
+    future = client.plan.call_async(Trigger.Request())
+    wait_until(future.done)
+    message = future.result().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the body on'), message
+    assert 'has lost parts: "hand/0"' in message
+    q = np.array([state.position for state in client.states[n:]])
+    assert reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
+    # Once it is seen again, or deleted, the arm goes on.
+    client.body.publish(samples.array(samples.command(Marker.DELETE, 'hand')))
+    wait_until(lambda: not client.figures.get('lost parts'))
+    future = client.plan.call_async(Trigger.Request())
+    wait_until(future.done)
+    assert future.result().success, future.result().message
+
+
 def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
