@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
+import math
 import os
 import sys
 from typing import Any
@@ -118,7 +119,7 @@ def _visit(
 ) -> tuple[list[str], Any]:
     """Return one table row per target, and the figure of all motions."""
     arm, limits, length = client.arm, settings.limits, settings.ray_guard_length
-    scene = scene_of(WearerBody().apply(body, 0.0, frame))
+    scene = scene_of(WearerBody().apply(body, math.inf, frame))
     motions, lines = [], []
     for name, message in targets.items():
         target = goal_from_msg(message, frame).target
@@ -218,7 +219,8 @@ def _clearance_beside(client: DemoClient, settings: PlanSettings, frame: str) ->
     newest = np.searchsorted(measured, taken, side='right') - 1
     clearances = []
     for k in np.unique(newest):
-        scene = scene_of(WearerBody().apply(bodies[max(k, 0)], 0.0, frame))
+        # Whenever it was measured: it is the newest of its time.
+        scene = scene_of(WearerBody().apply(bodies[max(k, 0)], math.inf, frame))
         contact = first_contact(arm, scene, q[newest == k], length, 0.0)
         if contact is not None:
             raise DemoError(f'bar {contact.bar} of the arm was in contact with {contact.box}')

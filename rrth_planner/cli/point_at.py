@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
 import json
+import math
 from pathlib import Path
 import sys
 
@@ -169,7 +170,8 @@ def _accepted(path: Path, frame: str) -> MarkerArray:
 
     body = _body(path, frame)
     try:
-        taken = WearerBody().apply(body, 0.0, frame)
+        # Whenever it was measured.
+        taken = WearerBody().apply(body, math.inf, frame)
     except MessageError as problem:
         raise OptionsError(f'--body: file {path}: {problem}') from problem
     if taken.n_boxes == 0:

@@ -150,23 +150,17 @@ class RecordingReader:
     def _bodies(self) -> list[tuple[float, Scene]]:
         order, body = MarkerOrder(), WearerBody()
 
-        def read(recorded: RecordedMessage) -> tuple[float, WearerBody]:
+        def read(recorded: RecordedMessage) -> tuple[float, Scene]:
             nonlocal body
-            now = self._when(recorded)
+            # By the clock of the stamps.
+            now = recorded.received / NANOSECONDS
             edits = read_edits(recorded.msg, now, self._base_frame)
             body = order.apply(
                 body, edits, (recorded.sent, 0), now, lambda other: other[0] > recorded.sent
             )
-            return now, body
+            return self._when(recorded), scene_of(body)
 
-        bodies = self._good('body_boxes', read)
-        result = []
-        for i, (begin, present) in enumerate(bodies):
-            result.append((begin, scene_of(present)))
-            end = bodies[i + 1][0] if i + 1 < len(bodies) else float('inf')
-            lifetimes = sorted({part.expires for _, part in present.parts})
-            result += [(t, scene_of(present.at(t))) for t in lifetimes if begin < t < end]
-        return sorted(result, key=lambda item: item[0])
+        return sorted(self._good('body_boxes', read), key=lambda item: item[0])
 
     def _monitor_states(self) -> list[tuple[float, str]]:
         """Return the states of the monitor of this run, and since when [s]."""
