@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.world import World
+from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
@@ -138,24 +139,25 @@ def lead_rejection(
 
 def target_rejection(scene: Scene, goal: PointingGoal, margin: float) -> Rejection | None:
     """Return why no configuration may point at a target, or None."""
+    boxes = scene.numbers
+    away = (goal.target - boxes[:, :SIZE])[:, None]
+    local = (away @ boxes[:, ROTATION:].reshape(-1, 3, 3))[:, 0]
+    excesses = (np.abs(local) - 0.5 * boxes[:, SIZE:ROTATION]).max(axis=1)
+    near = np.flatnonzero(excesses <= margin)
+    if len(near) == 0:
+        return None
+    excess, name = float(excesses[near[0]]), scene.boxes[near[0]].name
     where = ', '.join(f'{value:.3f}' for value in goal.target)
-    for box in scene.boxes:
-        local = (goal.target - box.center) @ box.rotation
-        excess = float((np.abs(local) - 0.5 * box.size).max())
-        if excess <= 0.0:
-            return Rejection(
-                PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is inside box "{box.name}", penetration depth '
-                f'{-excess:.4f} m',
-            )
-        if excess <= margin:
-            return Rejection(
-                PlanStatus.GOAL_IN_COLLISION,
-                f'the target ({where}) m is {excess:.4f} m from box "{box.name}", nearer than the '
-                f'margin of {margin:g} m: penetration depth {margin - excess:.4f} m including the '
-                'margin',
-            )
-    return None
+    if excess <= 0.0:
+        return Rejection(
+            PlanStatus.GOAL_IN_COLLISION,
+            f'the target ({where}) m is inside box "{name}", penetration depth {-excess:.4f} m',
+        )
+    return Rejection(
+        PlanStatus.GOAL_IN_COLLISION,
+        f'the target ({where}) m is {excess:.4f} m from box "{name}", nearer than the margin of '
+        f'{margin:g} m: penetration depth {margin - excess:.4f} m including the margin',
+    )
 
 
 def goal_rejection(world: World, goals: GoalSet) -> Rejection:

@@ -102,6 +102,14 @@ def test_a_lifetime_counts_from_reception_and_is_renewed():
     assert names(body.apply(array(marker), 10.4, 'torso').at(10.8)) == ['torso/0', 'head/0']
 
 
+def test_a_body_that_does_not_change_is_one_scene_that_is_sent_once():
+    marker = box()
+    marker.lifetime.sec = 1
+    body = body_of(marker, box('head'), now=10.0)
+    assert scene_of(body.at(10.9)) is scene_of(body.at(10.1))
+    assert scene_of(body.at(11.5)) is not scene_of(body)
+
+
 def measured(marker, stamp):
     """Return a marker that was measured at a time [s]."""
     marker.header.stamp.sec, rest = divmod(round(stamp * 10**9), 10**9)

@@ -200,10 +200,10 @@ class Inputs:
     def is_wearer_moving(self) -> bool:
         """Return whether a box has moved lately by more than a tracker's noise."""
         since = time.monotonic() - LATELY
-        scenes = [scene_of(body) for came, body in tuple(self._bodies) if came >= since]
-        if len(scenes) < 2:
+        bodies = [body for came, body in tuple(self._bodies) if came >= since]
+        if len(bodies) < 2:
             return False
-        now, before = scenes[-1].numbers, scenes[0].numbers
+        now, before = scene_of(bodies[-1]).numbers, scene_of(bodies[0]).numbers
         return now.shape != before.shape or bool(np.abs(now - before).max(initial=0.0) > MOVED)
 
     @property

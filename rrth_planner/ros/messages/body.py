@@ -5,6 +5,7 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+import functools
 import math
 
 from rrth_planner.model.errors import MessageError, one_line
@@ -102,6 +103,9 @@ class WearerBody:
         return body
 
 
+# The same body is the same scene each time: what is derived from it is kept, here and in the
+# planning process.
+@functools.lru_cache(maxsize=8)
 def scene_of(body: WearerBody) -> Scene:
     """Return the boxes, lost ones too, as a scene; take `body.at(now)` first for times."""
     return Scene(tuple(box for _, part in (*body.parts, *body.lost) for box in part.boxes))

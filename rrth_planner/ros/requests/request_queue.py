@@ -302,8 +302,8 @@ class PlanQueue:
         """
         end = time.monotonic() + RAY_PATIENCE
         while (
-            self._is_ray_crossed(parameters)
-            and self._inputs.is_wearer_moving()
+            self._inputs.is_wearer_moving()
+            and self._is_ray_crossed(parameters)
             and time.monotonic() < end
             and not ticket.is_cancelled
         ):
