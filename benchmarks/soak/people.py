@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 from rclpy.serialization import deserialize_message
-from rrth_planner.collision.reference_checker import first_contact
+from rrth_planner.collision.reference_checker import bar_box_contact, bar_radii, bars
 from rrth_planner.io.arm_file import load_arm
-from rrth_planner.model.arm import ArmModel, pointing_error
+from rrth_planner.kernels.layout import ROTATION, SIZE
+from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.scene import Scene
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
@@ -194,25 +195,33 @@ def judge_person(
         scenes.append((stamp, scene_of(body)))
     scenes.sort(key=lambda item: item[0])
     stamps = np.array([stamp for stamp, _ in scenes])
+    ends, radii = bars(arm, np.array([q for _, q, _ in states]), RAY), bar_radii(arm)
     was_in, before = False, None
-    for sent, q, v in states:
+    for (sent, _, v), places in zip(states, ends, strict=True):
         k = int(np.searchsorted(stamps, sent)) - 1
         is_moving = max(map(abs, v)) >= REST
         if k < 0 or not is_moving:
             was_in, before = False, sent
             continue
-        bars, ray = _crossed(arm, scenes[k][1], np.array([q]))
-        if bars and not was_in:
+        hits = _hits(places, radii, scenes[k][1])
+        # The last one is the ray.
+        found = np.argwhere(hits[:-1])
+        if len(found) and not was_in:
+            bar, box = found[0]
             record.n_contacts += 1
-            record.contacts.append(f'{(sent - stamps[0]) * 1e-9:.2f} s: {bars}')
-        was_in = bool(bars)
-        if ray and before is not None:
+            record.contacts.append(
+                f'{(sent - stamps[0]) * 1e-9:.2f} s: bar {bar} and box '
+                f'"{scenes[k][1].boxes[box].name}"'
+            )
+        was_in = bool(len(found))
+        if hits.any() and before is not None:
             record.ray_seconds += min(0.05, (sent - before) * 1e-9)
         before = sent
 
 
-def _crossed(arm: ArmModel, scene: Scene, q: np.ndarray) -> tuple[str, bool]:
-    """Return what is in contact with a bar of the arm, and whether its ray crosses a box."""
-    found = first_contact(arm, scene, q, 0.0, 0.0)
-    bars = '' if found is None else f'bar {found.bar} and box "{found.box}"'
-    return bars, first_contact(arm, scene, q, RAY, 0.0) is not None
+def _hits(places: np.ndarray, radii: np.ndarray, scene: Scene) -> np.ndarray:
+    """Return which bars (n_bars, 2, 3) are in contact with which boxes, (n_bars, m)."""
+    boxes = scene.numbers
+    half = 0.5 * boxes[:, SIZE:ROTATION] + radii[:, None, None]
+    rotations = boxes[:, ROTATION:].reshape(-1, 3, 3)
+    return bar_box_contact(places[:, None], boxes[:, None, :SIZE], rotations, half)

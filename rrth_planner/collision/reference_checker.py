@@ -98,7 +98,7 @@ def first_contact(
     ends = bars(arm, q, ray_length)
     found: Contact | None = None
     for box in scene.boxes:
-        for k, radius in enumerate(_bar_radii(arm)):
+        for k, radius in enumerate(bar_radii(arm)):
             half = 0.5 * box.size + margin + radius
             hit = np.flatnonzero(bar_box_contact(ends[:, k], box.center, box.rotation, half))
             if len(hit) and (found is None or hit[0] < found.index):
@@ -106,7 +106,7 @@ def first_contact(
     return found
 
 
-def _bar_radii(arm: ArmModel) -> Array:
+def bar_radii(arm: ArmModel) -> Array:
     """Return the radius of each of the `bars` [m]."""
     radii: Array = np.repeat(arm.radii, 2)[1 if arm.is_prismatic[0] else 2 :]
     return radii
@@ -119,7 +119,7 @@ def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) ->
     The closest point of each bar is found by golden section: its distance from a box is convex.
     """
     ends = bars(arm, q, ray_length)
-    radii = _bar_radii(arm)
+    radii = bar_radii(arm)
     least = np.inf
     golden = 0.5 * (np.sqrt(5.0) - 1.0)
     for box in scene.boxes:
