@@ -2,15 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arms, wearers and a fast dense oracle that the tests share; nothing random without an rng."""
 
+from dataclasses import replace
 import functools
+import itertools
 
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.collision.reference_checker import bars
+from rrth_planner.collision.reference_checker import bar_ends_at
 from rrth_planner.collision.world import arm_world, robot_rows, World
 from rrth_planner.io.arm_file import arm_from_mapping
-from rrth_planner.model.arm import ArmModel, bar_ends, tool_pose
+from rrth_planner.model.arm import ArmModel, bar_names, bars_of, Capsule, NO_BARS, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
@@ -188,13 +190,47 @@ def random_chain(rng, has_tail, fewest=3):
     T = np.eye(4)
     T[:3, :3] = random_rotation(rng)
     T[:3, 3] = rng.uniform(-0.5, 0.5, 3)
-    return ArmModel(
+    arm = ArmModel(
         joint_names=tuple(f'j{i}' for i in range(dof)),
         is_prismatic=tuple(is_prismatic),
         dh=dh,
         bounds=np.stack([lower, upper]),
         radii=rng.uniform(0.0, 0.05, dof + 1) if rng.random() < 0.5 else np.zeros(dof + 1),
         T_base_mount=T,
+    )
+    # Its links are wherever they are: most of them run through each other.
+    names = sorted(set(bar_names(arm)))
+    return replace(arm, allowed=tuple(itertools.combinations(names, 2)))
+
+
+def capsule_arm(rng, dof=7):
+    """Return a slim arm of revolute joints whose links and tool are capsules, on a mount."""
+    dh = np.zeros((dof + 1, 4))
+    dh[:, 0] = [0.0, *([QUARTER, -QUARTER] * dof)[:dof]]
+    dh[:, 1] = np.where(rng.random(dof + 1) < 0.4, rng.uniform(-0.06, 0.06, dof + 1), 0.0)
+    dh[:-1, 3] = np.where(np.arange(dof) % 2 == 0, rng.uniform(0.25, 0.4, dof), 0.0)
+    capsules = [
+        Capsule(name='base', link=0, ends=np.array([[0, 0, 0], [0, 0, 0.05]]), radius=0.05)
+    ]
+    for i in range(dof):
+        back = np.array([0.0, 0.0, -0.9 * dh[i, 3]])
+        side = rng.uniform(-0.02, 0.02, 3)
+        radius = float(rng.uniform(0.015, 0.03))
+        capsules.append(
+            Capsule(name=f'part {i + 1}', link=i + 1, ends=np.stack([back, side]), radius=radius)
+        )
+    ends = np.array([[0.0, 0.0, 0.0], [0.05, 0.0, 0.06]])
+    capsules.append(Capsule(name='camera', link=dof + 1, ends=ends, radius=0.025))
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = random_rotation(rng), rng.uniform(-0.3, 0.3, 3)
+    return ArmModel(
+        joint_names=tuple(f'j{i}' for i in range(dof)),
+        is_prismatic=(False,) * dof,
+        dh=dh,
+        bounds=np.outer([-1.0, 1.0], np.where(np.arange(dof) % 2 == 0, 2.9, 2.0)),
+        radii=np.array([NO_BARS] * dof + [0.0]),
+        T_base_mount=T,
+        capsules=tuple(capsules),
     )
 
 
@@ -303,22 +339,16 @@ def raw_paths(world, rng, n):
 def kernel_bars(arm, world, q, ray):
     """Return the bars as the kernel sees them, in the base frame, (n_bars, 2, 3) [m]."""
     n = len(world.bar_names)
-    points = np.full(4 * (n + 1), np.nan)
+    points = np.full(world.stride, np.nan)
     assert world.chain(q, ray, points, 0) == n
-    ends = points.reshape(n + 1, 4)[:, :3] @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
-    return np.stack([ends[:-1], ends[1:]], axis=1)
+    ends = points[: 8 * n].reshape(n, 2, 4)[:, :, :3]
+    return ends @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
 
 
 def oracle_bars(arm, q, ray):
     """Return the bars that have a length as the oracle sees them, (n, n_bars, 2, 3) [m]."""
-    labels = [
-        (row, end)
-        for row in range(arm.dof + 1)
-        for end in 'ad'
-        if row > 0 or (end == 'd' and arm.is_prismatic[0])
-    ]
-    wanted = [labels.index(label) for label in bar_ends(arm)]
-    return bars(arm, np.atleast_2d(q), ray)[:, wanted]
+    ends: np.ndarray = bar_ends_at(arm, np.atleast_2d(q), ray)
+    return ends[:, : len(bars_of(arm))]
 
 
 def line(q_from, q_to):

@@ -23,9 +23,9 @@ _is_configuration_free = arm_validity.is_configuration_free
 
 
 @njit(nogil=True)
-def _check_configurations(positions, ray_length, chain, boxes, flags):
+def _check_configurations(positions, ray_length, chain, robot, boxes, flags):
     for i in range(positions.shape[0]):
-        flags[i] = _is_configuration_free(positions[i], ray_length, chain, boxes)
+        flags[i] = _is_configuration_free(positions[i], ray_length, chain, robot, boxes)
 
 
 @njit(nogil=True)
@@ -36,7 +36,9 @@ def _check_edges(check, starts, ends, resolution, chain, robot, boxes, flags):
 
 def check_configurations(world: World, positions: Array, flags: Array) -> None:
     """Write whether each configuration, (n, dof), is free."""
-    _check_configurations(positions, world.ray_length, world.chain, world.obstacles, flags)
+    _check_configurations(
+        positions, world.ray_length, world.chain, world.robot, world.obstacles, flags
+    )
 
 
 def check_edges(world: World, starts: Array, ends: Array, flags: Array) -> None:

@@ -87,5 +87,5 @@ def least_clearance(trajectory: Trajectory, world: World, begin: float = 0.0) ->
         return float(world.clearances(trajectory.positions[-1]).min(initial=np.inf))
     n = math.ceil((trajectory.duration - begin) / CLEARANCE_PERIOD) + 1
     motion = (piece_coefficients(trajectory), trajectory.times)
-    arm = (world.ray_length, world.chain)
-    return float(least_along(*motion, max(begin, 0.0), n, *arm, world.obstacles))
+    surroundings = (world.chain, world.robot, world.obstacles)
+    return float(least_along(*motion, max(begin, 0.0), n, *surroundings))

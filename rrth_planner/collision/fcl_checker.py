@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.collision.fcl_objects import Bar, boxes_of, DOUBT
+from rrth_planner.collision.bar_pairs import pairs_of
+from rrth_planner.collision.fcl_objects import boxes_of, DOUBT, PlacedBar, PlacedPair
 from rrth_planner.collision.violation import Violation
-from rrth_planner.model.arm import ArmModel, bar_ends, forward_kinematics
+from rrth_planner.model.arm import ArmModel, bars_of, forward_kinematics, is_called
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Box, Scene
@@ -41,11 +42,11 @@ def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Violati
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
     boxes, poses = boxes_of(scene), forward_kinematics(arm, q)
     least, where = math.inf, ('', '')
-    for k in range(len(bar_ends(arm))):
-        bar = Bar(arm, k, ray_length)
-        distance, j = bar.nearest(boxes, np.full(len(boxes.names), -math.inf), q, poses)
+    for k in range(len(bars_of(arm))):
+        bar = PlacedBar(arm, k, ray_length)
+        distance, box = bar.nearest(boxes, _unknown(arm, scene, bar.name), q, poses)
         if distance < least:
-            least, where = distance, (bar.name, boxes.names[j])
+            least, where = distance, (bar.name, box)
     return Violation(0.0, least, *where)
 
 
@@ -54,11 +55,15 @@ def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_lengt
     Return upper bounds of the path length of the points of each bar since the start.
 
     Between any two of the instants (n,) [s], which do not decrease, no point of the bar moves
-    further than the difference. (n_bars, n), bars as in `arm.bar_ends` [m].
+    further than the difference. (n_bars + n_pairs, n), bars as in `arm.bars_of`, then pairs as in
+    `bar_pairs.pairs_of`, whose bars move no further to each other [m].
     """
-    reaches = reach_table(arm, ray_length)
     # Both ends of a bar bound the speed of all its points.
-    reaches = np.maximum(reaches, np.vstack([reaches[:1], reaches[:-1]]))
+    every = reach_table(arm, ray_length).max(axis=1)
+    reaches = every[: len(bars_of(arm))]
+    for pair in pairs_of(arm):
+        between = (every[pair.inner] + every[pair.outer]) * (np.arange(arm.dof) >= pair.body)
+        reaches = np.vstack([reaches, between])
     if len(trajectory.times) == 1:
         return np.zeros((len(reaches), len(times)))
     c = piece_coefficients(trajectory)
@@ -93,8 +98,18 @@ class _Sample:
         return self.bounds - abs(displacement - self.displacement)
 
 
-# A bar and two samples of it; whether it is free between them is open.
-_Gap = tuple[Bar, _Sample, _Sample]
+def _unknown(arm: ArmModel, scene: Scene, bar: str) -> Array:
+    """Return what is known of the distances of a bar from boxes: it may meet some, (m,) [m]."""
+    bounds = np.full(len(scene.boxes), -math.inf)
+    for part, name in arm.allowed:
+        if part == bar:
+            bounds[[is_called(box.name, name) for box in scene.boxes]] = math.inf
+    return bounds
+
+
+_Part = PlacedBar | PlacedPair
+# A bar, or a pair, and two samples of it; whether it is free between them is open.
+_Gap = tuple[_Part, _Sample, _Sample]
 
 
 class _Advancement:
@@ -108,33 +123,50 @@ class _Advancement:
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.displacements = displacements(arm, trajectory, self._times, ray_length)
-        self.bars = [Bar(arm, k, ray_length) for k in range(len(self.displacements))]
-        self._unknown = np.full(len(scene.boxes), -math.inf)
+        self.bars = [PlacedBar(arm, k, ray_length) for k in range(len(bars_of(arm)))]
+        self.parts: list[_Part] = [*self.bars]
+        self.parts += [
+            PlacedPair(arm, pair, len(self.bars) + n, ray_length)
+            for n, pair in enumerate(pairs_of(arm))
+        ]
+        unknown = [_unknown(arm, scene, bar.name) for bar in self.bars]
+        # Of a pair there are no boxes.
+        self._unknown = unknown + [np.empty(0)] * (len(self.parts) - len(self.bars))
         self.violation: Violation | None = None
 
-    def take(self, wanted: Sequence[tuple[Bar, int, tuple[_Sample, ...]]]) -> list[_Sample]:
+    def take(self, wanted: Sequence[tuple[_Part, int, tuple[_Sample, ...]]]) -> list[_Sample]:
         """Return samples of bars at some instants; others: samples whose bounds carry over."""
         q = positions_at(self._trajectory, self._times[[index for _, index, _ in wanted]])
         poses = forward_kinematics(self._arm, q)
         samples = []
         for (bar, index, others), one_q, one_poses in zip(wanted, q, poses, strict=True):
             moved = float(self.displacements[bar.k, index])
-            bounds = self._unknown
+            bounds = self._unknown[bar.k]
             for other in others:
                 bounds = np.maximum(bounds, other.bounds_at(moved))
             bounds = bounds.copy()
-            distance, j = bar.nearest(self._boxes, bounds, one_q, one_poses)
-            if distance < self._margin - TOLERANCE and (
-                self.violation is None or index < self.last
-            ):
+            distance, box = bar.nearest(self._boxes, bounds, one_q, one_poses)
+            # Of itself the arm only has to be clear.
+            margin = self._margin if bar.k < len(self.bars) else 0.0
+            if distance < margin - TOLERANCE and (self.violation is None or index < self.last):
                 # Later instants need not be checked any more.
                 self.last = index
-                box = self._boxes.names[j]
-                self.violation = Violation(float(self._times[index]), distance, bar.name, box)
-            samples.append(
-                _Sample(index, moved, max(0.0, distance - self._margin - DOUBT), bounds)
-            )
+                self.violation = Violation(
+                    float(self._times[index]), distance, bar.name, box, bar.k >= len(self.bars)
+                )
+            samples.append(_Sample(index, moved, max(0.0, distance - margin - DOUBT), bounds))
         return samples
+
+    def take_end(self, reach: float) -> None:
+        """Take samples of the pointing ray at the end, as far as the target [m]."""
+        ray = self.bars[-1].k
+        parts: list[_Part] = [PlacedBar(self._arm, ray, reach)]
+        parts += [
+            PlacedPair(self._arm, pair, len(self.bars) + n, reach)
+            for n, pair in enumerate(pairs_of(self._arm))
+            if pair.outer == ray
+        ]
+        self.take([(part, self.last, ()) for part in parts])
 
     def next_samples(self, gap: _Gap) -> list[int]:
         """Return where to sample next in a gap; nowhere when its ends prove it free."""
@@ -173,11 +205,11 @@ def first_violation(
     end = advancement.last
     starts = sorted({0, end // 2, end})
     samples = iter(
-        advancement.take([(bar, index, ()) for bar in advancement.bars for index in starts])
+        advancement.take([(part, index, ()) for part in advancement.parts for index in starts])
     )
     gaps: list[_Gap] = []
-    for bar in advancement.bars:
-        gaps += [(bar, *pair) for pair in pairwise(list(islice(samples, len(starts))))]
+    for part in advancement.parts:
+        gaps += [(part, *pair) for pair in pairwise(list(islice(samples, len(starts))))]
     # All samples of a round are taken at once: the kinematics of one instant take as long as those
     # of a dozen.
     while inner := [(gap, places) for gap in gaps if (places := advancement.next_samples(gap))]:
@@ -189,7 +221,7 @@ def first_violation(
             chain = (before, *islice(samples, len(places)), after)
             gaps += [(bar, *pair) for pair in pairwise(chain)]
     if advancement.violation is None and reach > ray_guard_length:
-        advancement.take([(Bar(arm, advancement.bars[-1].k, reach), end, ())])
+        advancement.take_end(reach)
     return advancement.violation
 
 
@@ -230,8 +262,10 @@ def first_escape_violation(
             kept[box.name] = max(by, kept.get(box.name, by))
         violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray, 0.0)
         if violation is not None:
-            distance = violation.distance - APART + kept[violation.box]
-            violations.append(replace(violation, distance=distance))
+            if not violation.is_of_arm:
+                distance = violation.distance - APART + kept[violation.box]
+                violation = replace(violation, distance=distance)
+            violations.append(violation)
     return min(violations, key=lambda violation: violation.time, default=None)
 
 
@@ -243,7 +277,7 @@ def _entered(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> NDArra
         Box(box.name, box.center, box.size + 2.0 * radius, box.rotation) for box in scene.boxes
     ]
     distances = np.full(len(grown), -math.inf)
-    ray = Bar(arm, len(bar_ends(arm)) - 1, ray_length)
+    ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length)
     ray.nearest(boxes_of(Scene(tuple(grown))), distances, q, forward_kinematics(arm, q))
     found: NDArray[np.bool_] = distances <= DOUBT
     return found

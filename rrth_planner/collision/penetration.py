@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.world import without_ray, World
 from rrth_planner.kernels.collision.bar_box import depths
-from rrth_planner.kernels.layout import BOX_HALF, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import (
+    ALLOWED,
+    BAR_SIZE,
+    BOX_CLASS,
+    BOX_HALF,
+    BOX_ROWS,
+    LANES,
+)
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
 
@@ -33,13 +40,26 @@ def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Arra
     rows = world.obstacles[(len(world.obstacles) - 1) // LANES :].reshape(-1, BOX_ROWS, LANES)
     rows = rows.transpose(1, 0, 2).reshape(BOX_ROWS, -1)[:, np.asarray(world.lanes, np.int64)]
     n_bars = len(world.bar_names)
-    points = np.empty((len(np.atleast_2d(q)), n_bars + 1, 4))
-    rays = np.full(len(points), world.ray_length) if ray_lengths is None else ray_lengths
+    places = np.empty((len(np.atleast_2d(q)), world.stride))
+    rays = np.full(len(places), world.ray_length) if ray_lengths is None else ray_lengths
     for i, one in enumerate(np.atleast_2d(q)):
-        world.chain(np.ascontiguousarray(one), float(rays[i]), points[i].reshape(-1), 0)
-    found = np.empty((len(points), n_bars, rows.shape[1]))
-    depths(np.ascontiguousarray(rows), points, found)
+        world.chain(np.ascontiguousarray(one), float(rays[i]), places[i], 0)
+    bars = np.ascontiguousarray(places[:, : BAR_SIZE * n_bars]).reshape(-1, n_bars, BAR_SIZE)
+    found = np.empty((len(bars), n_bars, rows.shape[1]))
+    depths(np.ascontiguousarray(rows), bars, found)
+    found[:, ~_is_checked(world)] = -np.inf
     return found if np.ndim(q) == 2 else found[0]
+
+
+def _is_checked(world: World) -> NDArray[np.bool_]:
+    """Return which bars must keep clear of which boxes, (n_bars, m)."""
+    rows, lanes = _places(world)
+    obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES)
+    first = world.bounds.shape[1] + 2
+    allowed = world.robot[first : first + len(world.bar_names), ALLOWED].astype(np.int64)
+    classes = obstacles[rows, BOX_CLASS, lanes].astype(np.int64)
+    checked: NDArray[np.bool_] = (allowed[:, None] >> classes) % 2 == 0
+    return checked
 
 
 def escape_depths(world: World, q: Array) -> Array:
@@ -60,9 +80,9 @@ def relaxed(world: World, by: Array) -> World:
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES).copy()
     rows, lanes = _places(world)
     # The groups above bound the larger boxes, hence the smaller ones too.
-    halves = obstacles[rows, BOX_HALF:, lanes] - by[:, None]
+    halves = obstacles[rows, BOX_HALF:BOX_CLASS, lanes] - by[:, None]
     is_left = (halves > 0.0).all(axis=1, keepdims=True)
-    obstacles[rows, BOX_HALF:, lanes] = np.where(is_left, halves, -np.inf)
+    obstacles[rows, BOX_HALF:BOX_CLASS, lanes] = np.where(is_left, halves, -np.inf)
     return replace(world, obstacles=obstacles.reshape(world.obstacles.shape))
 
 
@@ -76,7 +96,7 @@ def half_widths(world: World) -> Array:
     """Return by how much each grown box may shrink until it vanishes, (m,) [m]."""
     rows, lanes = _places(world)
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES)
-    halves: Array = obstacles[rows, BOX_HALF:, lanes].min(axis=1)
+    halves: Array = obstacles[rows, BOX_HALF:BOX_CLASS, lanes].min(axis=1)
     return halves
 
 

@@ -10,7 +10,7 @@ against the slabs of the box, and a motion is checked instant by instant.
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, bar_ends, Capsule, NO_BARS
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -51,11 +51,12 @@ def bars(arm: ArmModel, q: Array, ray_length: float) -> Array:
     """
     Return all bars of the moving arm in the base frame, (n, n_bars, 2, 3) [m].
 
-    Each DH row gives two, `a` along the x axis before it and `d` along its own z axis; the last
-    is the pointing ray. Bars of the mount (before the first joint) are left out.
+    Its capsules first. Then each DH row gives two, `a` along the x axis before it and `d` along
+    its own z axis; the last is the pointing ray. Bars of the mount (before the first joint) are
+    left out.
     """
     T = frames(arm, q)
-    result = []
+    result = [_capsule_ends(arm, T, c) for c in arm.capsules if c.link > 0]
     for i in range(arm.dof + 1):
         origin, z = T[:, i, :3, 3], T[:, i, :3, 2]
         if i == arm.dof:
@@ -63,11 +64,64 @@ def bars(arm: ArmModel, q: Array, ray_length: float) -> Array:
         else:
             d = arm.dh[i, 3] + (q[:, i, None] if arm.is_prismatic[i] else 0.0)
             corner, end = origin - d * z, origin
+        if arm.radii[i] == NO_BARS:
+            continue
         if i > 0:
             result.append(np.stack([T[:, i - 1, :3, 3], corner], axis=1))
         if i > 0 or arm.is_prismatic[0]:
             result.append(np.stack([corner, end], axis=1))
     return np.stack(result, axis=1)
+
+
+def _capsule_ends(arm: ArmModel, T: Array, capsule: Capsule) -> Array:
+    """Return the line of a capsule in the base frame, T as from `frames`, (n, 2, 3) [m]."""
+    if capsule.link == 0:
+        pose = np.tile(arm.T_base_mount, (len(T), 1, 1))
+    else:
+        pose = T[:, capsule.link - 1]
+    result: Array = capsule.ends @ pose[:, :3, :3].swapaxes(1, 2) + pose[:, None, :3, 3]
+    return result
+
+
+def bar_ends_at(arm: ArmModel, q: Array, ray_length: float) -> Array:
+    """Return the ends of `arm.bars_of` and `arm.mount_bars`, (n, dof) -> (n, n_bars, 2, 3) [m]."""
+    ends, n = bars(arm, q, ray_length), sum(capsule.link > 0 for capsule in arm.capsules)
+    rows = [
+        (i, end)
+        for i in range(arm.dof + 1)
+        for end in 'ad'
+        if arm.radii[i] != NO_BARS and (i > 0 or (end == 'd' and arm.is_prismatic[0]))
+    ]
+    wanted = [*range(n), *(n + rows.index(offset) for offset in bar_ends(arm))]
+    T = frames(arm, q)
+    mount = [_capsule_ends(arm, T, c)[:, None] for c in arm.capsules if c.link == 0]
+    return np.concatenate([ends[:, wanted], *mount], axis=1)
+
+
+def bar_distances(one: Array, other: Array) -> Array:
+    """
+    Return the distances of the lines of two bars, (n, 2, 3) each -> (n,) [m].
+
+    The distance of a point of one line from the other line is convex along the first: its least
+    value is found by golden section.
+    """
+    golden = 0.5 * (np.sqrt(5.0) - 1.0)
+    a, step = one[:, 0], one[:, 1] - one[:, 0]
+    b, along = other[:, 0], other[:, 1] - other[:, 0]
+    square = np.maximum((along * along).sum(axis=1), 1e-300)
+
+    def distance(s: Array) -> Array:
+        p = a + s[:, None] * step
+        t = np.clip(((p - b) * along).sum(axis=1) / square, 0.0, 1.0)
+        result: Array = np.linalg.norm(p - b - t[:, None] * along, axis=1)
+        return result
+
+    low, high = np.zeros(len(a)), np.ones(len(a))
+    for _ in range(60):
+        left, right = high - golden * (high - low), low + golden * (high - low)
+        is_left = distance(left) <= distance(right)
+        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
+    return np.minimum(distance(0.5 * (low + high)), np.minimum(distance(low), distance(high)))
 
 
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
@@ -108,7 +162,9 @@ def first_contact(
 
 def bar_radii(arm: ArmModel) -> Array:
     """Return the radius of each of the `bars` [m]."""
-    radii: Array = np.repeat(arm.radii, 2)[1 if arm.is_prismatic[0] else 2 :]
+    offsets = np.repeat(arm.radii, 2)[1 if arm.is_prismatic[0] else 2 :]
+    capsules = [capsule.radius for capsule in arm.capsules if capsule.link > 0]
+    radii: Array = np.concatenate([capsules, offsets[offsets != NO_BARS]])
     return radii
 
 

@@ -8,14 +8,23 @@ import functools
 from typing import Any
 
 import numpy as np
+from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.kernels import jit, layout
 from rrth_planner.kernels.collision import arm_clearance, arm_validity, edge_contacts as contacts
+from rrth_planner.kernels.collision.bar_bar import colliding_pair
 from rrth_planner.kernels.collision.boxes import rows_of
 from rrth_planner.kernels.kinematics import generated_fk as chain
-from rrth_planner.model.arm import ArmModel, bar_ends, bar_names
+from rrth_planner.model.arm import (
+    ArmModel,
+    bar_names,
+    bars_of,
+    Capsule,
+    is_called,
+    mount_bars,
+)
 from rrth_planner.model.arrays import Array, check_dof, FARTHEST
-from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.errors import ModelError, OptionsError
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
 
@@ -43,8 +52,8 @@ class World:
     chain : compiled function
         The arm's forward kinematics, `kernels.jit.CHAIN`.
     robot : ndarray, shape (n_rows, 8 + 2 dof)
-        Rows of the arm, columns as in `kernels.layout`.
-    obstacles : ndarray, shape (n_groups, 8 * 15)
+        The arm as numbers, rows and columns as in `kernels.layout`.
+    obstacles : ndarray, shape (n_groups, 8 * 16)
         Boxes grown by the margin, in the arm's base frame, groups as in `kernels.layout` [m]. On a
         map: lower and upper corners, shape (m, 2 dof).
     edge_check, free_radius, contacts : compiled function
@@ -55,6 +64,8 @@ class World:
         Names of the arm's bars and the boxes in messages.
     lanes : ndarray, shape (m,)
         Which lane of the last level of groups holds box i.
+    pair_names : tuple of (str, str)
+        Names of the bars of the arm that must not collide.
 
     Raises
     ------
@@ -74,6 +85,7 @@ class World:
     bar_names: tuple[str, ...]
     box_names: tuple[str, ...]
     lanes: Any = ()
+    pair_names: tuple[tuple[str, str], ...] = ()
 
     functions: Any = field(init=False)
     space: jit.Space = field(init=False)
@@ -94,7 +106,12 @@ class World:
     @property
     def ray_length(self) -> float:
         """Length of the pointing ray that must stay clear in motion [m]."""
-        return float(self.robot[-1, layout.D])
+        return float(self.robot[self.bounds.shape[1], layout.D])
+
+    @property
+    def stride(self) -> int:
+        """How many numbers the chain writes of a configuration."""
+        return int(self.robot[self.bounds.shape[1] + 1, layout.STRIDE])
 
     def is_in_bounds(self, q: Array) -> bool:
         """Return whether a configuration, shape (dof,), respects the joints' limits."""
@@ -111,7 +128,7 @@ class World:
             return self.is_edge_valid(q, q)
         ray = self.ray_length if ray_length is None else ray_length
         return self.is_in_bounds(q) and bool(
-            arm_validity.is_configuration_free(q, ray, self.chain, self.obstacles)
+            arm_validity.is_configuration_free(q, ray, self.chain, self.robot, self.obstacles)
         )
 
     def is_edge_valid(self, q_from: Array, q_to: Array) -> bool:
@@ -124,6 +141,17 @@ class World:
             )
         )
 
+    def colliding_bars(self, q: Array, ray_length: float | None = None) -> tuple[str, str] | None:
+        """Return the names of two bars that collide at q, shape (dof,), and must not; or None."""
+        if not self.pair_names:
+            return None
+        check_dof(q, self.bounds.shape[1], 'q')
+        ray = self.ray_length if ray_length is None else ray_length
+        points = np.empty(self.stride)
+        self.chain(np.ascontiguousarray(q), ray, points, 0)
+        pair = colliding_pair(points, 0, self.bounds.shape[1], self.robot)
+        return self.pair_names[pair] if pair >= 0 else None
+
     def clearances(self, q: Array, ray_length: float | None = None) -> Array:
         """
         Return the least signed distances of the bars from the grown boxes, (n_bars, m) [m].
@@ -134,7 +162,9 @@ class World:
         check_dof(q, self.bounds.shape[1], 'q')
         ray = self.ray_length if ray_length is None else ray_length
         distances = np.empty((len(self.bar_names), layout.LANES * len(self.obstacles)))
-        arm_clearance.clearances(np.atleast_2d(q), ray, self.chain, self.obstacles, distances)
+        arm_clearance.clearances(
+            np.atleast_2d(q), ray, self.chain, self.robot, self.obstacles, distances
+        )
         chosen: Array = distances[:, self.lanes]
         return chosen
 
@@ -158,6 +188,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
     robot, compiled_chain = arm_rows(arm, ray_guard_length)
     rows = np.empty((layout.BOX_ROWS, len(scene.boxes)))
     rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
+    rows[layout.BOX_CLASS] = box_classes(arm, scene)
     obstacles, lanes = pack_boxes(rows)
     return World(
         bounds=arm.bounds,
@@ -171,6 +202,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
         bar_names=tuple(bar_names(arm)),
         box_names=tuple(box.name for box in scene.boxes),
         lanes=lanes,
+        pair_names=tuple(pair_names(arm, pair) for pair in pairs_of(arm)),
     )
 
 
@@ -186,7 +218,7 @@ def without_ray(world: World) -> World:
     """Return the same world with an arm whose pointing ray ends where it begins, at the tool."""
     robot = world.robot.copy()
     # The reaches stay those of the ray's end, which are upper bounds.
-    robot[-1, layout.D] = 0.0
+    robot[world.bounds.shape[1], layout.D] = 0.0
     return replace(world, robot=robot)
 
 
@@ -199,23 +231,65 @@ def arm_rows(arm: ArmModel, ray_length: float) -> tuple[Array, Any]:
 
 
 def robot_rows(arm: ArmModel, ray_length: float) -> Array:
-    """Return the rows of an arm, columns as in `kernels.layout`, with a ray of that length [m]."""
-    dof = arm.dof
-    rows: Any = np.zeros((dof + 1, layout.REACH + 2 * dof))
+    """Return an arm as numbers, as in `kernels.layout`, with a ray of that length [m]."""
+    dof, bars, pairs = arm.dof, (*bars_of(arm), *mount_bars(arm)), pairs_of(arm)
+    first_bar = dof + 2
+    first_pair = first_bar + len(bars)
+    rows: Any = np.zeros((first_pair + len(pairs), layout.REACH + 2 * dof))
     alpha, a, offset, d = arm.dh.T
-    rows[:, layout.COS_ALPHA], rows[:, layout.SIN_ALPHA] = np.cos(alpha), np.sin(alpha)
-    rows[:, layout.A], rows[:, layout.OFFSET], rows[:, layout.D] = a, offset, d
-    rows[-1, layout.D] = ray_length
-    rows[:, layout.KIND] = [
-        layout.PRISMATIC if p else layout.REVOLUTE for p in arm.is_prismatic
-    ] + [layout.FIXED]
-    rows[:, layout.RADIUS_A] = rows[:, layout.RADIUS_D] = layout.NO_BAR
-    for (row, end), reach in zip(bar_ends(arm), reach_table(arm, ray_length), strict=True):
-        column = layout.RADIUS_A if end == 'a' else layout.RADIUS_D
-        rows[row, column] = arm.radii[row]
-        first = layout.REACH + (0 if end == 'a' else dof)
-        rows[row, first : first + dof] = reach
-    return rows
+    dh = rows[: dof + 1]
+    dh[:, layout.COS_ALPHA], dh[:, layout.SIN_ALPHA] = np.cos(alpha), np.sin(alpha)
+    dh[:, layout.A], dh[:, layout.OFFSET], dh[:, layout.D] = a, offset, d
+    dh[-1, layout.D] = ray_length
+    dh[:, layout.KIND] = [layout.PRISMATIC if p else layout.REVOLUTE for p in arm.is_prismatic] + [
+        layout.FIXED
+    ]
+    dh[:, layout.RADIUS_A] = dh[:, layout.RADIUS_D] = layout.NO_BAR
+    frames = sorted({pair.body for pair in pairs if pair.body > 0})
+    sizes = rows[dof + 1]
+    sizes[layout.N_BARS], sizes[layout.FRAMES] = len(bars_of(arm)), layout.BAR_SIZE * len(bars)
+    sizes[layout.STRIDE] = sizes[layout.FRAMES] + layout.FRAME_SIZE * len(frames)
+    sizes[layout.FIRST_PAIR] = first_pair
+    for k, (bar, reach) in enumerate(zip(bars, reach_table(arm, ray_length), strict=True)):
+        row = rows[first_bar + k]
+        row[layout.REACH :] = reach.reshape(-1)
+        if isinstance(bar.source, Capsule):
+            row[layout.LINK], row[layout.RADIUS] = bar.source.link, bar.radius
+            row[layout.ENDS : layout.ENDS + 6] = bar.source.ends.reshape(-1)
+        else:
+            row[layout.LINK] = layout.NO_BAR
+            i, end = bar.source
+            dh[i, layout.RADIUS_A if end == 'a' else layout.RADIUS_D] = bar.radius
+        row[layout.ALLOWED] = sum(
+            2.0 ** (c + 1)
+            for c, name in enumerate(_box_names(arm))
+            if (bar.name, name) in arm.allowed
+        )
+    for k, pair in enumerate(pairs):
+        slot = frames.index(pair.body) if pair.body > 0 else -1
+        rows[first_pair + k, :4] = pair.inner, pair.outer, slot, pair.body
+    return np.asarray(rows)
+
+
+def box_classes(arm: ArmModel, scene: Scene) -> Array:
+    """Return the class of each box, (m,): 0, or one more than the index of its name."""
+    names = _box_names(arm)
+    classes = np.zeros(len(scene.boxes))
+    for c, name in enumerate(names):
+        classes[[is_called(box.name, name) for box in scene.boxes]] = c + 1
+    return classes
+
+
+@functools.lru_cache(maxsize=16)
+def _box_names(arm: ArmModel) -> tuple[str, ...]:
+    """Return the names of boxes that some bar may meet, without repetition."""
+    parts = {bar.name for bar in (*bars_of(arm), *mount_bars(arm))}
+    names = tuple(dict.fromkeys(name for _, name in arm.allowed if name not in parts))
+    if len(names) > layout.MAX_CLASSES:
+        raise ModelError(
+            f'allowed: {len(names)} different names, expected at most {layout.MAX_CLASSES} [-]'
+        )
+    return names
 
 
 @functools.lru_cache(maxsize=16)

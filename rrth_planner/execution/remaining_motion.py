@@ -11,6 +11,7 @@ from rrth_planner.collision.penetration import gets_no_deeper, leads_out
 from rrth_planner.collision.world import (
     arm_rows,
     arm_world,
+    box_classes,
     mount_inverse,
     RESOLUTION,
     SLACK,
@@ -110,6 +111,7 @@ def is_remaining_free(
             chain,
             robot,
             scene.numbers,
+            box_classes(arm, scene),
             mount_inverse(arm),
             margin + SLACK,
             tree_depth(len(scene.boxes)),
@@ -159,11 +161,19 @@ def is_place_free(
 
     With the margin, and with the pointing ray up to `ray_guard_length` [m].
     """
-    _, chain = arm_rows(arm, ray_guard_length)
+    robot, chain = arm_rows(arm, ray_guard_length)
     boxes, T_arm_base = scene.numbers, mount_inverse(arm)
     depth = tree_depth(len(scene.boxes))
     return bool(
         trajectory_check.is_place_free(
-            q, ray_guard_length, chain, boxes, T_arm_base, margin + SLACK, depth
+            q,
+            ray_guard_length,
+            chain,
+            robot,
+            boxes,
+            box_classes(arm, scene),
+            T_arm_base,
+            margin + SLACK,
+            depth,
         )
     )

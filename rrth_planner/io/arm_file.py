@@ -10,7 +10,7 @@ import numpy as np
 from rrth_planner.io.entries import mapping, number, sequence
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import naming_file, parse_yaml, read_text, to_yaml
-from rrth_planner.model.arm import ArmModel, ROW
+from rrth_planner.model.arm import ArmModel, Capsule, NO_BARS, ROW
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable, shown
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
@@ -18,7 +18,8 @@ from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw
 LAYOUT = (
     'Modified Denavit-Hartenberg parameters (Craig), '
     'T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d).',
-    'Lengths in metres, angles in radians; radius: thickness of the bars of a row.',
+    'Lengths in metres, angles in radians; radius: of the bars that the offsets a and d of a row',
+    'are; capsules: of the link that the joint moves, in its frame after the row.',
     "tool: the frame after the last joint, whose pointing ray leaves along +z; mount: the arm's",
     "base in the wearer's base frame, x forward, y left, z up.",
 )
@@ -32,17 +33,31 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
     for k, joint in enumerate(arm.joint_names):
         kind = 'prismatic' if arm.is_prismatic[k] else 'revolute'
         limits = {'lower': lower[k], 'upper': upper[k]}
-        joints.append({'name': joint, 'type': kind, **rows[k], **limits, 'radius': radii[k]})
+        radius = {} if radii[k] == NO_BARS else {'radius': radii[k]}
+        row = {'name': joint, 'type': kind, **rows[k], **limits, **radius}
+        joints.append(row | _capsules_of(arm, k + 1))
     del rows[-1]['d']
-    return {
+    mount = {
+        'position': _plain(arm.T_base_mount[:3, 3]),
+        'quaternion_xyzw': _plain(quaternion_xyzw(arm.T_base_mount[:3, :3])),
+    }
+    result = {
         'name': name,
         'joints': joints,
-        'tool': {**rows[-1], 'radius': radii[-1]},
-        'mount': {
-            'position': _plain(arm.T_base_mount[:3, 3]),
-            'quaternion_xyzw': _plain(quaternion_xyzw(arm.T_base_mount[:3, :3])),
-        },
+        'tool': {**rows[-1], 'radius': radii[-1]} | _capsules_of(arm, arm.dof + 1),
+        'mount': mount | _capsules_of(arm, 0),
     }
+    return result | ({'allowed': [list(pair) for pair in arm.allowed]} if arm.allowed else {})
+
+
+def _capsules_of(arm: ArmModel, link: int) -> dict[str, Any]:
+    """Return the entry with the capsules of a link, if it has any."""
+    found = [
+        {'name': c.name, 'from': c.ends[0].tolist(), 'to': c.ends[1].tolist(), 'radius': c.radius}
+        for c in arm.capsules
+        if c.link == link
+    ]
+    return {'capsules': found} if found else {}
 
 
 def arm_to_yaml(arm: ArmModel, name: str, comments: Sequence[str] = ()) -> str:
@@ -71,12 +86,14 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         Something is missing, has another name or describes no arm.
 
     """
-    given = mapping(data, 'arm', ('joints', 'tool', 'mount'), ModelError, ('name',))
+    wanted = ('joints', 'tool', 'mount')
+    given = mapping(data, 'arm', wanted, ModelError, ('name', 'allowed'))
     printable(given.get('name', 'arm'), 'arm: name', ModelError)
     joints = [
         _joint(i, joint) for i, joint in enumerate(sequence(given['joints'], 'joints', ModelError))
     ]
-    mount = mapping(given['mount'], 'mount', ('position', 'quaternion_xyzw'), ModelError)
+    pose = ('position', 'quaternion_xyzw')
+    mount = mapping(given['mount'], 'mount', pose, ModelError, ('capsules',))
     position = frozen_array(mount['position'], (3,), 'mount position', 'm', ModelError)
     quaternion = frozen_array(
         mount['quaternion_xyzw'], (4,), 'mount quaternion_xyzw', '-', ModelError, FARTHEST
@@ -84,33 +101,74 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
     if np.linalg.norm(quaternion) < 1e-6:
         raise ModelError('mount quaternion_xyzw: all zero, expected a unit quaternion [-]')
     rows = [*joints, _tool(given['tool'])]
+    capsules = [
+        capsule
+        for link, row in enumerate([mount, *rows])
+        for capsule in _capsules(row.get('capsules', []), link, len(joints))
+    ]
+    # Where links are made of capsules, offsets are bars only if they say so.
+    unsaid = NO_BARS if capsules else 0.0
     return ArmModel(
         joint_names=tuple(joint['name'] for joint in joints),
         is_prismatic=tuple(joint['type'] == 'prismatic' for joint in joints),
         dh=np.array([[row[key] for key in ROW] for row in rows]),
         bounds=np.array([[joint[key] for joint in joints] for key in ('lower', 'upper')]),
-        radii=np.array([row['radius'] for row in rows]),
+        radii=np.array([row.get('radius', unsaid) for row in joints] + [rows[-1]['radius']]),
         T_base_mount=pose_matrix(position, quaternion),
+        capsules=tuple(capsules),
+        allowed=allowed_from(given.get('allowed', []), 'allowed'),
     )
+
+
+def allowed_from(data: Any, label: str) -> tuple[tuple[str, str], ...]:
+    """Return pairs of names, of a part of the arm and of another part or a box, or raise."""
+    pairs = []
+    for i, pair in enumerate(sequence(data, label, ModelError)):
+        names = sequence(pair, f'{label}[{i}]', ModelError)
+        if len(names) != 2 or not all(isinstance(name, str) for name in names):
+            raise ModelError(
+                f'{label}[{i}]: {shown(pair)}, expected a part of the arm and another part or box'
+            )
+        pairs.append((names[0], names[1]))
+    return tuple(pairs)
+
+
+def _capsules(data: Any, link: int, dof: int) -> list[Capsule]:
+    """Return the capsules of a link; 0: of the mount, dof + 1: of the tool."""
+    what = 'mount' if link == 0 else 'tool' if link > dof else f'link {link}'
+    found = []
+    for i, entry in enumerate(sequence(data, f'{what}: capsules', ModelError)):
+        label = f'{what}: capsule {i}'
+        given = mapping(entry, label, ('from', 'to', 'radius'), ModelError, ('name',))
+        ends = [
+            frozen_array(given[key], (3,), f'{label}: {key}', 'm', ModelError, FARTHEST)
+            for key in ('from', 'to')
+        ]
+        radius = number(given['radius'], f'{label}: radius', 'm', ModelError)
+        name = printable(given.get('name', what), f'{label}: name', ModelError)
+        found.append(Capsule(name=name, link=link, ends=np.array(ends), radius=radius))
+    return found
 
 
 def _joint(index: int, data: Any) -> dict[str, Any]:
     """Return what an arm's file says of a joint, its radius included."""
     wanted = ('name', 'type', *ROW, 'lower', 'upper')
-    given = {'radius': 0.0, **mapping(data, f'joint {index}', wanted, ModelError, ('radius',))}
+    given = mapping(data, f'joint {index}', wanted, ModelError, ('radius', 'capsules'))
     label = f'joint "{printable(given["name"], f"joint {index}: name", ModelError)}"'
     kind = given['type']
     if kind not in ('revolute', 'prismatic'):
         raise ModelError(f'{label}: type {shown(kind)}, expected revolute or prismatic')
     limit = 'm' if kind == 'prismatic' else 'rad'
-    return given | _numbers(given, label, {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'})
+    units = {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'}
+    return {**given, **_numbers(given, label, units)}
 
 
 def _tool(data: Any) -> dict[str, Any]:
     """Return the row of the tool, its radius and a `d` of 0 included."""
     wanted = ('alpha', 'a', 'offset')
-    given = mapping(data, 'tool', wanted, ModelError, ('d', 'radius'))
-    row = _numbers({'d': 0.0, 'radius': 0.0, **given}, 'tool', {**ROW, 'radius': 'm'})
+    given = mapping(data, 'tool', wanted, ModelError, ('d', 'radius', 'capsules'))
+    row = {'d': 0.0, 'radius': 0.0, **given}
+    row |= _numbers(row, 'tool', {**ROW, 'radius': 'm'})
     if row['d'] != 0.0:
         raise ModelError(f'tool: d = {row["d"]}, expected none: the ray begins at the frame [m]')
     return row
@@ -118,7 +176,9 @@ def _tool(data: Any) -> dict[str, Any]:
 
 def _numbers(given: Mapping[str, Any], label: str, units: Mapping[str, str]) -> dict[str, float]:
     return {
-        key: number(given[key], f'{label}: {key}', unit, ModelError) for key, unit in units.items()
+        key: number(given[key], f'{label}: {key}', unit, ModelError)
+        for key, unit in units.items()
+        if key in given
     }
 
 

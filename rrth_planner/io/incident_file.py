@@ -13,11 +13,12 @@ import uuid
 
 import numpy as np
 from rrth_planner.collision.violation import Violation
+from rrth_planner.io.arm_file import allowed_from
 from rrth_planner.io.entries import mapping, number, sequence, text, whole
 from rrth_planner.io.incident import Incident, IncidentKind
 from rrth_planner.io.settings import LENGTHS
 from rrth_planner.io.text_file import load_yaml, naming_file, to_yaml
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, Capsule
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import one_line, printable, RecordError, shown
 from rrth_planner.model.goal import PointingGoal
@@ -171,7 +172,23 @@ def _arm(data: Any) -> ArmModel:
         values = given[name]
         if not isinstance(values, list) or not all(isinstance(v, kind) for v in values):
             raise RecordError(f'arm: {name} {shown(values)}, expected a list of {kind.__name__}')
+    capsules = sequence(given['capsules'], 'arm: capsules', RecordError)
+    given['capsules'] = tuple(
+        _capsule(item, f'arm: capsule {i}') for i, item in enumerate(capsules)
+    )
+    given['allowed'] = allowed_from(given['allowed'], 'arm: allowed')
     return ArmModel(**given)
+
+
+def _capsule(data: Any, name: str) -> Capsule:
+    """Return the capsule that `plain` wrote, or raise RrthError."""
+    given = _fields_of(data, Capsule, name)
+    return Capsule(
+        name=text(given['name'], f'{name}: name', RecordError),
+        link=whole(given['link'], f'{name}: link', RecordError),
+        ends=given['ends'],
+        radius=number(given['radius'], f'{name}: radius', 'm', RecordError),
+    )
 
 
 def _scene(data: Any, name: str) -> Scene:
@@ -190,11 +207,16 @@ def _trajectory(data: Any, name: str) -> Trajectory | None:
 def _violation(data: Any) -> Violation:
     """Return the violation that `plain` wrote, or raise RrthError."""
     given = _fields_of(data, Violation, 'violation')
+    if not isinstance(given['is_of_arm'], bool):
+        raise RecordError(
+            f'violation: is_of_arm {shown(given["is_of_arm"])}, expected true or false'
+        )
     return Violation(
         time=number(given['time'], 'violation: time', 's', RecordError),
         distance=number(given['distance'], 'violation: distance', 'm', RecordError),
         bar=printable(given['bar'], 'violation: bar', RecordError),
         box=printable(given['box'], 'violation: box', RecordError),
+        is_of_arm=given['is_of_arm'],
     )
 
 

@@ -10,17 +10,36 @@ SIZE, ROTATION, NUMBERS = 3, 6, 15
 # A rotation is orthogonal up to this.
 ORTHOGONAL = 1e-6
 
-# Columns of `robot`, a row for each DH row of the arm; then dof columns with the reach of the end
-# of the row's `a` offset and dof with that of its `d` offset.
-COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D, REACH = range(9)
+# `robot` holds an arm in four blocks of rows. First its dof + 1 DH rows, the tool's last, whose D
+# is the length of the pointing ray; RADIUS_A and RADIUS_D are those of the bars that its offsets
+# are.
+COS_ALPHA, SIN_ALPHA, A, OFFSET, D, KIND, RADIUS_A, RADIUS_D = range(8)
+REACH = 9
 REVOLUTE, PRISMATIC, FIXED = 0.0, 1.0, 2.0
 NO_BAR = -1.0
+# Then one row of sizes: the bars that are checked against boxes; the numbers that `chain` writes
+# of a configuration; where among them the frames of links begin; the first of the pairs.
+N_BARS, STRIDE, FRAMES, FIRST_PAIR = range(4)
+# Then a row for each bar, those of the mount last. Of a capsule: the frame of its link (0: the
+# mount's, dof + 1: the tool's), its radius, its two ends in that frame; of an offset: NO_BAR.
+# Then the sum of 2^c over the classes c of boxes that it may meet. From REACH on, dof columns
+# with the reach of its start and dof with that of its end.
+LINK, RADIUS, ENDS, ALLOWED = 0, 1, 2, 8
+# More classes a floating-point number does not hold.
+MAX_CLASSES = 50
+# Then a row for each pair of bars that must not collide: the inner and the outer one, where among
+# the frames that of the inner one's link is, and how many joints move that link.
+INNER, OUTER, FRAME, BODY = range(4)
+# Room in `points` for a bar (start, 0, end, radius), and for a frame (origin, then its axes).
+BAR_SIZE, FRAME_SIZE = 8, 12
+# Most pairs of an arm's bars, and most links whose frames they need.
+MAX_PAIRS, MAX_FRAMES = 2048, 64
 
 # `boxes`: a row for each group of LANES boxes, their numbers side by side, so that the compiler
 # works on them all at once: number r of box l stands in column LANES r + l. The numbers: the
 # rotation into the box's own axes (9), the position of the arm's base in them (3), the half
-# extents grown by margin and slack (3). The groups form a tree: lane l of group g bounds the whole
-# group LANES g + l + 1, if there is such a row; the last ones hold the boxes themselves. Unused
-# lanes have half extents of minus infinity: they never collide.
+# extents grown by margin and slack (3), the class of the box, 0: none (1). The groups form a tree:
+# lane l of group g bounds the whole group LANES g + l + 1, if there is such a row; the last ones
+# hold the boxes themselves. Unused lanes have half extents of minus infinity: they never collide.
 LANES = 8
-BOX_OFFSET, BOX_HALF, BOX_ROWS = 9, 12, 15
+BOX_OFFSET, BOX_HALF, BOX_CLASS, BOX_ROWS = 9, 12, 15, 16

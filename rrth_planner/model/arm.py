@@ -1,18 +1,61 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The arm: a chain of modified Denavit-Hartenberg rows that ends in a pointing ray."""
+"""The arm: a chain of modified Denavit-Hartenberg rows, its shape, and its pointing ray."""
 
 from dataclasses import dataclass
 import functools
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF
+from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF, NO_BAR
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
 
+# Radius of a row whose offsets are no bars.
+NO_BARS = NO_BAR
 # Keys of the rows of an arm's file, and their units.
 ROW = {'alpha': 'rad', 'a': 'm', 'offset': 'rad', 'd': 'm'}
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Capsule:
+    """
+    All points within a radius of a straight line that is fixed to a link.
+
+    Parameters
+    ----------
+    name : str
+        What messages call it: the link's name.
+    link : int
+        0: the mount, i: the link that joint i moves (i = 1 ... dof), both in Craig's frame i;
+        dof + 1: the last link again, in the frame of the tool.
+    ends : array_like, shape (2, 3)
+        Of the line, in that frame [m].
+    radius : float
+        >= 0 [m].
+
+    Raises
+    ------
+    ModelError
+        Names that cannot be printed, numbers that are none, a radius below 0, beyond 1e4 m.
+
+    """
+
+    name: str
+    link: int
+    ends: Array
+    radius: float
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        printable(self.name, 'capsule: name', ModelError)
+        label = f'capsule "{self.name}"'
+        ends = frozen_array(self.ends, (2, 3), f'{label}: ends', 'm', ModelError, FARTHEST)
+        object.__setattr__(self, 'ends', ends)
+        if not 0.0 <= self.radius <= FARTHEST:
+            raise ModelError(
+                f'{label}: radius {self.radius}, expected a length from 0 to {FARTHEST:g} [m]'
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -32,14 +75,21 @@ class ArmModel:
     bounds : array_like, shape (2, dof)
         Lowest and highest joint positions [rad or m].
     radii : array_like, shape (dof + 1,)
-        Thickness of the bars of each row, ray included [m].
+        Radius of the bars that the offsets `a` and `d` of each row are; -1: the offsets of that
+        row are no bars; the last one is that of the pointing ray, >= 0 [m].
     T_base_mount : array_like, shape (4, 4)
         Pose of the arm's frame 0 in the wearer's base frame [m].
+    capsules : tuple of Capsule
+        What else the links are made of. Those of the mount, which is worn on the body, are checked
+        against the rest of the arm only.
+    allowed : tuple of (str, str)
+        Pairs that may meet: a part of the arm, by the name that messages give it, and another
+        part or a box.
 
     Raises
     ------
     ModelError
-        Inconsistent rows, names or limits, or an angle or extent beyond 1e4 rad or m.
+        Inconsistent rows, names, limits or capsules, or an angle or extent beyond 1e4 rad or m.
 
     """
 
@@ -49,6 +99,8 @@ class ArmModel:
     bounds: Array
     radii: Array
     T_base_mount: Array
+    capsules: tuple[Capsule, ...] = ()
+    allowed: tuple[tuple[str, str], ...] = ()
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -75,15 +127,19 @@ class ArmModel:
             object.__setattr__(self, field, value)
         if not (self.bounds[0] < self.bounds[1]).all():
             raise ModelError(f'bounds: {self.bounds.tolist()}, expected lower < upper [rad or m]')
-        if (self.radii < 0.0).any():
-            raise ModelError(f'radii: {self.radii.tolist()}, expected lengths >= 0 [m]')
+        if (self.radii[-1] < 0.0) or ((self.radii < 0.0) & (self.radii != NO_BARS)).any():
+            raise ModelError(
+                f'radii: {self.radii.tolist()}, expected lengths >= 0, or {NO_BARS:g}: no bars; '
+                'that of the pointing ray >= 0 [m]'
+            )
         if self.dh[-1, 3] != 0.0:
             raise ModelError(f'dh: d = {self.dh[-1, 3]} in the row of the tool, expected 0 [m]')
-        n_bars = len(bar_ends(self))
+        self._check_capsules(dof)
+        n_bars = len(bar_ends(self)) + len(self.capsules)
         if n_bars > MAX_BARS:
             raise ModelError(
-                f'dh: {n_bars} bars, expected at most {MAX_BARS}: each a and d behind the first '
-                'joint that is not 0, each joint that slides, and the pointing ray [-]'
+                f'dh: {n_bars} bars and capsules, expected at most {MAX_BARS}: each a and d after '
+                'the first joint that is not 0, each joint that slides, and the pointing ray [-]'
             )
         if not np.array_equal(self.T_base_mount[3], [0.0, 0.0, 0.0, 1.0]):
             raise ModelError(f'mount: last row {self.T_base_mount[3].tolist()}, expected 0 0 0 1')
@@ -96,7 +152,11 @@ class ArmModel:
             np.linalg.norm(self.T_base_mount[:3, 3])
             + np.abs(self.dh[:, [1, 3]]).sum()
             + np.abs(self.bounds[:, slides]).max(axis=0).sum()
-            + self.radii.max()
+            + max(
+                self.radii.max(),
+                *(np.linalg.norm(c.ends, axis=1).max() + c.radius for c in self.capsules),
+                0.0,
+            )
         )
         if extent > FARTHEST:
             raise ModelError(
@@ -104,10 +164,49 @@ class ArmModel:
                 f'{FARTHEST:g} [m]'
             )
 
+    def _check_capsules(self, dof: int) -> None:
+        """Validate and freeze capsules and the pairs that may meet."""
+        object.__setattr__(self, 'capsules', tuple(self.capsules))
+        object.__setattr__(self, 'allowed', tuple((str(a), str(b)) for a, b in self.allowed))
+        for capsule in self.capsules:
+            if not 0 <= capsule.link <= dof + 1:
+                raise ModelError(
+                    f'capsule "{capsule.name}": link {capsule.link}, expected 0 to {dof + 1} [-]'
+                )
+        for pair in self.allowed:
+            for name in pair:
+                printable(name, 'allowed', ModelError)
+            known = {*bar_names(self), *(capsule.name for capsule in self.capsules)}
+            if pair[0] not in known:
+                raise ModelError(
+                    f'allowed: no part of the arm is called "{pair[0]}", expected one of '
+                    f'{sorted(known)} first'
+                )
+
     @property
     def dof(self) -> int:
         """Number of joints."""
         return len(self.joint_names)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bar:
+    """
+    A straight part of the arm with a radius: a capsule, an offset of a row, or the pointing ray.
+
+    Parameters
+    ----------
+    body : int
+        How many joints move it. Bars of the same body keep their places to each other.
+    source : Capsule or (int, str)
+        The capsule, or the row of the offset and which one it is, 'a' or 'd'.
+
+    """
+
+    name: str
+    body: int
+    radius: float
+    source: Capsule | tuple[int, str]
 
 
 @functools.lru_cache(maxsize=16)
@@ -121,6 +220,8 @@ def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
     bars = []
     for row, (_, a, _, d) in enumerate(arm.dh):
         is_moved, is_ray = row > 0, row == arm.dof
+        if arm.radii[row] == NO_BARS:
+            continue
         if is_moved and a != 0.0:
             bars.append((row, 'a'))
         if is_ray or arm.is_prismatic[row] or (is_moved and d != 0.0):
@@ -129,11 +230,36 @@ def bar_ends(arm: ArmModel) -> tuple[tuple[int, str], ...]:
 
 
 @functools.lru_cache(maxsize=16)
+def bars_of(arm: ArmModel) -> tuple[Bar, ...]:
+    """Return all bars of an arm that its joints move: its capsules first, the ray last."""
+    moved = [
+        Bar(capsule.name, min(capsule.link, arm.dof), capsule.radius, capsule)
+        for capsule in arm.capsules
+        if capsule.link > 0
+    ]
+    for row, end in bar_ends(arm):
+        # `a` leads from the link before; so does a `d` that slides, but its end is what matters.
+        body = row if end == 'a' else min(row + 1, arm.dof)
+        name = 'pointing ray' if row == arm.dof else f'link {row + 1}'
+        moved.append(Bar(name, body, float(arm.radii[row]), (row, end)))
+    return tuple(moved)
+
+
+@functools.lru_cache(maxsize=16)
+def mount_bars(arm: ArmModel) -> tuple[Bar, ...]:
+    """Return the capsules of the mount, which no joint moves."""
+    return tuple(Bar(c.name, 0, c.radius, c) for c in arm.capsules if c.link == 0)
+
+
+@functools.lru_cache(maxsize=16)
 def bar_names(arm: ArmModel) -> tuple[str, ...]:
-    """Return what messages call the bars of `bar_ends`."""
-    return tuple(
-        'pointing ray' if row == arm.dof else f'link {row + 1}' for row, _ in bar_ends(arm)
-    )
+    """Return what messages call the bars of `bars_of`."""
+    return tuple(bar.name for bar in bars_of(arm))
+
+
+def is_called(box: str, name: str) -> bool:
+    """Return whether a box has a name, or is one of those that have it: `name/0`, `name[1]`."""
+    return box == name or (box.startswith(name) and box[len(name)] in '/[')
 
 
 def forward_kinematics(arm: ArmModel, q: Array) -> Array:
@@ -183,6 +309,13 @@ def _link_parts(arm: ArmModel) -> tuple[Array, NDArray[np.bool_], Array]:
     parts[:, 3, 1, 3], parts[:, 3, 2, 3] = -sa, ca
     slides = np.array([*arm.is_prismatic, False])
     return np.stack([offset, d]), slides, parts.reshape(-1, 4, 16)
+
+
+def tool_in_last_link(arm: ArmModel, points: Array) -> Array:
+    """Return points of the tool's frame in that of the last link, (..., 3) -> (..., 3) [m]."""
+    T = link_poses(arm, np.zeros(arm.dof))[-1]
+    result: Array = points @ T[:3, :3].T + T[:3, 3]
+    return result
 
 
 def tool_pose(arm: ArmModel, q: Array) -> Array:

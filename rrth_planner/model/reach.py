@@ -6,7 +6,7 @@ import functools
 import math
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, bar_ends
+from rrth_planner.model.arm import ArmModel, Bar, bars_of, Capsule, mount_bars, tool_in_last_link
 from rrth_planner.model.arrays import Array
 
 # A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
@@ -44,6 +44,36 @@ def reach_bound(arm: ArmModel, ray_length: float, joint: int, row: int, end: str
             if length is not None:
                 best[first] = min(best[first], length + best[first + size])
     return best[0]
+
+
+def capsule_reach(arm: ArmModel, joint: int, capsule: Capsule, end: int) -> float:
+    """Return `reach_bound` for one end of the line of a capsule, 0 or 1 [m]."""
+    link, point = capsule.link, capsule.ends[end]
+    if link > arm.dof:
+        link, point = arm.dof, tool_in_last_link(arm, point)
+    if link <= joint:
+        return 0.0
+    if arm.is_prismatic[joint]:
+        return 1.0
+    row = link - 1
+    if row == joint:
+        return math.hypot(point[0], point[1])
+    # The last offsets and the point, whose place to each other only the last joint changes; or
+    # all but the point, and the point.
+    a, across = abs(float(arm.dh[row, 1])), math.hypot(point[0], point[1])
+    places = [(across, float(point[2]) + d) for d in _extremes(arm, 0.0, row)]
+    last_d = max(math.hypot(*place) for place in places)
+    last_a = max(math.sqrt(a * a + 2.0 * a * r + r * r + z * z) for r, z in places)
+    return min(
+        reach_bound(arm, 0.0, joint, row, 'd') + float(np.linalg.norm(point)),
+        reach_bound(arm, 0.0, joint, row, 'a') + last_d,
+        _before(arm, joint, row) + last_a,
+    )
+
+
+def _before(arm: ArmModel, joint: int, row: int) -> float:
+    """Return `reach_bound` for the point where the `a` offset of a row begins [m]."""
+    return reach_bound(arm, 0.0, joint, row - 1, 'd')
 
 
 def _group_norm(
@@ -87,12 +117,21 @@ def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
 
 @functools.lru_cache(maxsize=16)
 def reach_table(arm: ArmModel, ray_length: float) -> Array:
-    """Return `reach_bound` for every bar end (rows) and joint (columns), (n_bars, dof) [m]."""
-    table = np.array(
-        [
-            [reach_bound(arm, ray_length, joint, row, end) for joint in range(arm.dof)]
-            for row, end in bar_ends(arm)
-        ]
-    )
+    """
+    Return `reach_bound` for both ends of every bar and every joint, (n_bars, 2, dof) [m].
+
+    Bars as in `arm.bars_of`, and those of the mount after them.
+    """
+    bars = (*bars_of(arm), *mount_bars(arm))
+    table = np.array([_bar_reach(arm, ray_length, bar) for bar in bars])
     table.setflags(write=False)
     return table
+
+
+def _bar_reach(arm: ArmModel, ray_length: float, bar: Bar) -> list[list[float]]:
+    joints = range(arm.dof)
+    if isinstance(bar.source, Capsule):
+        return [[capsule_reach(arm, j, bar.source, end) for j in joints] for end in (0, 1)]
+    row, end = bar.source
+    before = (row - 1, 'd') if end == 'a' else (row, 'a')
+    return [[reach_bound(arm, ray_length, j, *at) for j in joints] for at in (before, (row, end))]

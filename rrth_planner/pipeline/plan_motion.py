@@ -127,7 +127,8 @@ def plan_question(
     escape, disagreement = None, None
     leads: Iterable[LeadIn | None | Rejection] = (None,)
     rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
-    if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION:
+    is_in_box = rejection is not None and world.colliding_bars(q_start) is None
+    if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION and is_in_box:
         if moving is not None:
             sentence = depth_sentence(world, box_depths(world, q_start), margin)
             rejection = replace(

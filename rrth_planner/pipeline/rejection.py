@@ -72,6 +72,13 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
             )
     if world.is_valid(q_start):
         return None
+    colliding = world.colliding_bars(q_start)
+    if colliding is not None:
+        return Rejection(
+            PlanStatus.START_IN_COLLISION,
+            f'{colliding[0]} and {colliding[1]} of the arm collide, expected them apart; pairs '
+            'that may meet are listed as `allowed`',
+        )
     return Rejection(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
 
 
@@ -170,7 +177,13 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
     pairs: Counter[tuple[str, str]] = Counter()
     least: dict[tuple[str, str], float] = {}
     reaches = np.maximum(goals.blocked_reaches, world.ray_length)
-    for depths in box_depths(world, goals.q_blocked, reaches):
+    n_colliding: Counter[tuple[str, str]] = Counter()
+    for q, reach, depths in zip(
+        goals.q_blocked, reaches, box_depths(world, goals.q_blocked, reaches), strict=True
+    ):
+        colliding = world.colliding_bars(q, float(reach))
+        if colliding is not None:
+            n_colliding[colliding] += 1
         # A link of two bars counts once.
         found: dict[tuple[str, str], float] = {}
         for bar, box in np.argwhere(depths > 0.0):
@@ -180,7 +193,11 @@ def goal_rejection(world: World, goals: GoalSet) -> Rejection:
         for pair, depth in found.items():
             least[pair] = min(least.get(pair, np.inf), depth)
     blame = 'with next to no clearance'
-    if pairs:
+    if n_colliding and n_colliding.most_common(1)[0][1] > max(pairs.values(), default=0):
+        (part, other), count = n_colliding.most_common(1)[0]
+        share = 100.0 * count / len(goals.q_blocked)
+        blame = f'most often {part} and {other} of the arm collide ({share:.0f} %)'
+    elif pairs:
         (bar, box), count = pairs.most_common(1)[0]
         share = 100.0 * count / len(goals.q_blocked)
         blame = (

@@ -2,13 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """python-fcl agrees with the kernels and with the reference checker."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from rrth_planner.collision.bar_pairs import pair_names, pairs_of
+from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world
-from rrth_planner.model.arm import tool_pose
+from rrth_planner.model.arm import bars_of, mount_bars, tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import (
+    capsule_arm,
     compiled_chain,
     dense_touch,
     free_configuration,
@@ -253,3 +258,46 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
     assert not made
     assert any(before)
     assert not all(before)
+
+
+@pytest.mark.parametrize('seed', [0, 2])
+def test_capsules_are_as_far_from_boxes_as_by_the_kernels(seed):
+    arm = capsule_arm(np.random.default_rng(seed))
+    names = sorted({bar.name for bar in (*bars_of(arm), *mount_bars(arm))})
+    rng = np.random.default_rng(30 + seed)
+    allowed = replace(arm, allowed=((names[1], 'box_0'), (names[-2], 'box_1')))
+    for one in (arm, allowed):
+        assert check_nearest(one, random_boxes(rng, 3), rng, 60) > 20
+
+
+@pytest.mark.parametrize('seed', [0, 2, 3])
+def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(seed):
+    arm, rng = capsule_arm(np.random.default_rng(seed)), np.random.default_rng(40 + seed)
+    nothing, n_free, n_touching = Scene(()), 0, 0
+    pairs = {frozenset(pair_names(arm, pair)) for pair in pairs_of(arm)}
+    for _ in range(40):
+        q_from = rng.uniform(*arm.bounds)
+        q_to = np.clip(q_from + 0.6 * rng.standard_normal(arm.dof), *arm.bounds)
+        trajectory = straight(q_from, q_to)
+        dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 201))
+        ends = bar_ends_at(arm, dense, 0.4)
+        radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
+        least = min(
+            (
+                bar_distances(ends[:, p.inner], ends[:, p.outer]) - radii[p.inner] - radii[p.outer]
+            ).min()
+            for p in pairs_of(arm)
+        )
+        violation = fcl_check.first_violation(arm, nothing, trajectory, 0.02, 0.4, 0.4)
+        if least > 1e-4:
+            n_free += 1
+            assert violation is None or least < 5e-3
+        elif least < -1e-3:
+            n_touching += 1
+            assert violation is not None
+            assert violation.is_of_arm
+            assert violation.distance < 0.0
+            assert frozenset((violation.bar, violation.box)) in pairs
+            assert 'box' not in violation.other
+    assert n_free > 3
+    assert n_touching > 3

@@ -24,7 +24,7 @@ from rrth_planner.kernels.collision.arm_validity import (
     prove_curve,
 )
 from rrth_planner.kernels.jit import CHAIN, first_class, kernel, MAT, VEC
-from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, D
+from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, D
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
@@ -90,7 +90,10 @@ def test_configurations_are_checked_as_by_the_reference_checker():
         for scene in (wearer(), varied_body(rng)):
             world = arm_world(arm, scene, MARGIN, RAY)
             q = rng.uniform(*arm.bounds, (2500, arm.dof))
-            got = [is_configuration_free(row, RAY, world.chain, world.obstacles) for row in q]
+            got = [
+                is_configuration_free(row, RAY, world.chain, world.robot, world.obstacles)
+                for row in q
+            ]
             ends, touched = bars(arm, q, RAY), np.zeros(len(q), dtype=bool)
             for box in scene.boxes:
                 half = 0.5 * box.size + MARGIN + arm.radii[0]
@@ -227,7 +230,7 @@ def is_free_at_instants(q_from, q_to, resolution, chain, robot, boxes):
     for i in range(n):
         for k in range(q.shape[0]):
             q[k] = q_from[k] + i / (n - 1) * (q_to[k] - q_from[k])
-        if not is_configuration_free(q, robot[robot.shape[0] - 1, D], chain, boxes):
+        if not is_configuration_free(q, robot[q.shape[0], D], chain, robot, boxes):
             return False
     return True
 
@@ -303,9 +306,9 @@ def test_a_configuration_that_is_none_is_never_free(value):
     for k in range(4):
         q = FOLDED.copy()
         q[k] = value
-        assert not is_configuration_free(q, RAY, world.chain, world.obstacles)
+        assert not is_configuration_free(q, RAY, world.chain, world.robot, world.obstacles)
         assert not world.is_valid(q)
-    assert not is_configuration_free(FOLDED, np.nan, world.chain, world.obstacles)
+    assert not is_configuration_free(FOLDED, np.nan, world.chain, world.robot, world.obstacles)
 
 
 def test_a_curve_with_a_number_that_is_none_is_never_proven():
@@ -325,8 +328,8 @@ def test_a_box_with_a_number_that_is_none_is_never_passed():
     # One box that fills the space where the arm is, broken row by row.
     rows = np.zeros((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = np.eye(3).ravel()
-    rows[BOX_HALF:] = 5.0
-    for row in range(BOX_ROWS):
+    rows[BOX_HALF:BOX_CLASS] = 5.0
+    for row in range(BOX_CLASS):
         for value in (np.nan, np.inf) if row >= BOX_HALF else (np.nan,):
             broken = rows.copy()
             broken[row] = value
@@ -438,7 +441,7 @@ for _ in range(40):
     distances.append(float(bar_box_distance(start, step, rng.uniform(0.1, 0.5, 3))))
 q_goal = np.array([2.2, -1.0, 0.3, -0.4])
 free = [
-    bool(is_configuration_free(q, 1.0, world.chain, world.obstacles))
+    bool(is_configuration_free(q, 1.0, world.chain, world.robot, world.obstacles))
     for q in (FOLDED, q_goal, np.zeros(4))
 ]
 ends = blocked_pair(np.random.default_rng(6), world)

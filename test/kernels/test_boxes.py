@@ -85,7 +85,7 @@ def test_rows_tell_which_points_are_inside(seed, n, growth):
     rng = np.random.default_rng(seed)
     scene = random_boxes(rng, n)
     T = pose_matrix(rng.normal(size=3), quaternion_xyzw(random_rotation(rng)))
-    rows = np.empty((15, n))
+    rows = np.empty((16, n))
     rows_of(scene.numbers, T, growth, rows)
     for k, box in enumerate(scene.boxes):
         # Points in the box's own axes, none of them within rounding of its faces.
@@ -94,4 +94,5 @@ def test_rows_tell_which_points_are_inside(seed, n, growth):
         points = (box.center + own @ box.rotation.T) @ T[:3, :3].T + T[:3, 3]
         seen = points @ rows[:9, k].reshape(3, 3).T + rows[9:12, k]
         assert np.allclose(seen, own, rtol=0.0, atol=1e-12)
-        assert np.array_equal(rows[12:, k], half)
+        assert np.array_equal(rows[12:15, k], half)
+        assert rows[15, k] == 0.0

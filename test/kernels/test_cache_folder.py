@@ -43,10 +43,12 @@ def note(self, signature, result):
     compiled.append(self._function.__name__)
     save(self, signature, result)
 KeptCode.save_overload = note
-rows = np.zeros((2, layout.REACH))
-rows[:, layout.COS_ALPHA] = 1.0
-rows[:, [layout.RADIUS_A, layout.RADIUS_D]] = layout.NO_BAR
+rows = np.zeros((4, layout.REACH + 2))
+rows[:2, layout.COS_ALPHA] = 1.0
+rows[:2, [layout.RADIUS_A, layout.RADIUS_D]] = layout.NO_BAR
 rows[1, [layout.A, layout.RADIUS_A]] = LENGTH, 0.0
+rows[2, [layout.N_BARS, layout.STRIDE, layout.FRAMES, layout.FIRST_PAIR]] = 1, 8, 8, 4
+rows[3, layout.LINK] = layout.NO_BAR
 points = np.zeros(12)
 chain_of(rows)(np.zeros(1), 0.0, points, 0)
 print(points[4], *compiled, file=sys.stderr)

@@ -17,7 +17,7 @@ from rrth_planner.kernels.collision.edge_contacts import (
     SHARE,
     SPACING,
 )
-from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.scene import Scene
 from worlds import (
     compiled_chain,
@@ -34,10 +34,10 @@ from worlds import (
 
 def kernel_gap(a, b, radius, center, rotation, half):
     """Return the gap between the bar a-b and a box."""
-    rows = np.empty((BOX_ROWS, 1))
+    rows = np.zeros((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = rotation.T.ravel()
     rows[BOX_OFFSET:BOX_HALF, 0] = -rotation.T @ center
-    rows[BOX_HALF:, 0] = half
+    rows[BOX_HALF:BOX_CLASS, 0] = half
     gaps = np.empty(LANES)
     bar_gaps(np.array([*a, 0.0, *b, radius]), 0, pack_boxes(rows)[0], 0, gaps)
     # Lanes that hold no box are never close.
@@ -135,10 +135,12 @@ def cases():
 
 def gaps_at(arm, scene, world, q):
     """Return the gaps of all bars and boxes by numpy, (n_bars, m)."""
-    points = np.empty(4 * (len(world.bar_names) + 1))
+    points = np.empty(world.stride)
     world.chain(q, RAY, points, 0)
     boxes = [(box.center, box.rotation, 0.5 * box.size + MARGIN) for box in scene.boxes]
-    return numpy_gaps(kernel_bars(arm, world, q, RAY), points[7::4], boxes)
+    return numpy_gaps(
+        kernel_bars(arm, world, q, RAY), points[7 : 8 * len(world.bar_names) : 8], boxes
+    )
 
 
 @pytest.mark.parametrize('case', range(8))

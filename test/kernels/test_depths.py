@@ -34,14 +34,15 @@ def test_the_kernel_is_plain_numpy(seed):
     axes = np.array([random_rotation(rng) if rng.uniform() < 0.7 else np.eye(3) for _ in range(m)])
     axes = axes.reshape(m, 3, 3)
     offsets, halves = rng.uniform(-0.5, 0.5, (m, 3)), rng.uniform(0.01, 0.4, (m, 3))
-    points = rng.uniform(-0.6, 0.6, (n, n_bars + 1, 4))
+    points = rng.uniform(-0.6, 0.6, (n, n_bars, 2, 4))
     if rng.uniform() < 0.3:
         # Along an axis, or of no length.
-        points[:, 1, :3] = points[:, 0, :3] + rng.choice([0.0, 0.3]) * np.eye(3)[rng.integers(3)]
-    points[..., 3] = rng.choice([0.0, 0.02], points.shape[:2])
+        along = rng.choice([0.0, 0.3]) * np.eye(3)[rng.integers(3)]
+        points[:, 0, 1, :3] = points[:, 0, 0, :3] + along
+    points[..., 3] = rng.choice([0.0, 0.02], points.shape[:3])
     boxes = np.concatenate([axes.reshape(m, 9).T, offsets.T, halves.T])
     found = np.empty((n, n_bars, m))
-    depths(np.ascontiguousarray(boxes), points, found)
-    ends = np.stack([points[:, :-1, :3], points[:, 1:, :3]], axis=2).reshape(-1, 2, 3)
-    expected = plain_depths(axes, offsets, halves, ends, points[:, 1:, 3].reshape(-1))
+    depths(np.ascontiguousarray(boxes), points.reshape(n, n_bars, 8), found)
+    ends, radii = points[..., :3].reshape(-1, 2, 3), points[:, :, 1, 3].reshape(-1)
+    expected = plain_depths(axes, offsets, halves, ends, radii)
     np.testing.assert_allclose(found.reshape(n * n_bars, m), expected, rtol=0, atol=1e-9)

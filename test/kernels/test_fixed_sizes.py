@@ -4,6 +4,7 @@
 
 import ast
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 import re
 
@@ -13,13 +14,13 @@ from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
-from rrth_planner.kernels.collision import arm_validity, bar_box, edge_contacts
+from rrth_planner.kernels.collision import arm_validity, edge_contacts
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.layout import BOX_ROWS, LANES
 from rrth_planner.kernels.search import elastic_band, tree
 from rrth_planner.kernels.trajectory import speed_profile
-from rrth_planner.model.arm import ArmModel, bar_ends, pointing_error, tool_pose
+from rrth_planner.model.arm import ArmModel, bar_ends, bar_names, pointing_error, tool_pose
 from rrth_planner.model.errors import ModelError, OptionsError, SceneError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
@@ -67,8 +68,10 @@ GROUPS = ('test_a_group_holds_as_many_boxes_as_it_has_lanes',)
 ROWS = ()
 NAMED = {
     'MAX_DOF': JOINTS,
-    'MAX_ENDS': JOINTS,
+    'BARS_ROOM': JOINTS,
     'ENDS_ROOM': JOINTS,
+    'BOWS_ROOM': ('test_sizes_that_follow_from_others_do',),
+    'SEEN_ROOM': ROWS,
     'MAX_GROUPS': BOXES,
     'MAX_NODES': PROOF,
     'POINTS_ROOM': PROOF,
@@ -95,6 +98,7 @@ NUMBERS = {
     'arm_validity': {'2': 'ends of an edge', '16': 'two bars of two points of four numbers'},
     'boxes': {'3': 'coordinates', '1': 'the part that is all boxes'},
     'clock': {'2': 'seconds and nanoseconds'},
+    'bar_bar': {'3': 'coordinates'},
     'bar_box': {'3': 'coordinates'},
     'trajectory_check': {'6': 'coefficients of a quintic'},
     'pan_tilt_ik': {'12': 'three axes and an origin', '3': 'coordinates'},
@@ -151,7 +155,9 @@ def test_every_listed_size_has_its_tests():
 
 
 def test_sizes_that_follow_from_others_do():
-    assert bar_box.MAX_ENDS == layout.MAX_BARS + 1
+    # Each bar with each other one, and no more frames than links.
+    assert layout.MAX_BARS * (layout.MAX_BARS - 1) // 2 <= layout.MAX_PAIRS
+    assert layout.MAX_DOF <= layout.MAX_FRAMES
     # A group is replaced by those below it, on each level but the last.
     n_waiting = 1 + (LANES - 1) * (tree_depth(layout.MAX_BOXES) - 1)
     assert n_waiting <= arm_validity.MAX_GROUPS
@@ -170,7 +176,7 @@ def long_arm(n_joints, n_bars):
     n_more = n_bars - (n_joints - 1) - 1
     dh[1 : 1 + max(0, n_more), 1] = 0.02
     dh[1 : 1 + max(0, -n_more), 3] = 0.0
-    return ArmModel(
+    arm = ArmModel(
         joint_names=tuple(f'j{i}' for i in range(n_joints)),
         is_prismatic=(False,) * n_joints,
         dh=dh,
@@ -178,6 +184,9 @@ def long_arm(n_joints, n_bars):
         radii=np.full(n_joints + 1, 0.01),
         T_base_mount=np.eye(4),
     )
+    # It coils up.
+    names = sorted(set(bar_names(arm)))
+    return replace(arm, allowed=tuple(combinations(names, 2)))
 
 
 def boxes_round(rng):
@@ -256,9 +265,9 @@ def test_the_kinematics_of_an_arm_make_room_for_all_of_its_joints(n_joints):
 def test_a_larger_arm_is_rejected():
     with pytest.raises(ModelError, match=r'joint_names: 65 joints, expected at most 64$'):
         long_arm(layout.MAX_DOF + 1, layout.MAX_BARS)
-    with pytest.raises(ModelError, match=r'dh: 64 bars, expected at most 63: '):
+    with pytest.raises(ModelError, match=r'dh: 64 bars and capsules, expected at most 63: '):
         long_arm(layout.MAX_DOF, layout.MAX_BARS + 1)
-    with pytest.raises(ModelError, match=r'dh: 64 bars, expected at most 63: '):
+    with pytest.raises(ModelError, match=r'dh: 64 bars and capsules, expected at most 63: '):
         long_arm(33, layout.MAX_BARS + 1)
 
 
@@ -309,10 +318,10 @@ def test_the_queue_and_the_points_of_a_proof_hold_all_of_its_nodes():
     # A row of the queue for each interval that was begun with, two for each node beyond.
     assert arm_validity.QUEUE_ROOM >= 4 * 2 * arm_validity.MAX_NODES
     # Of the longest arm, too, there is room for more nodes than one interval needs.
-    assert arm_validity.POINTS_ROOM // (4 * bar_box.MAX_ENDS) > 2
+    assert arm_validity.POINTS_ROOM // (8 * layout.MAX_BARS) > 2
     arm = long_arm(layout.MAX_DOF, layout.MAX_BARS)
     world = arm_world(arm, Scene(()), 0.0, 0.5)
-    q, n_nodes = np.zeros(layout.MAX_DOF), arm_validity.POINTS_ROOM // (4 * bar_box.MAX_ENDS)
+    q, n_nodes = np.zeros(layout.MAX_DOF), arm_validity.POINTS_ROOM // (8 * layout.MAX_BARS)
     for length, is_proven in ((n_nodes - 1.5, True), (n_nodes - 0.5, False), (n_nodes, False)):
         q_to = np.eye(layout.MAX_DOF)[3] * length
         rest = (world.resolution, world.chain, world.robot, world.obstacles)

@@ -5,13 +5,22 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.collision.reference_checker import frames
+from rrth_planner.collision.bar_pairs import pairs_of
+from rrth_planner.collision.reference_checker import bar_ends_at, frames
 from rrth_planner.collision.world import arm_world, robot_rows
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.kinematics.trigonometry import sine_cosine
-from rrth_planner.model.arm import bar_ends, forward_kinematics, pointing_error, tool_pose
+from rrth_planner.kernels.layout import STRIDE
+from rrth_planner.model.arm import (
+    bars_of,
+    forward_kinematics,
+    mount_bars,
+    pointing_error,
+    tool_pose,
+)
 from rrth_planner.model.scene import Scene
 from worlds import (
+    capsule_arm,
     compiled_chain,
     examples,
     kernel_bars,
@@ -52,23 +61,32 @@ def test_bars_of_the_paper_arm_are_those_of_the_reference_checker():
 @given(seed=SEEDS, has_tail=st.booleans())
 def test_the_chain_written_for_any_arm_is_the_reference_checkers(seed, has_tail):
     rng = np.random.default_rng(seed)
-    arm = random_chain(rng, has_tail)
+    arm = random_chain(rng, has_tail) if seed % 3 else capsule_arm(rng, 3 + seed % 5)
     rows = robot_rows(arm, 0.8)
     # The same lines, interpreted: to compile them for each arm would take minutes.
     text = chain_source(rows).replace('scratch.floats', 'np.empty')
     lines = [line for line in text.splitlines() if not line.startswith(('@', 'from'))]
     space = {'np': np, 'sine_cosine': sine_cosine}
     exec('\n'.join(lines), space)
-    n = len(bar_ends(arm))
-    points = np.full(4 * n + 8, np.nan)
+    n, n_parts = len(bars_of(arm)), len(bars_of(arm)) + len(mount_bars(arm))
+    stride = int(rows[arm.dof + 1, STRIDE])
+    points = np.full(stride + 4, np.nan)
     for q in rng.uniform(*arm.bounds, (5, arm.dof)):
         assert space['chain'](q, 0.8, points, 2) == n
-        got = points[2:-2].reshape(n + 1, 4)
-        ends = got[:, :3] @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
-        expected = oracle_bars(arm, q, 0.8)[0]
-        assert np.abs(ends[:-1] - expected[:, 0]).max() < 1e-12
-        assert np.abs(ends[1:] - expected[:, 1]).max() < 1e-12
-        assert np.array_equal(got[1:, 3], [arm.radii[row] for row, _ in bar_ends(arm)])
+        got = points[2 : 2 + 8 * n_parts].reshape(n_parts, 2, 4)
+        ends = got[:, :, :3] @ arm.T_base_mount[:3, :3].T + arm.T_base_mount[:3, 3]
+        assert np.abs(ends - bar_ends_at(arm, q[None], 0.8)[0]).max() < 1e-12
+        radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
+        assert np.array_equal(got[:, 1, 3], radii)
+        # The frames of the links that pairs are seen from, one after the other.
+        placed = points[2 + 8 * n_parts : -2].reshape(-1, 4, 3)
+        bodies = sorted({pair.body for pair in pairs_of(arm) if pair.body > 0})
+        assert len(placed) == len(bodies)
+        inverse = np.linalg.inv(arm.T_base_mount)
+        for frame, body in zip(placed, bodies, strict=True):
+            T = inverse @ frames(arm, q[None])[0, body - 1]
+            assert np.abs(frame[0] - T[:3, 3]).max() < 1e-12
+            assert np.abs(frame[1:].T - T[:3, :3]).max() < 1e-12
         assert np.isnan(points[:2]).all()
         assert np.isnan(points[-2:]).all()
 

@@ -11,7 +11,7 @@ from rrth_planner.kernels.collision.arm_validity import (
     is_edge_free,
 )
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, VEC
-from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, D, LANES
+from rrth_planner.kernels.layout import BAR_SIZE, BOX_HALF, BOX_OFFSET, D, LANES
 from rrth_planner.kernels.vectors import between, distance
 
 # Check points of the paper: 10 on the first metre of the ray (section 6.2); as many on each bar.
@@ -33,10 +33,10 @@ def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, boxes):
         return True
     n = int64(distance(q_from, q_to) / resolution) + 1
     q = np.empty(q_from.shape[0])
-    ray_length = robot[robot.shape[0] - 1, D]
+    ray_length = robot[q.shape[0], D]
     for i in range(n, 0, -1):
         between(q_from, q_to, i / n, q)
-        if not is_configuration_free(q, ray_length, chain, boxes):
+        if not is_configuration_free(q, ray_length, chain, robot, boxes):
             return False
     return True
 
@@ -50,7 +50,7 @@ def is_configuration_free_at_points(q, chain, robot, boxes):
     literally, the sum over the faces would ask every free point to be outside all six at once.
     """
     points = scratch.floats(ENDS_ROOM)
-    n_bars = chain(q, robot[robot.shape[0] - 1, D], points, 0)
+    n_bars = chain(q, robot[q.shape[0], D], points, 0)
     first = (boxes.shape[0] - 1) // LANES
     for bar in range(n_bars):
         for i in range(1, POINTS_PER_BAR + 1):
@@ -62,7 +62,7 @@ def is_configuration_free_at_points(q, chain, robot, boxes):
                         value = boxes[g, LANES * (BOX_OFFSET + r) + j]
                         half = boxes[g, LANES * (BOX_HALF + r) + j]
                         for c in range(3):
-                            start, end = points[4 * bar + c], points[4 * bar + 4 + c]
+                            start, end = points[BAR_SIZE * bar + c], points[BAR_SIZE * bar + 4 + c]
                             cosine = boxes[g, LANES * (3 * r + c) + j]
                             value += cosine * (start + share * (end - start))
                         n_inner += int64(value < half) + int64(-value < half)

@@ -7,14 +7,38 @@ import math
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.bar_box import contact_lanes, MAX_ENDS, open_lanes
+from rrth_planner.kernels.collision.bar_bar import (
+    BOW_SIZE,
+    BOWS_ROOM,
+    colliding_pair,
+    curvature_bound,
+    is_pair_open,
+    pair_bounds,
+)
+from rrth_planner.kernels.collision.bar_box import contact_lanes, open_lanes
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_POOL, OUT_VEC, VEC
-from rrth_planner.kernels.layout import D, KIND, LANES, MAX_DOF, NO_BAR, PRISMATIC, RADIUS_A, REACH
+from rrth_planner.kernels.layout import (
+    ALLOWED,
+    BAR_SIZE,
+    BOX_CLASS,
+    D,
+    FIRST_PAIR,
+    FRAME_SIZE,
+    LANES,
+    MAX_BARS,
+    MAX_DOF,
+    MAX_FRAMES,
+    STRIDE,
+)
 
-ENDS_ROOM = 4 * MAX_ENDS
+# Room for the numbers that `chain` writes of a configuration.
+ENDS_ROOM = BAR_SIZE * MAX_BARS + FRAME_SIZE * MAX_FRAMES
+# Bounds of both ends of each bar.
+BARS_ROOM = 2 * MAX_BARS
 # Most configurations of a continuous check, and room for the numbers of their points.
-MAX_NODES, POINTS_ROOM = 512, 8192
-# Most open entries (pairs of a bar and a group of boxes) of a continuous check.
+MAX_NODES, POINTS_ROOM = 512, 65536
+# Most open entries of a continuous check: a bar, a group of boxes and which of them are open to
+# one of so many equal parts of the bar; or, below 0, a pair of bars.
 MAX_OPEN, ENTRY = 2048, 5
 QUEUE_ROOM, POOL_ROOM = 8 * MAX_NODES, ENTRY * MAX_OPEN
 # Groups of boxes waiting to be checked: LANES per level of their tree.
@@ -28,12 +52,24 @@ SPLIT, MAX_PARTS = 0.05, 64
 FIRST_INTERVAL = 1.0
 
 
-@kernel(boolean(OUT_VEC, int64, int64, MAT))
-def is_in_contact(points, at, n_bars, boxes):
+@kernel(int64(MAT, int64, MAT, int64, int64))
+def checked_lanes(robot, row, boxes, g, lanes):
+    """Return those of some boxes of a group that a bar, row in `robot`, must keep clear of."""
+    classes = int64(robot[row, ALLOWED])
+    if classes != 0:
+        for j in range(LANES):
+            if (classes >> int64(boxes[g, LANES * BOX_CLASS + j])) & 1:
+                lanes &= ~(1 << j)
+    return lanes
+
+
+@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT))
+def is_in_contact(points, at, n_bars, dof, robot, boxes):
     """Return whether any bar of the arm at points[at] is in contact with a box: exact."""
     if boxes.shape[0] == 1:
         for k in range(n_bars - 1, -1, -1):
-            if contact_lanes(points, at + 4 * k, boxes, 0) != 0:
+            hit = contact_lanes(points, at + BAR_SIZE * k, boxes, 0)
+            if hit != 0 and checked_lanes(robot, dof + 2 + k, boxes, 0, hit) != 0:
                 return True
         return False
     waiting = scratch.ints(MAX_GROUPS)
@@ -44,9 +80,11 @@ def is_in_contact(points, at, n_bars, boxes):
         hit = 0
         is_leaf = LANES * g + 1 >= boxes.shape[0]
         for k in range(n_bars - 1, -1, -1):
-            hit |= contact_lanes(points, at + 4 * k, boxes, g)
+            hit |= contact_lanes(points, at + BAR_SIZE * k, boxes, g)
             if is_leaf and hit != 0:
-                return True
+                if checked_lanes(robot, dof + 2 + k, boxes, g, hit) != 0:
+                    return True
+                hit = 0
         for j in range(LANES):
             if (hit >> j) & 1:
                 waiting[n_waiting] = LANES * g + j + 1
@@ -54,38 +92,30 @@ def is_in_contact(points, at, n_bars, boxes):
     return False
 
 
-@kernel(boolean(VEC, float64, CHAIN, MAT))
-def is_configuration_free(q, ray_length, chain, boxes):
-    """Return whether the arm at q, with a ray of the given length [m], is clear of all boxes."""
+@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT))
+def collides(points, at, n_bars, dof, robot, boxes):
+    """Return whether the arm at points[at] is in contact with a box, or with itself: exact."""
+    return (
+        is_in_contact(points, at, n_bars, dof, robot, boxes)
+        or colliding_pair(points, at, dof, robot) >= 0
+    )
+
+
+@kernel(boolean(VEC, float64, CHAIN, MAT, MAT))
+def is_configuration_free(q, ray_length, chain, robot, boxes):
+    """Return whether the arm at q, with a ray that long [m], is clear of all boxes and itself."""
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
-    return not is_in_contact(points, 0, n_bars, boxes)
+    return not collides(points, 0, n_bars, q.shape[0], robot, boxes)
 
 
-@kernel(void(MAT, VEC, VEC, OUT_VEC))
-def curvature_bounds(robot, speed, curvature, bows):
-    """
-    Write a bound of the second derivative of each end of a bar along a motion.
-
-    speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint along the motion. With R_j the
-    reach of a point round joint j: sum over i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus
-    sum of |q_j''| R_j; an inner prismatic joint adds nothing (`docs/algorithms.md`, section 2).
-    """
-    dof = speed.shape[0]
-    bows[0] = 0.0
-    n = 1
-    for i in range(robot.shape[0]):
+@kernel(void(MAT, int64, VEC, VEC, OUT_VEC))
+def curvature_bounds(robot, n_bars, speed, curvature, bows):
+    """Write `curvature_bound` for both ends of each bar, seen from the base."""
+    first = speed.shape[0] + 2
+    for k in range(n_bars):
         for end in range(2):
-            if robot[i, RADIUS_A + end] == NO_BAR:
-                continue
-            total, inner = 0.0, 0.0
-            for j in range(dof):
-                reach = robot[i, REACH + end * dof + j]
-                turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
-                total += reach * (speed[j] * (turns + 2.0 * inner) + curvature[j])
-                inner += turns
-            bows[n] = total
-            n += 1
+            bows[2 * k + end] = curvature_bound(robot, first + k, end, 0, speed, curvature)
 
 
 @kernel(void(MAT, float64, OUT_VEC))
@@ -110,20 +140,20 @@ def cut_bar(points, a, b, n_parts, part, piece):
     piece[7] = piece[15] = points[a + 7]
 
 
-@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64))
-def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
+@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, int64, MAT, MAT, OUT_POOL, int64))
+def open_bar(points, a, b, bow, bows, k, dof, robot, boxes, pool, n_open):
     """
     Append to the pool the groups of boxes that are open to bar k; return its new length.
 
     points[a], points[b]: the arm at two instants; bow: width^2 / 8. -1: the pool has no room.
     """
-    first, last = bow * bows[k], bow * bows[k + 1]
+    first, last = bow * bows[2 * k], bow * bows[2 * k + 1]
     waiting = scratch.ints(MAX_GROUPS)
     n_waiting, waiting[0] = 1, 0
     while n_waiting > 0:
         n_waiting -= 1
         g = int64(waiting[n_waiting])
-        lanes = open_lanes(points, a + 4 * k, b + 4 * k, first, last, boxes, g)
+        lanes = open_lanes(points, a + BAR_SIZE * k, b + BAR_SIZE * k, first, last, boxes, g)
         if lanes == 0:
             continue
         if LANES * g + 1 < boxes.shape[0]:
@@ -131,6 +161,9 @@ def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
                 if (lanes >> j) & 1:
                     waiting[n_waiting] = LANES * g + j + 1
                     n_waiting += 1
+            continue
+        lanes = checked_lanes(robot, dof + 2 + k, boxes, g, lanes)
+        if lanes == 0:
             continue
         if n_open >= MAX_OPEN:
             return -1
@@ -156,10 +189,10 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     splits = 2 if is_split else 1
     n_parts *= splits
     for i in range(splits * part, splits * (part + 1)):
-        cut_bar(points, a + 4 * k, b + 4 * k, n_parts, i, piece)
-        rise = bows[k + 1] - bows[k]
-        first = bow * (bows[k] + i / n_parts * rise)
-        last = bow * (bows[k] + (i + 1) / n_parts * rise)
+        cut_bar(points, a + BAR_SIZE * k, b + BAR_SIZE * k, n_parts, i, piece)
+        rise = bows[2 * k + 1] - bows[2 * k]
+        first = bow * (bows[2 * k] + i / n_parts * rise)
+        last = bow * (bows[2 * k] + (i + 1) / n_parts * rise)
         left = lanes & open_lanes(piece, 0, 8, first, last, boxes, g)
         if left == 0:
             continue
@@ -171,6 +204,18 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     return n_open
 
 
+@kernel(int64(OUT_VEC, int64, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64))
+def open_pair(points, a, b, p, width, bows, dof, robot, pool, n_open):
+    """Append pair p to the pool if it is open; return the new length; -1: there is no room."""
+    row = int64(robot[dof + 1, FIRST_PAIR]) + p
+    if not is_pair_open(points, a, b, row, width, bows, BOW_SIZE * p, dof, robot):
+        return n_open
+    if n_open >= MAX_OPEN:
+        return -1
+    pool[ENTRY * n_open] = -1 - p
+    return n_open + 1
+
+
 @kernel(int64(MAT, VEC, VEC, float64, CHAIN, MAT, MAT))
 def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     """
@@ -178,10 +223,10 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
 
     curve (degree + 1, dof): q(u) for u in [0, 1]; speed, curvature (dof,): derivative bounds.
     An interval of u is free when the hull of each bar at its two ends, thickened by
-    width^2 / 8 times the bound of the second derivative, is apart from each box. Otherwise
-    it is bisected, breadth first, and the halves test only the pairs of bar and box that are still
-    open, on short intervals part by part, until an interval is shorter than `resolution` [rad]
-    (`docs/algorithms.md`, section 3).
+    width^2 / 8 times the bound of the second derivative, is apart from each box, and the hulls of
+    two bars that must not collide are apart. Otherwise it is bisected, breadth first, and the
+    halves test only what is still open, bars on short intervals part by part, until an interval is
+    shorter than `resolution` [rad] (`docs/algorithms.md`, section 3).
     """
     length = extent = 0.0
     for k in range(curve.shape[1]):
@@ -194,17 +239,22 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     if not (length < 0.5 * FIRST_INTERVAL * MAX_NODES and extent < LARGEST):
         return -1
     points, u = scratch.floats(POINTS_ROOM), scratch.floats(MAX_NODES)
-    q, bows = scratch.floats(MAX_DOF), scratch.floats(MAX_ENDS)
+    q, bows, pair_bows = (
+        scratch.floats(MAX_DOF),
+        scratch.floats(BARS_ROOM),
+        scratch.floats(BOWS_ROOM),
+    )
+    dof = curve.shape[1]
     # Queue of intervals: nodes at both ends, then the range of `pool` with the open entries.
     queue, pool = scratch.ints(QUEUE_ROOM), scratch.ints(POOL_ROOM)
-    ray_length = robot[robot.shape[0] - 1, D]
+    ray_length, stride = robot[dof, D], int64(robot[dof + 1, STRIDE])
+    n_pairs = robot.shape[0] - int64(robot[dof + 1, FIRST_PAIR])
     # The far end first: earlier edges have mostly proven the start.
     u[0] = 1.0
     curve_point(curve, 1.0, q)
     n_bars = chain(q, ray_length, points, 0)
-    if is_in_contact(points, 0, n_bars, boxes):
+    if collides(points, 0, n_bars, dof, robot, boxes):
         return 0
-    stride = 4 * (n_bars + 1)
     max_nodes = min(MAX_NODES, POINTS_ROOM // stride)
     n_pieces = int64(length / FIRST_INTERVAL) + 1
     if n_pieces >= max_nodes:
@@ -215,12 +265,14 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         curve_point(curve, u[i], q)
         chain(q, ray_length, points, i * stride)
         # The start is checked below: mostly it is known to be free.
-        if i > 1 and is_in_contact(points, i * stride, n_bars, boxes):
+        if i > 1 and collides(points, i * stride, n_bars, dof, robot, boxes):
             return 0
         queue[tail], queue[tail + 1] = i, i + 1 if i < n_pieces else 0
         queue[tail + 2], queue[tail + 3] = 0, -1
         tail += 4
-    curvature_bounds(robot, speed, curvature, bows)
+    curvature_bounds(robot, n_bars, speed, curvature, bows)
+    if n_pairs > 0:
+        pair_bounds(robot, speed, curvature, pair_bows)
     while head < tail:
         a, b = int64(queue[head]), int64(queue[head + 1])
         first, last = int64(queue[head + 2]), int64(queue[head + 3])
@@ -231,27 +283,39 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         if last < 0:
             for k in range(n_bars):
                 n_open = open_bar(
-                    points, a * stride, b * stride, bow, bows, k, boxes, pool, n_open
+                    points, a * stride, b * stride, bow, bows, k, dof, robot, boxes, pool, n_open
+                )
+                if n_open < 0:
+                    return -1
+            for p in range(n_pairs):
+                n_open = open_pair(
+                    points, a * stride, b * stride, p, width, pair_bows, dof, robot, pool, n_open
                 )
                 if n_open < 0:
                     return -1
         is_split = width * length < SPLIT and last - first < MAX_PARTS
         for row in range(first, last):
-            n_open = open_again(
-                points, a * stride, b * stride, bow, bows, row, is_split, boxes, pool, n_open
-            )
+            if pool[ENTRY * row] < 0:
+                p = -1 - int64(pool[ENTRY * row])
+                n_open = open_pair(
+                    points, a * stride, b * stride, p, width, pair_bows, dof, robot, pool, n_open
+                )
+            else:
+                n_open = open_again(
+                    points, a * stride, b * stride, bow, bows, row, is_split, boxes, pool, n_open
+                )
             if n_open < 0:
                 return -1
         if n_open == start:
             continue
-        if a == 1 and last < 0 and is_in_contact(points, stride, n_bars, boxes):
+        if a == 1 and last < 0 and collides(points, stride, n_bars, dof, robot, boxes):
             return 0
         if width * length < resolution or n_nodes >= max_nodes or tail > QUEUE_ROOM - 8:
             return -1
         u[n_nodes] = 0.5 * (u[a] + u[b])
         curve_point(curve, u[n_nodes], q)
         chain(q, ray_length, points, n_nodes * stride)
-        if is_in_contact(points, n_nodes * stride, n_bars, boxes):
+        if collides(points, n_nodes * stride, n_bars, dof, robot, boxes):
             return 0
         queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = a, n_nodes, start, n_open
         tail += 4

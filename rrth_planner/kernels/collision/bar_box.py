@@ -8,7 +8,7 @@ from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC
-from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, LANES, MAX_BARS
+from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, LANES
 
 # Bars nearer than this are in contact [m].
 CONTACT = 1e-12
@@ -16,8 +16,6 @@ CONTACT = 1e-12
 PARALLEL = 1e-12
 # Up to four points in the axes of LANES boxes.
 LOCAL_ROOM = 12 * LANES
-# Ends of all bars of an arm, and the start of the first one.
-MAX_ENDS = MAX_BARS + 1
 
 
 @kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')
@@ -219,13 +217,13 @@ def depths(boxes, points, found):
     Write by how much each box would have to shrink on every side for each bar to be clear.
 
     boxes (15, m): a column for each box, its axes, offset and half sizes as from `boxes.rows_of`;
-    points (n, n_bars + 1, 4): the corners of the arm in n configurations, each with the radius of
-    the bar that ends there [m]; found (n, n_bars, m) [m], < 0: apart.
+    points (n, n_bars, 8): the bars of the arm in n configurations, each its start, 0, its end and
+    its radius [m]; found (n, n_bars, m) [m], < 0: apart.
     """
     middle, along, half = np.empty(3), np.empty(3), np.empty(3)
     for k in range(points.shape[0]):
-        for bar in range(points.shape[1] - 1):
-            p, q = points[k, bar], points[k, bar + 1]
+        for bar in range(points.shape[1]):
+            p, q = points[k, bar, :4], points[k, bar, 4:]
             for j in range(boxes.shape[1]):
                 depth = math.inf
                 for i in range(3):

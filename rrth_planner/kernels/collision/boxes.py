@@ -8,6 +8,7 @@ from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_INTS, OUT_MAT, OUT_VEC, READ_INTS
 from rrth_planner.kernels.layout import (
+    BOX_CLASS,
     BOX_HALF,
     BOX_OFFSET,
     BOX_ROWS,
@@ -82,10 +83,10 @@ def first_bad(boxes, farthest):
 @kernel(void(MAT, MAT, float64, OUT_MAT), is_short=True)
 def rows_of(boxes, T_arm_base, growth, rows):
     """
-    Write the rows of boxes, (15, n), each grown by that much on every side [m].
+    Write the rows of boxes, (16, n), each grown by that much on every side [m].
 
     boxes (n, 15) in the base frame. A box's column: its axes in the arm's frame row by row, the
-    position of that frame in them, its half extents.
+    position of that frame in them, its half extents, and 0: it is of no class.
     """
     for i in range(boxes.shape[0]):
         for k in range(3):
@@ -100,6 +101,7 @@ def rows_of(boxes, T_arm_base, growth, rows):
                 offset -= along * center
             rows[BOX_OFFSET + k, i] = offset
             rows[BOX_HALF + k, i] = 0.5 * boxes[i, SIZE + k] + growth
+        rows[BOX_CLASS, i] = 0.0
 
 
 @kernel(void(MAT, READ_INTS, int64, int64, OUT_MAT, int64, int64))
@@ -179,13 +181,13 @@ def pack(rows, depth, groups, lanes):
     """
     Write the tree of groups of boxes, and which lane of its last level holds box i.
 
-    rows (15, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 15) as in
+    rows (16, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 16) as in
     `kernels.layout`; lanes (n,). On every level the boxes are halved three times, each time along
     the axis that their centres spread most along.
     """
     n = rows.shape[1]
     groups[:] = 0.0
-    groups[:, LANES * BOX_HALF :] = -math.inf
+    groups[:, LANES * BOX_HALF : LANES * BOX_CLASS] = -math.inf
     order, keys = np.arange(n), np.empty(n)
     # Ends of the parts of the present level, each a group of it.
     ends = np.full(1, n)

@@ -6,9 +6,9 @@ import math
 
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM, MAX_GROUPS
+from rrth_planner.kernels.collision.arm_validity import checked_lanes, ENDS_ROOM, MAX_GROUPS
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
-from rrth_planner.kernels.layout import D, LANES, MAX_DOF
+from rrth_planner.kernels.layout import BAR_SIZE, D, LANES, MAX_DOF
 from rrth_planner.kernels.vectors import distance
 
 # A gap smaller than this counts as contact [m].
@@ -69,7 +69,7 @@ def gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points):
         q[k] = q_from[k] + share * (q_to[k] - q_from[k])
     chain(q, ray_length, points, 0)
     gaps = scratch.floats(LANES)
-    bar_gaps(points, 4 * bar, boxes, g, gaps)
+    bar_gaps(points, BAR_SIZE * bar, boxes, g, gaps)
     return gaps[j]
 
 
@@ -105,11 +105,11 @@ def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, co
         here = q[i]
         q[i] = here + STEP
         chain(q, ray_length, points, 0)
-        bar_gaps(points, 4 * bar, boxes, g, gaps)
+        bar_gaps(points, BAR_SIZE * bar, boxes, g, gaps)
         ahead = gaps[j]
         q[i] = here - STEP
         chain(q, ray_length, points, 0)
-        bar_gaps(points, 4 * bar, boxes, g, gaps)
+        bar_gaps(points, BAR_SIZE * bar, boxes, g, gaps)
         q[i] = here
         contacts[n, GRADIENT + i] = (ahead - gaps[j]) / (2.0 * STEP)
     return n + 1
@@ -129,7 +129,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
     pairs, gaps = scratch.ints(PAIRS_ROOM), scratch.floats(MAX_PAIRS)
     now = scratch.floats(LANES)
     falling, waiting = scratch.ints(MAX_PAIRS), scratch.ints(MAX_GROUPS)
-    ray_length = robot[robot.shape[0] - 1, D]
+    ray_length = robot[dof, D]
     n_samples = int64(distance(q_from, q_to) / SPACING) + 2
     spacing = 1.0 / (n_samples - 1)
     for sample in range(n_samples):
@@ -141,7 +141,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
             while n_waiting > 0:
                 n_waiting -= 1
                 g = int64(waiting[n_waiting])
-                bar_gaps(points, 4 * bar, boxes, g, now)
+                bar_gaps(points, BAR_SIZE * bar, boxes, g, now)
                 for j in range(LANES):
                     gap = now[j]
                     # Also for NaN: a lane without a box.
@@ -150,6 +150,8 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                     if LANES * g + 1 < boxes.shape[0]:
                         waiting[n_waiting] = LANES * g + j + 1
                         n_waiting += 1
+                        continue
+                    if checked_lanes(robot, dof + 2 + bar, boxes, g, 1 << j) == 0:
                         continue
                     row = 0
                     while row < n_pairs and not (

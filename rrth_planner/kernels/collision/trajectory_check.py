@@ -7,12 +7,12 @@ import numpy as np
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.boxes import pack, rows_of
 from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, VEC
-from rrth_planner.kernels.layout import BOX_ROWS, D, LANES
+from rrth_planner.kernels.layout import BOX_CLASS, BOX_ROWS, D, LANES
 from rrth_planner.kernels.trajectory.quintics import bound, fit
 
-# Newly received boxes: boxes, T_arm_base, growth, depth. Points of a motion: times, positions,
-# velocities, accelerations.
-NEW, POINTS = (MAT, MAT, float64, int64), (VEC, MAT, MAT, MAT)
+# Newly received boxes: boxes, their classes, T_arm_base, growth, depth. Points of a motion: times,
+# positions, velocities, accelerations.
+NEW, POINTS = (MAT, VEC, MAT, float64, int64), (VEC, MAT, MAT, MAT)
 
 
 @kernel(void(MAT, float64, OUT_MAT))
@@ -56,20 +56,23 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
 
 
 @kernel(OUT_MAT(*NEW))
-def packed(boxes, T_arm_base, growth, depth):
+def packed(boxes, classes, T_arm_base, growth, depth):
     """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
     rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
     rows_of(boxes, T_arm_base, growth, rows)
+    for i in range(n):
+        rows[BOX_CLASS, i] = classes[i]
     pack(rows, depth, groups, lanes)
     return groups
 
 
-@kernel(boolean(VEC, float64, CHAIN, *NEW), is_short=True)
-def is_place_free(q, ray_length, chain, boxes, T_arm_base, growth, depth):
-    """Return whether the arm at q (dof,) is free of newly received boxes, as below."""
-    return is_configuration_free(q, ray_length, chain, packed(boxes, T_arm_base, growth, depth))
+@kernel(boolean(VEC, float64, CHAIN, MAT, *NEW), is_short=True)
+def is_place_free(q, ray_length, chain, robot, boxes, classes, T_arm_base, growth, depth):
+    """Return whether the arm at q (dof,) is free of newly received boxes and itself, as below."""
+    groups = packed(boxes, classes, T_arm_base, growth, depth)
+    return is_configuration_free(q, ray_length, chain, robot, groups)
 
 
 @kernel(boolean(*POINTS, float64, float64, float64, CHAIN, MAT, *NEW, MAT, MAT), is_short=True)
@@ -84,6 +87,7 @@ def is_remaining_motion_free(
     chain,
     robot,
     boxes,
+    classes,
     T_arm_base,
     growth,
     depth,
@@ -95,21 +99,20 @@ def is_remaining_motion_free(
 
     In one call, since it decides about a stop. At the end a ray of length `reach` has to be free
     too [m]. times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of
-    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15), T_arm_base
-    (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`; quartic and cubic as for
-    `quintics.bound`.
+    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15), classes (m,) as
+    in `layout`, T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`;
+    quartic and cubic as for `quintics.bound`.
     """
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
-    groups = packed(boxes, T_arm_base, growth, depth)
+    groups = packed(boxes, classes, T_arm_base, growth, depth)
     q_end = np.empty(dof)
     for k in range(dof):
         q_end[k] = 0.0
         for power in range(6):
             q_end[k] += curves[n_pieces - 1, power, k]
-    ray = robot[robot.shape[0] - 1, D]
-    if not is_configuration_free(q_end, max(ray, reach), chain, groups):
+    if not is_configuration_free(q_end, max(robot[dof, D], reach), chain, robot, groups):
         return False
     if begin >= times[n_pieces]:
         return True

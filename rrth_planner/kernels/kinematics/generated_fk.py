@@ -12,14 +12,25 @@ from numba.core.types import float64, int64
 from rrth_planner.kernels.jit import first_class, kernel, OUT_VEC, VEC
 from rrth_planner.kernels.layout import (
     A,
+    BAR_SIZE,
+    BODY,
     COS_ALPHA,
     D,
+    ENDS,
+    FIRST_PAIR,
+    FRAME,
+    FRAME_SIZE,
+    FRAMES,
     KIND,
+    LINK,
+    N_BARS,
     NO_BAR,
     OFFSET,
     PRISMATIC,
+    RADIUS,
     RADIUS_A,
     RADIUS_D,
+    REACH,
     REVOLUTE,
     SIN_ALPHA,
 )
@@ -113,33 +124,60 @@ def chain_source(rows: Any) -> str:
     """
     Return the text of the module whose kernel `chain` writes the bars of an arm.
 
-    rows (dof + 1, >= 8): DH rows, columns as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta)
-    Tz(d) each.
-    The kernel `chain(q, ray_length, points, at)` writes four numbers a point from points[at] on:
-    x, y, z in the arm's base frame [m], and the radius of the bar that ends there [m]; first the
-    start of the first bar. It returns the number of bars.
+    rows: `robot` as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta) Tz(d) each.
+    The kernel `chain(q, ray_length, points, at)` writes BAR_SIZE numbers a bar from points[at] on,
+    in the order of their rows: its start in the arm's base frame, 0, its end [m], and its radius
+    [m]; then FRAME_SIZE numbers for each link whose frame a pair of bars needs: its origin [m] and
+    its axes. It returns the number of bars that are checked against boxes.
     """
     source = _Source()
+    dof = (rows.shape[1] - REACH) // 2
+    dh, sizes = rows[: dof + 1], rows[dof + 1]
+    first_pair = int(sizes[FIRST_PAIR])
+    bars, pairs = rows[dof + 2 : first_pair], rows[first_pair:]
+    # The bars that are offsets, in the order of the rows.
+    offsets = [k for k, bar in enumerate(bars) if bar[LINK] == NO_BAR]
+    slots = {int(pair[BODY]): int(pair[FRAME]) for pair in pairs if pair[FRAME] >= 0.0}
     p: list[Term] = [0.0, 0.0, 0.0]
     x: list[Term] = [1.0, 0.0, 0.0]
     y: list[Term] = [0.0, 1.0, 0.0]
     z: list[Term] = [0.0, 0.0, 1.0]
     angles: list[str] = []
-    written = 0
 
-    def write(radius: float) -> None:
-        nonlocal written
-        for k, value in enumerate((*p, radius)):
-            source.lines.append(f'    points[at + {4 * written + k}] = {value}')
-        written += 1
+    def write(at: int, *values: Term) -> None:
+        for k, value in enumerate(values):
+            source.lines.append(f'    points[at + {at + k}] = {value}')
 
-    for i, row in enumerate(rows):
-        is_last = i == len(rows) - 1
-        if written == 0 and row[RADIUS_A] != NO_BAR:
-            write(0.0)
+    def write_offset(start: list[Term], radius: float) -> None:
+        write(BAR_SIZE * offsets.pop(0), *start, 0.0, *p, radius)
+
+    def write_link(link: int) -> None:
+        """Write the capsules of a link, and its frame where it is needed."""
+        for n, bar in enumerate(bars):
+            if int(bar[LINK]) == link:
+                ends = [
+                    [
+                        source.total(
+                            (1.0, p[k]),
+                            (float(c[0]), x[k]),
+                            (float(c[1]), y[k]),
+                            (float(c[2]), z[k]),
+                        )
+                        for k in range(3)
+                    ]
+                    for c in (bar[ENDS : ENDS + 3], bar[ENDS + 3 : ENDS + 6])
+                ]
+                write(BAR_SIZE * n, *ends[0], 0.0, *ends[1], float(bar[RADIUS]))
+        if link in slots:
+            write(int(sizes[FRAMES]) + FRAME_SIZE * slots[link], *p, *x, *y, *z)
+
+    write_link(0)
+    for i, row in enumerate(dh):
+        is_last = i == len(dh) - 1
+        start = p
         p = [source.total((1.0, p[k]), (float(row[A]), x[k])) for k in range(3)]
         if row[RADIUS_A] != NO_BAR:
-            write(float(row[RADIUS_A]))
+            write_offset(start, float(row[RADIUS_A]))
         ca, sa = _snapped(float(row[COS_ALPHA])), _snapped(float(row[SIN_ALPHA]))
         m = [source.total((ca, y[k]), (sa, z[k])) for k in range(3)]
         z = [source.total((ca, z[k]), (-sa, y[k])) for k in range(3)]
@@ -164,14 +202,16 @@ def chain_source(rows: Any) -> str:
         )
         d: Term = float(row[D])
         if is_last:
+            write_link(i + 1)
             d = 'ray_length'
         elif row[KIND] == PRISMATIC:
             d = source.let(f'q[{i}] + {d!r}')
-        if written == 0 and row[RADIUS_D] != NO_BAR:
-            write(0.0)
+        start = p
         p = [source.total((1.0, p[k]), (d, z[k])) for k in range(3)]
         if row[RADIUS_D] != NO_BAR:
-            write(float(row[RADIUS_D]))
+            write_offset(start, float(row[RADIUS_D]))
+        if not is_last:
+            write_link(i + 1)
     # Whole vectors of the machine, the rest of the last one filled with zeros.
     room = -(-max(1, len(angles)) // 4) * 4
     angles += ['0.0'] * (room - len(angles))
@@ -180,7 +220,7 @@ def chain_source(rows: Any) -> str:
         HEADER.format(room=room)
         + given
         + ALL_ANGLES.format(room=room)
-        + '\n'.join([*source.lines, f'    return {written - 1}', ''])
+        + '\n'.join([*source.lines, f'    return {int(sizes[N_BARS])}', ''])
     )
 
 

@@ -153,8 +153,8 @@ def goal_candidates(
 @kernel(boolean(CHAIN, MAT, MAT, VEC, float64))
 def is_goal_free(chain, robot, obstacles, q, reach):
     """Return whether q is free with its ray out to the target, and up to ray_guard_length."""
-    ray_length = max(reach, robot[robot.shape[0] - 1, D])
-    return is_configuration_free(q, ray_length, chain, obstacles)
+    ray_length = max(reach, robot[q.shape[0], D])
+    return is_configuration_free(q, ray_length, chain, robot, obstacles)
 
 
 @kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))

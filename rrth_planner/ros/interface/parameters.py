@@ -3,7 +3,8 @@
 """The parameters of the planner: fields of the core's options as ROS parameters."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -17,7 +18,7 @@ from rrth_planner.io.settings import (
     settings_from_values,
 )
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.errors import OptionsError, RrthError
+from rrth_planner.model.errors import ModelError, OptionsError, RrthError
 from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
@@ -36,6 +37,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
     escape = 'greatest depth of a bar in a box, margin included, to escape from; 0: none'
     latency = 'age at reception of a body without stamp'
     lost = 'time that a lost part of the body stays where it was before the arm stops'
+    allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
         Setting('base_frame', 'torso', 'frame id', 'frame of the wearer', is_read_only=True),
@@ -54,6 +56,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('body_latency', 0.03, 's', latency, 0.0, LONGEST_LATENCY, is_read_only=True),
         Setting('keep_lost', 2.0, 's', lost, *timeout),
         Setting('required_boxes', [''], 'names', 'a body without one of these is rejected'),
+        Setting('allowed', [''], 'part: box', allowed),
         Setting('incident_folder', '', 'path', folder),
         Setting('replan', True, '-', 'plan again after a fail-safe stop'),
         Setting(
@@ -109,13 +112,33 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         *('base_frame', 'body_timeout', 'joint_timeout', 'body_latency', 'keep_lost', 'replan'),
         'incident_folder',
     )
+    # ROS has no type for an empty array.
+    pairs = tuple(pair for pair in values['allowed'] or () if pair)
     return PlannerParameters(
-        arm=arm,
-        # ROS has no type for an empty array.
+        arm=_with_allowed(arm, pairs) if pairs else arm,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
+
+
+# What is derived of an arm is kept for it.
+@lru_cache(maxsize=4)
+def _with_allowed(arm: ArmModel, pairs: tuple[str, ...]) -> ArmModel:
+    """Return an arm of which some more pairs, "part: box" each, may meet."""
+    found = []
+    for pair in pairs:
+        part, _, other = (word.strip() for word in pair.partition(':'))
+        if not part or not other:
+            raise OptionsError(
+                f'allowed: "{pair}", expected a part of the arm and a box or part, as '
+                '"shoulder: torso"'
+            )
+        found.append((part, other))
+    try:
+        return replace(arm, allowed=(*arm.allowed, *found))
+    except ModelError as problem:
+        raise OptionsError(str(problem)) from problem
 
 
 def declare_parameters(node: Node) -> PlannerParameters:

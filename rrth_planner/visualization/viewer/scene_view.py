@@ -10,7 +10,7 @@ from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.result import Tree
-from rrth_planner.visualization.arm_view import arm_points, ray_of
+from rrth_planner.visualization.arm_view import arm_points, capsule_ends, ray_of
 from rrth_planner.visualization.viewer.curves import (
     along_z,
     segments_of,
@@ -41,7 +41,7 @@ PATHS = {'first': (FIRST, 0.007), 'short': (SHORT, 0.007), 'timed': (TIMED, 0.01
 
 
 class ArmShape:
-    """Bars and joints of the arm in one configuration."""
+    """Bars, joints and capsules of the arm in one configuration."""
 
     def __init__(
         self, server: viser.ViserServer, name: str, arm: ArmModel, opacity: float | None = None
@@ -51,6 +51,16 @@ class ArmShape:
         bar, joint = (BAR, JOINT) if opacity is None else (GHOST, GHOST)
         radii = np.repeat(np.maximum(arm.radii, BAR_RADIUS), 2)
         options: dict[str, Any] = {'opacity': opacity, 'cast_shadow': opacity is None}
+        self._capsules = [
+            (
+                server.scene.add_cylinder(f'{name}/capsule_{k}', c.radius, 1.0, bar, **options),
+                [
+                    server.scene.add_icosphere(f'{name}/cap_{k}_{end}', c.radius, bar, **options)
+                    for end in (0, 1)
+                ],
+            )
+            for k, c in enumerate(arm.capsules)
+        ]
         self._bars = [
             server.scene.add_cylinder(f'{name}/bar_{k}', float(r), 1.0, bar, **options)
             for k, r in enumerate(radii)
@@ -63,6 +73,11 @@ class ArmShape:
     def move(self, q: Array) -> None:
         """Move to a configuration, (dof,) [rad]."""
         points = arm_points(self._arm, q)
+        ends = capsule_ends(self._arm, q)
+        for (cylinder, caps), places in zip(self._capsules, ends, strict=True):
+            place_bar(cylinder, *places)
+            for cap, place in zip(caps, places, strict=True):
+                cap.position = place
         for k, bar in enumerate(self._bars):
             place_bar(bar, points[k], points[k + 1])
             self._joints[k + 1].position = points[k + 1]

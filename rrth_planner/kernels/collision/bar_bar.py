@@ -1,0 +1,227 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bars of an arm against each other: contact, distance, and the proof that two keep apart."""
+
+import math
+
+from numba.core.types import boolean, float64, int64, void
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.jit import kernel, MAT, OUT_VEC, VEC
+from rrth_planner.kernels.layout import (
+    BAR_SIZE,
+    BODY,
+    FIRST_PAIR,
+    FRAME,
+    FRAME_SIZE,
+    FRAMES,
+    INNER,
+    KIND,
+    MAX_PAIRS,
+    OUTER,
+    PRISMATIC,
+    REACH,
+)
+
+# Bars that come nearer than this are in contact: rounding of kinematics, with room [m].
+CONTACT = 1e-9
+# What is known of the motion of a pair: bounds of the second derivatives of both ends of the inner
+# bar and of the outer one, seen from the link of the inner one, and of the sum of their speeds.
+BOW_SIZE, SPEED = 5, 4
+BOWS_ROOM = BOW_SIZE * MAX_PAIRS
+# Two bars at two instants.
+SEEN_ROOM = 4 * BAR_SIZE
+# Shorter lines are points [m^2].
+POINT = 1e-24
+
+
+@kernel(float64(OUT_VEC, int64, OUT_VEC, int64, OUT_VEC))
+def segment_gap(first, i, second, j, gap):
+    """
+    Return the squared distance of two lines [m^2], and write the vector of it [m].
+
+    From the first, first[i] to first[i + 4], to the second, second[j] to second[j + 4]: the
+    nearest points of both, clamped in turn (Ericson 2005, section 5.1.9).
+    """
+    aa = ab = bb = ar = br = 0.0
+    for c in range(3):
+        u, v = first[i + 4 + c] - first[i + c], second[j + 4 + c] - second[j + c]
+        r = first[i + c] - second[j + c]
+        aa += u * u
+        ab += u * v
+        bb += v * v
+        ar += u * r
+        br += v * r
+    s = t = 0.0
+    if aa > POINT:
+        if bb > POINT:
+            denominator = aa * bb - ab * ab
+            if denominator > POINT * aa * bb:
+                s = min(max((ab * br - ar * bb) / denominator, 0.0), 1.0)
+            t = (ab * s + br) / bb
+            if t < 0.0:
+                t, s = 0.0, min(max(-ar / aa, 0.0), 1.0)
+            elif t > 1.0:
+                t, s = 1.0, min(max((ab - ar) / aa, 0.0), 1.0)
+        else:
+            s = min(max(-ar / aa, 0.0), 1.0)
+    elif bb > POINT:
+        t = min(max(br / bb, 0.0), 1.0)
+    square = 0.0
+    for c in range(3):
+        gap[c] = (
+            second[j + c]
+            + t * (second[j + 4 + c] - second[j + c])
+            - first[i + c]
+            - s * (first[i + 4 + c] - first[i + c])
+        )
+        square += gap[c] * gap[c]
+    return square
+
+
+@kernel(int64(OUT_VEC, int64, int64, MAT))
+def colliding_pair(points, at, dof, robot):
+    """Return the first pair of bars in contact with the arm at points[at], or -1: exact."""
+    gap = scratch.floats(3)
+    first = int64(robot[dof + 1, FIRST_PAIR])
+    for row in range(first, robot.shape[0]):
+        a = at + BAR_SIZE * int64(robot[row, INNER])
+        b = at + BAR_SIZE * int64(robot[row, OUTER])
+        radius = points[a + 7] + points[b + 7] + CONTACT
+        # Also for NaN, which must never count as apart.
+        if not segment_gap(points, a, points, b, gap) > radius * radius:
+            return row - first
+    return -1
+
+
+@kernel(float64(OUT_VEC, int64, int64, MAT, float64))
+def nearest_pair(points, at, dof, robot, least):
+    """Return the least distance of pairs of bars that must not collide, where it is less [m]."""
+    gap = scratch.floats(3)
+    for row in range(int64(robot[dof + 1, FIRST_PAIR]), robot.shape[0]):
+        a = at + BAR_SIZE * int64(robot[row, INNER])
+        b = at + BAR_SIZE * int64(robot[row, OUTER])
+        apart = math.sqrt(segment_gap(points, a, points, b, gap))
+        least = min(least, apart - points[a + 7] - points[b + 7])
+    return least
+
+
+@kernel(float64(MAT, int64, int64, int64, VEC, VEC))
+def curvature_bound(robot, row, end, first, speed, curvature):
+    """
+    Return a bound of the second derivative of one end of a bar, seen from a link.
+
+    The link is the one that `first` joints move; row: that of the bar in `robot`. speed,
+    curvature: bounds of |dq/du| and |d2q/du2| of each joint. With R_j the reach of the end round
+    joint j: sum over first <= i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus sum of
+    |q_j''| R_j; an inner prismatic joint adds nothing (`docs/algorithms.md`, section 2).
+    """
+    dof = speed.shape[0]
+    total, inner = 0.0, 0.0
+    for j in range(first, dof):
+        reach = robot[row, REACH + end * dof + j]
+        turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
+        total += reach * (speed[j] * (turns + 2.0 * inner) + curvature[j])
+        inner += turns
+    return total
+
+
+@kernel(void(MAT, VEC, VEC, OUT_VEC))
+def pair_bounds(robot, speed, curvature, bows):
+    """Write what is known of the motion of each pair, BOW_SIZE numbers each."""
+    dof = speed.shape[0]
+    first = int64(robot[dof + 1, FIRST_PAIR])
+    for row in range(first, robot.shape[0]):
+        n, body = BOW_SIZE * (row - first), int64(robot[row, BODY])
+        total = 0.0
+        for k in range(2):
+            bar = dof + 2 + int64(robot[row, OUTER if k else INNER])
+            fastest = 0.0
+            for end in range(2):
+                bows[n + 2 * k + end] = curvature_bound(robot, bar, end, body, speed, curvature)
+                along = 0.0
+                for j in range(body, dof):
+                    along += robot[bar, REACH + end * dof + j] * speed[j]
+                fastest = max(fastest, along)
+            total += fastest
+        bows[n + SPEED] = total
+
+
+@kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64))
+def seen_from(points, bar, frame, seen, to):
+    """Write both ends of points[bar] in the frame at points[frame], < 0: as is, to seen[to]."""
+    for end in range(2):
+        for k in range(3):
+            value = 0.0
+            if frame < 0:
+                value = points[bar + 4 * end + k]
+            else:
+                for c in range(3):
+                    value += points[frame + 3 + 3 * k + c] * (
+                        points[bar + 4 * end + c] - points[frame + c]
+                    )
+            seen[to + 4 * end + k] = value
+
+
+@kernel(boolean(OUT_VEC, OUT_VEC, int64, OUT_VEC, int64, float64, float64))
+def keeps_apart(gap, seen, here, bows, n, bow, radius):
+    """
+    Return whether a direction separates the hulls of two moving bars.
+
+    seen: both bars at two instants, inner and outer at each; here: which instant the direction
+    is taken at, from nearest point to nearest point, for which `gap` is room.
+    """
+    square = segment_gap(seen, 2 * BAR_SIZE * here, seen, 2 * BAR_SIZE * here + BAR_SIZE, gap)
+    low, high, length = math.inf, -math.inf, math.sqrt(square)
+    for instant in range(2):
+        for end in range(2):
+            at = 2 * BAR_SIZE * instant + 4 * end
+            inner = outer = 0.0
+            for c in range(3):
+                inner += gap[c] * seen[at + c]
+                outer += gap[c] * seen[at + BAR_SIZE + c]
+            high = max(high, inner + length * bow * bows[n + end])
+            low = min(low, outer - length * bow * bows[n + 2 + end])
+    return low - high > length * radius
+
+
+@kernel(boolean(OUT_VEC, int64, int64, int64, float64, OUT_VEC, int64, int64, MAT))
+def is_pair_open(points, a, b, row, width, bows, n, dof, robot):
+    """
+    Return whether a pair of bars is not proven apart between two instants.
+
+    points[a], points[b]: the arm at both; width: of the interval of the curve's parameter; row:
+    that of the pair in `robot`; n: where its bounds are in `bows`. Apart are: bars that do not
+    move to each other, those too far away to meet within the interval, and those whose hulls at
+    both instants, thickened by width^2 / 8 times the second derivative and seen from the link of
+    the inner bar, are separated by the direction in which they are nearest at one of the instants
+    (`docs/algorithms.md`, section 3).
+    """
+    if bows[n + SPEED] == 0.0:
+        # Checked at the nodes.
+        return False
+    inner, outer = BAR_SIZE * int64(robot[row, INNER]), BAR_SIZE * int64(robot[row, OUTER])
+    radius = points[a + inner + 7] + points[a + outer + 7] + CONTACT
+    between = half = other = 0.0
+    for c in range(3):
+        p, q = points[a + inner + c], points[a + inner + 4 + c]
+        r, s = points[a + outer + c], points[a + outer + 4 + c]
+        between += (r + s - p - q) * (r + s - p - q)
+        half += (q - p) * (q - p)
+        other += (s - r) * (s - r)
+    # Twice the distance of the middles, and twice the half lengths.
+    far = math.sqrt(half) + math.sqrt(other) + 2.0 * (radius + bows[n + SPEED] * width)
+    if between > far * far:
+        return False
+    seen, gap = scratch.floats(SEEN_ROOM), scratch.floats(3)
+    slot = int64(robot[row, FRAME])
+    frame = int64(robot[dof + 1, FRAMES]) + FRAME_SIZE * slot if slot >= 0 else -1
+    for instant in range(2):
+        base = b if instant else a
+        at = base + frame if slot >= 0 else -1
+        seen_from(points, base + inner, at, seen, 2 * BAR_SIZE * instant)
+        seen_from(points, base + outer, at, seen, 2 * BAR_SIZE * instant + BAR_SIZE)
+    bow = 0.125 * width * width
+    return not (
+        keeps_apart(gap, seen, 0, bows, n, bow, radius)
+        or keeps_apart(gap, seen, 1, bows, n, bow, radius)
+    )
