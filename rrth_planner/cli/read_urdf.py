@@ -4,14 +4,23 @@
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 import sys
 
 import numpy as np
 from rrth_planner.cli.program import command_parser, joint_values, run
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
+from rrth_planner.io.urdf.allowed_pairs import colliding_pairs, disabled_pairs
 from rrth_planner.io.urdf.chain import RAYS, read_chain
-from rrth_planner.io.urdf.import_chain import import_chain, ImportedArm
+from rrth_planner.io.urdf.import_chain import (
+    import_chain,
+    ImportedArm,
+    with_capsules,
+    with_ray_radius,
+)
+from rrth_planner.io.urdf.link_capsules import enclose_links
+from rrth_planner.model.arm import NO_BARS
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import pose_matrix
@@ -20,13 +29,18 @@ from rrth_planner.model.rotation import pose_matrix
 LONG = 2.0
 DESCRIPTION = """\
 Read the joints between two links of a URDF and write them as an arm of the planner, laid out as
-config/arm.yaml: modified Denavit-Hartenberg rows, limits, radii, mount and tool. Meshes are
-ignored: the planner models every link as a bar from joint to joint, with the radius given here.
+config/arm.yaml: modified Denavit-Hartenberg rows, limits, mount and tool, and the shape of the
+links. The collision geometry of each link, meshes included, is enclosed in a few slim capsules.
+Where there is none at all, or with --geometry bars, every link is a bar from joint to joint, with
+the radius given here.
 """
 EPILOG = """\
 The conversion is exact for any chain of revolute, continuous, prismatic and fixed joints. The
 result is compared with the URDF at many configurations, and the difference is printed. Continuous
-joints get limits of +-pi. Branches beside the chain, such as fingers, are left out.
+joints get limits of +-pi. Links beside the chain belong to the arm where they are fixed to it;
+those that joints beside it move, such as fingers, are left out and named, or enclosed in all their
+positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
+in the middle of the joint ranges and nearly everywhere are written as pairs that may meet.
 
 exit codes: 0  the file has been written
             2  wrong usage, or a URDF without such a chain (the reason is printed)
@@ -54,10 +68,20 @@ def _import(options: argparse.Namespace) -> None:
 
     chain = read_chain(options.file, options.base, options.tool, options.ray)
     found = import_chain(chain, _mount(options.mount), options.radius)
+    shape: list[str] = []
+    if options.geometry == 'collision':
+        found, shape = _with_flesh(found, options)
+    if options.srdf is not None and not found.arm.capsules:
+        raise ModelError(
+            f'--srdf {options.srdf}: the links are bars, expected collision geometry: its pairs '
+            'are links'
+        )
+    if not found.arm.capsules and options.ray_radius is not None:
+        found = with_ray_radius(found, options.ray_radius)
     # As it will be read.
     arm = arm_from_mapping(arm_to_mapping(found.arm, chain.name))
     check_pointing_arm(arm)
-    lines = _report(found)
+    lines = _report(found) + shape
     if options.check is not None:
         lines += _report_ray(found, joint_values(options.check, '--check', arm.joint_names))
     comments = [
@@ -66,6 +90,53 @@ def _import(options: argparse.Namespace) -> None:
     ]
     options.output.write_text(arm_to_yaml(found.arm, chain.name, comments), encoding='utf-8')
     print('\n'.join([*lines, f'written: {options.output}']))
+
+
+def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[ImportedArm, list[str]]:
+    """Return an arm with capsules round its links, and a description of them, in lines."""
+    flesh = enclose_links(found, options.include_branches)
+    lines = []
+    if flesh.left_out:
+        lines.append(
+            f'left out: {", ".join(flesh.left_out)}, which joints beside the chain move; '
+            '--include-branches encloses them in all their positions'
+        )
+    if not flesh.capsules:
+        return found, [
+            *lines,
+            'shape: no collision geometry: each link is a bar from joint to joint',
+        ]
+    found = with_capsules(found, flesh.capsules, options.ray_radius or 0.0)
+    always = colliding_pairs(found.arm)
+    pairs = list(always)
+    if options.srdf is not None:
+        named = disabled_pairs(options.srdf, found.arm)
+        known = {frozenset(pair) for pair in always}
+        pairs += [pair for pair in named if frozenset(pair) not in known]
+        lines.append(f'may meet, by {options.srdf.name}: {_listed(pairs[len(always) :])}')
+    if always:
+        lines.append(f'may meet, since they nearly always do: {_listed(always)}')
+    if flesh.bare:
+        lines.append(f'not checked, no collision geometry: {", ".join(flesh.bare)}')
+    shape = [
+        f'shape: {len(flesh.capsules)} capsules; slack: how far one reaches beyond the convex '
+        'hull of what it encloses'
+    ]
+    for link in flesh.links:
+        n = len(link.capsules)
+        if n == 0:
+            shape.append(f'  {link.name}: in the capsules of the links before it')
+            continue
+        radius = max(capsule.radius for capsule in link.capsules)
+        shape.append(
+            f'  {link.name}: {n} capsule{"s" * (n > 1)}, radius up to {radius:.4f} m, '
+            f'slack {1e3 * link.slack:.0f} mm'
+        )
+    return replace(found, arm=replace(found.arm, allowed=tuple(pairs))), shape + lines
+
+
+def _listed(pairs: Sequence[tuple[str, str]]) -> str:
+    return ', '.join(f'{one} and {other}' for one, other in pairs) or 'none'
 
 
 def _mount(numbers: Sequence[float] | None) -> Array:
@@ -86,17 +157,16 @@ def _report(found: ImportedArm) -> list[str]:
         low, high = arm.bounds[:, k]
         endless = chain.moving[k].type == 'continuous'
         note = ', +-pi for a continuous joint' if endless else ''
-        lines.append(
-            f'  {name}: {low:.4f} to {high:.4f} {unit}, radius {arm.radii[k]:.4f} m{note}'
-        )
+        radius = '' if arm.radii[k] == NO_BARS else f', radius {arm.radii[k]:.4f} m'
+        lines.append(f'  {name}: {low:.4f} to {high:.4f} {unit}{radius}{note}')
     lines.append(f'  ray: radius {arm.radii[-1]:.4f} m')
-    if arm.radii.max() > found.radius:
+    if arm.radii[:-1].max() > found.radius:
         lines.append(
             f'radii: more than {found.radius:g} m where a link deviates from its straight bars'
         )
     longest = np.abs(arm.dh[:, [1, 3]]).max()
     size = np.linalg.norm(np.diff(chain.points, axis=0), axis=1).sum()
-    if longest > LONG * size:
+    if longest > LONG * size and not arm.capsules:
         lines.append(
             f'bars: up to {longest:.2f} m long in an arm of {size:.2f} m: the common normal of '
             'two nearly parallel axes is far away; make them parallel in the URDF'
@@ -148,8 +218,23 @@ def _parser() -> argparse.ArgumentParser:
         metavar=('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW'),
         help="pose of the first link in the wearer's base frame [m] (the same frame)",
     )
-    radius = 'radius of the links [m] (%(default)s)'
+    add(
+        '--geometry',
+        choices=('collision', 'bars'),
+        default='collision',
+        help='shape of the links: their collision geometry, if any, or bars (%(default)s)',
+    )
+    radius = 'radius of links that are bars [m] (%(default)s)'
     add('--radius', type=float, default=0.03, metavar='M', help=radius)
+    radius = 'radius of the pointing ray [m] (0; that of the links where these are bars)'
+    add('--ray-radius', type=float, metavar='M', help=radius)
+    add(
+        '--include-branches',
+        action='store_true',
+        help='enclose links that joints beside the chain move, as fingers, in all positions',
+    )
+    srdf = 'SRDF whose disable_collisions name pairs of links that may meet'
+    add('--srdf', type=Path, metavar='FILE', help=srdf)
     add('--output', type=Path, required=True, metavar='FILE', help='arm file to write')
     check = 'print the tool pose at these joint positions [rad or m]'
     add('--check', type=float, nargs='+', metavar='Q', help=check)

@@ -17,8 +17,8 @@ from rrth_planner.model.errors import ModelError
 
 DESCRIPTION = """\
 Write an arm as a URDF, from the DH rows that the planner uses: a link for each frame,
-joints with their limits, the bars as cylinders, and a link "tool" whose +z axis is the pointing
-ray. It needs no ROS.
+joints with their limits, bars and capsules as cylinders and spheres, and a link "tool" whose +z
+axis is the pointing ray. Capsules are collision geometry, too. It needs no ROS.
 """
 EPILOG = """\
 The velocities are max_velocity of the settings. URDF also requires an effort, which neither file

@@ -293,6 +293,64 @@ def test_the_mount_is_where_the_first_link_is_worn(tmp_path, capsys):
     assert 'tool at' in capsys.readouterr().out
 
 
+def with_geometry(text):
+    """Return the example with boxes on three links, and a finger on the lamp."""
+    box = (
+        '<collision><origin xyz="0 0 0.05"/><geometry><box size="0.04 0.04 {}"/></geometry>'
+        '</collision>'
+    )
+    for link, length in (('upper_arm', 0.2), ('forearm', 0.1), ('lamp', 0.02)):
+        text = text.replace(
+            f'<link name="{link}"/>', f'<link name="{link}">{box.format(length)}</link>'
+        )
+    finger = (
+        f'<link name="finger">{box.format(0.03)}</link><joint name="grip" type="revolute">'
+        '<parent link="lamp"/><child link="finger"/><axis xyz="1 0 0"/>'
+        '<limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    return text.replace('</robot>', finger)
+
+
+def test_links_with_collision_geometry_become_capsules(tmp_path, capsys):
+    chest = resource_path('config/examples/chest_arm.urdf').read_text()
+    file, arm = file_of(tmp_path, with_geometry(chest)), tmp_path / 'arm.yaml'
+    srdf = tmp_path / 'arm.srdf'
+    pair = '<disable_collisions link1="upper_arm" link2="lamp"/>'
+    srdf.write_text(f'<robot name="chest_arm">{pair}</robot>')
+    request = [str(file), '--tool', 'lamp', '--ray', '+x', '--output', str(arm)]
+    assert read_urdf.main([*request, '--srdf', str(srdf), '--ray-radius', '0.01']) == 0
+    said, found = capsys.readouterr().out, load_arm(arm)
+    assert 'shape: 3 capsules' in said
+    assert '  upper_arm: 1 capsule, radius up to 0.0' in said
+    assert 'left out: finger, which joints beside the chain move' in said
+    assert 'may meet, by arm.srdf: upper_arm and lamp' in said
+    assert [(c.name, c.link) for c in found.capsules] == [
+        ('upper_arm', 2),
+        ('forearm', 3),
+        ('lamp', 6),
+    ]
+    assert found.allowed == (('upper_arm', 'lamp'),)
+    assert found.radii.tolist() == [-1.0] * 6 + [0.01]
+    assert read_urdf.main([*request, '--include-branches']) == 0
+    assert 'left out' not in capsys.readouterr().out
+    assert [c.name for c in load_arm(arm).capsules][-1] == 'finger'
+    assert read_urdf.main([*request, '--geometry', 'bars', '--ray-radius', '0.02']) == 0
+    assert 'shape' not in capsys.readouterr().out
+    bars_only = load_arm(arm)
+    assert (bars_only.capsules, bars_only.radii[-1]) == ((), 0.02)
+    assert read_urdf.main([*request, '--geometry', 'bars', '--srdf', str(srdf)]) == 2
+    assert 'the links are bars, expected collision geometry' in capsys.readouterr().err
+    assert read_urdf.main([*request, '--ray-radius', '-1']) == 2
+    assert 'ray radius: -1.0, expected a length >= 0' in capsys.readouterr().err
+
+
+def test_without_collision_geometry_links_are_bars(tmp_path, capsys):
+    file, arm = resource_path('config/examples/chest_arm.urdf'), tmp_path / 'arm.yaml'
+    assert read_urdf.main([str(file), '--ray', '+x', '--output', str(arm)]) == 0
+    assert 'shape: no collision geometry: each link is a bar' in capsys.readouterr().out
+    assert load_arm(arm).capsules == ()
+
+
 def test_an_interrupt_is_a_sentence(tmp_path, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt

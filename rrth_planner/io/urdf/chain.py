@@ -61,6 +61,10 @@ class UrdfChain:
         The x axis of the first joint's frame.
     ray : ndarray, shape (3,)
         The pointing ray in the tool's link.
+    robot : yourdfpy.Robot
+        All links and joints of the file.
+    file : Path
+        Where the names of its mesh files begin.
 
     """
 
@@ -74,6 +78,8 @@ class UrdfChain:
     directions: Array
     x_first: Array
     ray: Array
+    robot: Any
+    file: Path
 
     def tool_pose(self, q: Array) -> Array:
         """
@@ -86,10 +92,8 @@ class UrdfChain:
         for joint in self.joints:
             if joint.origin is not None:
                 T = T @ joint.origin
-            if joint.type == 'prismatic':
-                T = T @ transformations.translation_matrix(next(values) * joint_axis(joint))
-            elif joint.type != 'fixed':
-                T = T @ transformations.rotation_matrix(next(values), joint_axis(joint))
+            if joint.type != 'fixed':
+                T = T @ joint_motion(joint, next(values))
         return np.asarray(T)
 
 
@@ -97,7 +101,7 @@ def read_chain(
     path: str | Path, base: str | None = None, tool: str | None = None, ray: str = '+z'
 ) -> UrdfChain:
     """
-    Return the chain of a URDF file; meshes are ignored.
+    Return the chain of a URDF file, whose meshes are not looked for.
 
     Parameters
     ----------
@@ -120,7 +124,7 @@ def read_chain(
     T, frames, moving = np.eye(4), [], []
     for joint in joints:
         if joint.origin is not None:
-            T = T @ _squared(joint.origin)
+            T = T @ squared(joint.origin)
         if joint.type != 'fixed':
             moving.append(joint)
             frames.append(T)
@@ -129,7 +133,7 @@ def read_chain(
             f'URDF {path}: no joint moves between "{base}" and "{tool}", expected one'
         )
     axes = [R[:3, :3] @ joint_axis(joint) for R, joint in zip(frames, moving, strict=True)]
-    limits = [_limits(joint) for joint in moving]
+    limits = [joint_limits(joint) for joint in moving]
     return UrdfChain(
         name=str(model.robot.name),
         base=base,
@@ -141,6 +145,8 @@ def read_chain(
         directions=np.array([*axes, T[:3, :3] @ RAYS[ray]]),
         x_first=frames[0][:3, 0],
         ray=RAYS[ray],
+        robot=model.robot,
+        file=Path(path),
     )
 
 
@@ -235,7 +241,16 @@ def joint_axis(joint: Any) -> Array:
     return np.asarray(axis / length)
 
 
-def _limits(joint: Any) -> tuple[float, float]:
+def joint_motion(joint: Any, value: float) -> Array:
+    """Return the pose that a joint at a position [rad or m] gives what it moves, (4, 4) [m]."""
+    axis = joint_axis(joint)
+    if joint.type == 'prismatic':
+        return np.asarray(transformations.translation_matrix(value * axis))
+    return np.asarray(transformations.rotation_matrix(value, axis))
+
+
+def joint_limits(joint: Any) -> tuple[float, float]:
+    """Return how far a joint moves, +-pi if it is continuous [rad or m], or raise ModelError."""
     if joint.type == 'continuous':
         return -math.pi, math.pi
     limit, unit = joint.limit, 'm' if joint.type == 'prismatic' else 'rad'
@@ -249,7 +264,7 @@ def _limits(joint: Any) -> tuple[float, float]:
     return limit.lower, limit.upper
 
 
-def _squared(T: Array) -> Array:
+def squared(T: Array) -> Array:
     """Return the origin of a joint with angles that were meant to be right angles made right."""
     angles = np.array(transformations.euler_from_matrix(T))
     right = 0.5 * np.pi * np.round(angles / (0.5 * np.pi))

@@ -1,12 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The arm as a URDF: the same frames, joints and limits as its DH rows, its bars as cylinders."""
+"""The arm as a URDF: frames, joints and limits of its DH rows, bars and capsules as cylinders."""
 
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, link_poses
+from rrth_planner.model.arm import ArmModel, Capsule, link_poses, NO_BARS
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.rotation import roll_pitch_yaw
@@ -32,10 +32,11 @@ def arm_to_urdf(
     arm: ArmModel, max_velocity: Array, radius: float, base_frame: str = 'torso', name: str = 'arm'
 ) -> str:
     """
-    Return the URDF of an arm: links, joints with limits, and visual bars; no masses.
+    Return the URDF of an arm: links, joints with limits, visual bars, capsules; no masses.
 
     The base frame and the mount are fixed to each other, as are the last joint and the tool. A
-    prismatic joint shows as a rod that slides through the place where it begins.
+    prismatic joint shows as a rod that slides through the place where it begins. Capsules are seen
+    and collide: a cylinder and two spheres each.
 
     Parameters
     ----------
@@ -69,15 +70,20 @@ def arm_to_urdf(
     _add_joint(robot, joints[0], 'fixed', links[:2], arm.T_base_mount)
     poses = link_poses(arm, np.zeros(arm.dof))
     thickness = [float(r) or radius for r in arm.radii]
+    has_bars = arm.radii != NO_BARS
     for i, link in enumerate(links[1:]):
         element = ElementTree.SubElement(robot, 'link', name=link)
-        if i > 0:
+        for capsule in arm.capsules:
+            if capsule.link == i:
+                _add_capsule(element, capsule)
+        if i > 0 and has_bars[i - 1]:
             _add_bar(element, _along_z(arm, i - 1), 2, thickness[i - 1], 'bar')
         if i > arm.dof:
             _add_bar(element, (0.0, RAY_LENGTH), 2, RAY_WIDTH * thickness[-1], 'ray')
             break
         a = float(arm.dh[i, 1])
-        _add_bar(element, (min(0.0, a), max(0.0, a)), 0, thickness[i], 'bar')
+        if has_bars[i]:
+            _add_bar(element, (min(0.0, a), max(0.0, a)), 0, thickness[i], 'bar')
         kind = 'fixed'
         if i < arm.dof:
             kind = 'prismatic' if arm.is_prismatic[i] else 'revolute'
@@ -128,6 +134,37 @@ def _add_bar(
     geometry = ElementTree.SubElement(visual, 'geometry')
     ElementTree.SubElement(geometry, 'cylinder', radius=_text([radius]), length=_text([length]))
     ElementTree.SubElement(visual, 'material', name=material)
+
+
+def _add_capsule(link: ElementTree.Element, capsule: Capsule) -> None:
+    """Add a capsule to a link, once to be seen and once to collide."""
+    begin, end = capsule.ends
+    length = float(np.linalg.norm(end - begin))
+    radius = _text([capsule.radius])
+    if capsule.radius == 0.0:
+        return
+    solids: list[tuple[Array, Array, str, dict[str, str]]] = [
+        (centre, np.eye(3), 'sphere', {'radius': radius})
+        for centre in (capsule.ends if length > SHORTEST else capsule.ends[:1])
+    ]
+    if length > SHORTEST:
+        size = {'radius': radius, 'length': _text([length])}
+        solids.insert(0, (0.5 * (begin + end), _z_along((end - begin) / length), 'cylinder', size))
+    for tag in ('visual', 'collision'):
+        for centre, rotation, solid, size in solids:
+            element = ElementTree.SubElement(link, tag)
+            _add_origin(element, centre, roll_pitch_yaw(rotation))
+            geometry = ElementTree.SubElement(element, 'geometry')
+            ElementTree.SubElement(geometry, solid, size)
+            if tag == 'visual':
+                ElementTree.SubElement(element, 'material', name='bar')
+
+
+def _z_along(direction: Array) -> Array:
+    """Return a rotation that turns z into a unit vector, (3,) -> (3, 3)."""
+    x = np.cross(np.eye(3)[np.abs(direction).argmin()], direction)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(direction, x), direction], axis=1)
 
 
 def _add_origin(

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from rrth_planner.io.urdf.chain import UrdfChain
 from rrth_planner.io.urdf.dh_parameters import rows_of_axes
-from rrth_planner.model.arm import ArmModel, forward_kinematics, tool_pose
+from rrth_planner.model.arm import ArmModel, Capsule, forward_kinematics, NO_BARS, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 
@@ -92,6 +92,23 @@ def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> Importe
         ray_lead=ray_lead,
         radius=radius,
     )
+
+
+def with_ray_radius(found: ImportedArm, radius: float) -> ImportedArm:
+    """Return an arm whose pointing ray has another radius [m], or raise ModelError."""
+    if not 0.0 <= radius < np.inf:
+        raise ModelError(f'ray radius: {radius}, expected a length >= 0 [m]')
+    radii = np.array([*found.arm.radii[:-1], radius])
+    return replace(found, arm=replace(found.arm, radii=radii))
+
+
+def with_capsules(
+    found: ImportedArm, capsules: tuple[Capsule, ...], ray_radius: float
+) -> ImportedArm:
+    """Return an arm made of capsules instead of bars, but for its ray, of a radius [m]."""
+    bare = replace(found.arm, radii=np.array([*np.full(found.arm.dof, NO_BARS), 0.0]))
+    fleshed = replace(found, arm=replace(bare, capsules=capsules))
+    return with_ray_radius(fleshed, ray_radius)
 
 
 def _cover_radii(arm: ArmModel, points: Array, radius: float) -> Array:
