@@ -89,7 +89,8 @@ def judge_of(file: Path, arm: ArmModel, scene: Scene, mount: tuple[float, ...]) 
     """Return the judge of an arm's motions: its meshes against boxes, and those that must keep."""
     model = pin.buildModelFromUrdf(str(file))
     folders = [str(folder) for folder in file.parents]
-    geometry = pin.buildGeomFromUrdf(model, str(file), pin.GeometryType.COLLISION, folders)
+    kind = pin.GeometryType.COLLISION
+    geometry = pin.buildGeomFromUrdf(model, str(file), kind, package_dirs=folders)
     names = {capsule.name for capsule in arm.capsules}
     objects = [
         (k, model.frames[shape.parentFrame].name)

@@ -63,6 +63,7 @@ def question_of(
         seed=seed,
         escape_depth=settings.escape_depth,
         reserve=settings.reserve,
+        second_checker=settings.second_checker,
     )
 
 
@@ -75,5 +76,5 @@ def plan_of(question: PlanQuestion, name: str) -> 'MotionPlan':
     from rrth_planner.pipeline.plan_motion import plan_question, warm_up
 
     # Compiling and loading do not count as planning time.
-    warm_up(question.arm, question.options)
+    warm_up(question.arm, question.options, question.second_checker)
     return plan_question(question)

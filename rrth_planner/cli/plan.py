@@ -28,7 +28,7 @@ SEEDS = 2**31
 DESCRIPTION = """\
 Plan one motion after which the arm's pointing ray meets a target, and which keeps the margin from
 the wearer throughout. Reads files and needs no ROS; the motion is planned and checked as by the
-node: certificate and python-fcl.
+node: certificate and second checker.
 Lengths in metres, angles in radians, in the wearer's base frame: x forward, y left, z up.
 """
 EPILOG = """\

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
 DESCRIPTION = """\
-Replay an incident of the planner: a certified motion in which python-fcl found a clearance
+Replay an incident of the planner: a certified motion in which the second checker found a clearance
 violation, or an unexpected error. Neither is ever published; the node answers FAILURE and names
 the file that this command reads. The command plans again from the same inputs with the same seed,
 reports whether the motion is identical to the bit, and checks each piece of the recorded motion
-by three collision checkers: the certificate, python-fcl, and the reference checker, which is
-plain numpy and shares nothing with the others. It needs no ROS.
+by three collision checkers: the certificate, the second checker (python-fcl or coal), and the
+reference checker, which is plain numpy and shares nothing with the others. It needs no ROS.
 """
 EPILOG = """\
 exit codes: 0  reproduced as recorded
@@ -59,7 +59,7 @@ def replay(incident: Incident) -> int:
     assert incident.trajectory is not None
     is_same = _is_same_motion(planned, incident.trajectory)
     comparison = _compare_on_recorded(incident, incident.trajectory)
-    _print_comparison(comparison, incident.question.margin)
+    _print_comparison(comparison, incident.question.margin, incident.question.second_checker)
     if is_same and comparison.is_disagreement:
         print('reproduced: the two collision checks disagree about the same motion as recorded')
         return 0
@@ -101,6 +101,7 @@ def _compare_on_recorded(incident: Incident, trajectory: Trajectory) -> 'MotionC
         question.margin,
         question.ray_guard_length,
         incident.escape_time,
+        question.second_checker,
     )
 
 
@@ -152,22 +153,22 @@ def _print_record(incident: Incident) -> None:
             print(f'  {name}: {before} then, {after} now')
 
 
-def _print_comparison(comparison: 'MotionComparison', margin: float) -> None:
+def _print_comparison(comparison: 'MotionComparison', margin: float, library: str) -> None:
     print(f'the recorded motion, margin {margin:g} m:')
-    columns = f'{"certificate":>12} {"fcl [m]":>12} {"reference [m]":>13}  closest by fcl'
+    columns = f'{"certificate":>12} {"second [m]":>12} {"reference [m]":>13}  closest (second)'
     print(f'  {"piece":>5} {"from [s]":>9} {"to [s]":>9} {columns}')
     for i, piece in enumerate(comparison.pieces):
         name = 'end' if i == len(comparison.pieces) - 1 else str(i)
-        fcl = piece.fcl
+        second = piece.second
         print(
             f'  {name:>5} {piece.begin:9.4f} {piece.end:9.4f} {piece.certificate:>12} '
-            f'{fcl.distance:12.7f} {piece.reference:13.7f}  {fcl.bar}, "{fcl.box}"'
+            f'{second.distance:12.7f} {piece.reference:13.7f}  {second.bar}, "{second.box}"'
         )
     found, wrong = 'free', comparison.violation
     if wrong is not None:
         found = f'{wrong.bar} at {wrong.distance:.7f} m from "{wrong.box}" at {wrong.time:.4f} s'
     print(f'certificate: {"proven free" if comparison.is_proven else "not proven"}')
-    print(f'python-fcl: {found}')
+    print(f'second checker, {library}: {found}')
     word = 'keeps the margin' if comparison.clearance >= margin else 'below the margin'
     print(f'reference checker: least clearance {comparison.clearance:.7f} m, {word}')
 

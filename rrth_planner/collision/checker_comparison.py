@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Certificate, python-fcl and reference checker compared on each piece of a motion."""
+"""Certificate, second checker and reference checker compared on each piece of a motion."""
 
 from dataclasses import dataclass
 import math
@@ -8,7 +8,7 @@ import math
 import numpy as np
 from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.fcl_checker import nearest
+from rrth_planner.collision.second_checker import nearest
 from rrth_planner.collision.trajectory_validation import is_proven_free, violation_seen
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
@@ -18,7 +18,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import positions_at, Trajectory
 
-# Sampling period of the distances of python-fcl and the reference checker [s].
+# Sampling period of the distances of the second and the reference checker [s].
 PERIOD = 0.002
 
 
@@ -28,15 +28,15 @@ class PieceComparison:
     The results of the three checkers for one piece of a motion.
 
     `begin` and `end` [s] are equal for the final configuration, whose ray extends to the target.
-    `certificate`: `proven`, `violated` or `undecided`; `fcl`: where python-fcl finds the arm
-    closest to the wearer, sampled; `reference`: least clearance by the reference checker, sampled
-    [m].
+    `certificate`: `proven`, `violated` or `undecided`; `second`: where the second checker finds
+    the arm closest to the wearer, sampled; `reference`: least clearance by the reference checker,
+    sampled [m].
     """
 
     begin: float
     end: float
     certificate: str
-    fcl: Violation
+    second: Violation
     reference: float
 
 
@@ -45,8 +45,8 @@ class MotionComparison:
     """
     The results of the three checkers for a whole motion.
 
-    `is_proven` by the certificate, the first `violation` that python-fcl finds, and the least
-    `clearance` by the reference checker [m]; `pieces`: one for each, and one for the final
+    `is_proven` by the certificate, the first `violation` that the second checker finds, and the
+    least `clearance` by the reference checker [m]; `pieces`: one for each, and one for the final
     configuration.
     """
 
@@ -57,7 +57,7 @@ class MotionComparison:
 
     @property
     def is_disagreement(self) -> bool:
-        """Whether the motion is certified although python-fcl finds a violation."""
+        """Whether the motion is certified although the second checker finds a violation."""
         return self.is_proven and self.violation is not None
 
 
@@ -69,6 +69,7 @@ def compare_checkers(
     margin: float,
     ray_guard_length: float,
     escape_time: float = 0.0,
+    library: str = 'fcl',
 ) -> MotionComparison:
     """
     Return the results of the three checkers for a motion.
@@ -80,20 +81,21 @@ def compare_checkers(
     q_end: Array = trajectory.positions[-1]
     reach = reach_to(arm, goal.target, q_end)
     pieces = tuple(
-        _of_piece(arm, scene, world, trajectory, i) for i in range(len(trajectory.times) - 1)
+        _of_piece(arm, scene, world, trajectory, i, library)
+        for i in range(len(trajectory.times) - 1)
     )
     end = trajectory.duration
     last = PieceComparison(
         begin=end,
         end=end,
         certificate='proven' if world.is_valid(q_end, reach) else 'violated',
-        fcl=_closest(arm, scene, q_end[None], np.array([end]), reach),
+        second=_closest(arm, scene, q_end[None], np.array([end]), reach, library),
         reference=reference_checker.least_clearance(arm, scene, q_end[None], reach),
     )
     return MotionComparison(
         is_proven=is_proven_free(world, trajectory, margin, reach, escape_time),
         violation=violation_seen(
-            arm, scene, trajectory, margin, ray_guard_length, reach, escape_time
+            arm, scene, trajectory, margin, ray_guard_length, reach, escape_time, library
         ),
         clearance=min(piece.reference for piece in (*pieces, last)),
         pieces=(*pieces, last),
@@ -101,7 +103,7 @@ def compare_checkers(
 
 
 def _of_piece(
-    arm: ArmModel, scene: Scene, world: World, trajectory: Trajectory, i: int
+    arm: ArmModel, scene: Scene, world: World, trajectory: Trajectory, i: int, library: str
 ) -> PieceComparison:
     begin, end = (float(time) for time in trajectory.times[i : i + 2])
     piece = Trajectory(
@@ -119,17 +121,21 @@ def _of_piece(
         begin=begin,
         end=end,
         certificate='proven' if certificate.is_proven else found,
-        fcl=_closest(arm, scene, positions_at(piece, times), begin + times, world.ray_length),
+        second=_closest(
+            arm, scene, positions_at(piece, times), begin + times, world.ray_length, library
+        ),
         reference=reference_checker.least_clearance(arm, scene, q, world.ray_length),
     )
 
 
-def _closest(arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float) -> Violation:
-    """Return where python-fcl finds the arm closest at instants, q (n, dof), times (n,) [s]."""
+def _closest(
+    arm: ArmModel, scene: Scene, q: Array, times: Array, ray: float, library: str
+) -> Violation:
+    """Return where the second checker finds the arm closest at instants, q (n, dof), times [s]."""
     best = Violation(float(times[0]), math.inf, '', '')
     # Without a box there is nothing to be close to.
     for time, one in zip(times.tolist(), q if scene.boxes else (), strict=False):
-        found = nearest(arm, scene, one, ray)
+        found = nearest(arm, scene, one, ray, library)
         if found.distance < best.distance:
             best = Violation(time, found.distance, found.bar, found.box)
     return best

@@ -1,12 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The two independent checks of a whole motion: the certificate and python-fcl."""
+"""The two independent checks of a whole motion: the certificate and the second checker."""
 
 from dataclasses import replace
 
 from rrth_planner.collision.certificate import certify
-from rrth_planner.collision.fcl_checker import first_escape_violation, first_violation
 from rrth_planner.collision.penetration import escape_depths, leads_out
+from rrth_planner.collision.second_checker import first_escape_violation, first_violation
 from rrth_planner.collision.violation import Violation
 from rrth_planner.collision.world import arm_world, World
 from rrth_planner.model.arm import ArmModel
@@ -38,22 +38,24 @@ def violation_seen(
     ray_guard_length: float,
     reach: float,
     escape_time: float = 0.0,
+    library: str = 'fcl',
 ) -> Violation | None:
     """
-    Return the first clearance violation of a motion by python-fcl, or None.
+    Return the first clearance violation of a motion by the second checker, or None.
 
-    As `fcl_checker.first_violation`; reach and escape_time as in `is_proven_free`.
+    As `second_checker.first_violation`; reach and escape_time as in `is_proven_free`.
     """
     ray = ray_guard_length
     if escape_time > 0.0:
         world = arm_world(arm, scene, margin, ray)
         depths = escape_depths(world, trajectory.positions[0])
         violation = first_escape_violation(
-            arm, scene, depths, trajectory, escape_time, margin, ray
+            arm, scene, depths, trajectory, escape_time, margin, ray, library
         )
         if violation is not None:
             return violation
-    violation = first_violation(arm, scene, beyond(trajectory, escape_time), margin, ray, reach)
+    after = beyond(trajectory, escape_time)
+    violation = first_violation(arm, scene, after, margin, ray, reach, library)
     if violation is None:
         return None
     return replace(violation, time=escape_time + violation.time)

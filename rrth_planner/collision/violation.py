@@ -31,7 +31,7 @@ class Violation:
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """
-    A certified motion in which python-fcl finds a clearance violation, here the first one.
+    A certified motion in which the second checker finds a clearance violation, here the first one.
 
     It is never published. Until `escape_time` it escapes from boxes that the arm was in [s].
     """

@@ -18,7 +18,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 
-PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl')
+PACKAGES = ('rrth_planner', 'numpy', 'numba', 'python-fcl', 'coal')
 
 
 class IncidentKind(Enum):
@@ -72,7 +72,7 @@ class Incident:
     trajectory : Trajectory or None
         The motion concerned, if there was one already.
     violation : Violation or None
-        The clearance violation that python-fcl found.
+        The clearance violation that the second checker found.
     present : Scene or None
         The wearer that the motion was checked against, where that is not the one it was planned
         for, since the wearer moved meanwhile.

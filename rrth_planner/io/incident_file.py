@@ -28,7 +28,7 @@ from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 # Version of the record's layout; others are rejected.
-FORMAT = 3
+FORMAT = 4
 MOST_FILES = 100
 PATTERN = 'incident-*.yaml'
 HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
@@ -160,6 +160,7 @@ def _question(data: Any) -> PlanQuestion:
         limits=MotionLimits(**_fields_of(given['limits'], MotionLimits, 'limits')),
         options=_options(given['options']),
         seed=whole(given['seed'], 'seed', RecordError),
+        second_checker=text(given['second_checker'], 'second_checker', RecordError),
         moving=None if given['moving'] is None else _start_state(given['moving'], arm.dof),
         **lengths,
     )

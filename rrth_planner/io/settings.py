@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.io.entries import number, text, whole
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml, naming_file
@@ -30,6 +31,7 @@ class PlanSettings:
     ray_guard_length: float
     escape_depth: float
     reserve: float
+    second_checker: str
     limits: MotionLimits
     options: TreeOptions
 
@@ -47,8 +49,12 @@ def settings_from_values(values: Mapping[str, Any], dof: int) -> PlanSettings:
             f'{", ".join(ALGORITHMS)}'
         )
     algorithm = ALGORITHMS[values['algorithm']]
+    if values['second_checker'] not in LIBRARIES:
+        raise OptionsError(
+            f'second_checker: "{values["second_checker"]}", expected {" or ".join(LIBRARIES)}'
+        )
     return PlanSettings(
-        **{name: values[name] for name in ('seed', *LENGTHS)},
+        **{name: values[name] for name in ('seed', *LENGTHS, 'second_checker')},
         limits=MotionLimits(*(_of_each_joint(name, values, dof) for name in LIMIT_UNITS)),
         options=algorithm(**{f.name: values[f.name] for f in fields(algorithm)}),
     )
@@ -90,7 +96,8 @@ def _typed_settings(
         if name not in values:
             raise OptionsError(f'{name}: unknown parameter, expected one of {", ".join(values)}')
     changed = {**values, **changes}
-    text(changed['algorithm'], 'algorithm', OptionsError)
+    for name in ('algorithm', 'second_checker'):
+        text(changed[name], name, OptionsError)
     whole(changed['seed'], 'seed', OptionsError)
     lengths = {name: number(changed[name], name, 'm', OptionsError) for name in LENGTHS}
     return settings_from_values({**changed, **lengths}, dof)

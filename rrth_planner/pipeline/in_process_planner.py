@@ -19,9 +19,9 @@ class InProcessPlanner:
 
     violation_seen = staticmethod(violation_seen)
 
-    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
-        """Compile and load everything for an arm and options."""
-        warm_up(arm, options)
+    def warm_up(self, arm: ArmModel, options: TreeOptions, second_checker: str = 'fcl') -> None:
+        """Compile and load everything for an arm, options and a second checker."""
+        warm_up(arm, options, second_checker)
         # Loaded objects live as long as the process: the collector skips them.
         gc.collect()
         gc.freeze()

@@ -58,6 +58,7 @@ def plan_motion(
     moving: StartState | None = None,
     escape_depth: float = 0.05,
     reserve: float = 0.0,
+    second_checker: str = 'fcl',
 ) -> MotionPlan:
     """
     Return a certified motion that ends with the tool pointing at the goal.
@@ -92,11 +93,15 @@ def plan_motion(
     reserve : float
         Clearance beyond the margin that path and goal are planned with where there is room [m]: a
         wearer who moves by less invalidates nothing.
+    second_checker : str
+        Library behind the second collision check, one of `distance_library.LIBRARIES`.
 
     Raises
     ------
     OptionsError
         A number out of its range, or values of another number of joints than the arm's.
+    ModelError
+        The library of the second checker is not installed.
 
     """
     question = PlanQuestion(
@@ -112,6 +117,7 @@ def plan_motion(
         moving=moving,
         escape_depth=escape_depth,
         reserve=reserve,
+        second_checker=second_checker,
     )
     return plan_question(question, should_stop)
 
@@ -175,14 +181,14 @@ def plan_question(
     )
 
 
-def warm_up(arm: ArmModel, options: TreeOptions) -> None:
+def warm_up(arm: ArmModel, options: TreeOptions, second_checker: str = 'fcl') -> None:
     """
     Plan once round a small box, so that every kernel is compiled and loaded.
 
     Raises
     ------
     ModelError
-        The arm cannot point.
+        The arm cannot point, or the library of the second checker is not installed.
 
     """
     check_pointing_arm(arm)
@@ -201,6 +207,7 @@ def warm_up(arm: ArmModel, options: TreeOptions) -> None:
         margin=0.0,
         ray_guard_length=1.0,
         seed=0,
+        second_checker=second_checker,
     )
     jit.mark_compiled()
 

@@ -32,7 +32,7 @@ class PlanningTraceback(Exception):
 class Planner(Protocol):
     """Plans, and runs the second collision checker, in this process or in another one."""
 
-    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
+    def warm_up(self, arm: ArmModel, options: TreeOptions, second_checker: str = 'fcl') -> None:
         """Return once plans need no time to load; raise ModelError where the arm cannot point."""
 
     def plan(
@@ -53,6 +53,7 @@ class Planner(Protocol):
         ray_guard_length: float,
         reach: float,
         escape_time: float = 0.0,
+        library: str = 'fcl',
     ) -> Violation | None:
         """Return what `trajectory_validation.violation_seen` returns for the same arguments."""
 
@@ -69,8 +70,8 @@ class PlanningProcess:
 
     Parameters
     ----------
-    arm, options
-        The kernels are loaded for these.
+    arm, options, second_checker
+        Kernels and library are loaded for these.
     on_death : callable
         Called with a sentence after the process has died.
     worker : WorkerProcess, optional
@@ -84,16 +85,17 @@ class PlanningProcess:
         options: TreeOptions,
         on_death: Callable[[str], None] = lambda sentence: None,
         worker: WorkerProcess | None = None,
+        second_checker: str = 'fcl',
     ) -> None:
         """Start it."""
-        self._warm_up, self._on_death = (arm, options), on_death
+        self._warm_up, self._on_death = (arm, options, second_checker), on_death
         self._start(worker or WorkerProcess())
 
-    def warm_up(self, arm: ArmModel, options: TreeOptions) -> None:
+    def warm_up(self, arm: ArmModel, options: TreeOptions, second_checker: str = 'fcl') -> None:
         """As of `Planner`."""
-        if self._warm_up != (arm, options):
-            self._warm_up = arm, options
-            self._begin('warm_up', arm, options)
+        if self._warm_up != (arm, options, second_checker):
+            self._warm_up = arm, options, second_checker
+            self._begin('warm_up', *self._warm_up)
         self._require_ready()
 
     def plan(

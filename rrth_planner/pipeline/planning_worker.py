@@ -26,9 +26,7 @@ def main() -> None:
     _lower_priority()
     channel = Channel(Connection(int(sys.argv[1])))
     if is_compiled():
-        # Without python-fcl the owner ends, and says why.
-        with suppress(ImportError):
-            _planner()
+        _planner()
     # Otherwise the owner compiles all kernels before it asks for anything.
     work: dict[str, Callable[..., Any]] = {
         'warm_up': lambda *arguments: _planner().warm_up(*arguments),

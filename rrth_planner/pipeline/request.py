@@ -4,9 +4,10 @@
 
 from dataclasses import dataclass
 
+from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
-from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, StartState
@@ -28,6 +29,8 @@ class PlanQuestion:
         >= 0.
     escape_depth, reserve : float
         From 0 to 1e4 [m].
+    second_checker : str
+        One of `distance_library.LIBRARIES`.
 
     Raises
     ------
@@ -48,6 +51,7 @@ class PlanQuestion:
     moving: StartState | None = None
     escape_depth: float = 0.05
     reserve: float = 0.0
+    second_checker: str = 'fcl'
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -68,5 +72,9 @@ class PlanQuestion:
                 raise OptionsError(
                     f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]'
                 )
+        if self.second_checker not in LIBRARIES:
+            raise OptionsError(
+                f'second_checker: {shown(self.second_checker)}, expected {" or ".join(LIBRARIES)}'
+            )
         if self.seed < 0:
             raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')

@@ -96,6 +96,7 @@ def time_path(
         question.ray_guard_length,
         reach_to(question.arm, question.goal.target, path.waypoints[-1]),
         escape_time,
+        question.second_checker,
     )
     if should_stop():
         return CANCELLED

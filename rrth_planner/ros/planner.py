@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The planner as a ROS 2 node: its services, start and shutdown."""
 
-from importlib.util import find_spec
 import signal
 from threading import Event
 import time
@@ -16,7 +15,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rrth_planner.model.errors import MessageError, ModelError, RrthError
+from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.ros.interface.parameters import (
     current_parameters,
@@ -61,7 +60,7 @@ class PlannerNode(Node):
         Raises
         ------
         RrthError
-            A rejected parameter, an arm that cannot point, no python-fcl.
+            A rejected parameter, an arm that cannot point, no library for the second checker.
 
         """
         super().__init__(NAME, **kwargs)
@@ -71,11 +70,15 @@ class PlannerNode(Node):
 
         # It loads in parallel to the node.
         self._planner: Planner = planner or PlanningProcess(
-            parameters.arm, parameters.options, self.get_logger().error, worker
+            parameters.arm,
+            parameters.options,
+            self.get_logger().error,
+            worker,
+            parameters.second_checker,
         )
         try:
             self._create_components(parameters)
-            self._planner.warm_up(parameters.arm, parameters.options)
+            self._planner.warm_up(parameters.arm, parameters.options, parameters.second_checker)
         except BaseException:
             self._planner.close()
             raise
@@ -127,19 +130,19 @@ class PlannerNode(Node):
         """Compile all kernels, in processes of their own where there is a cache."""
         from rrth_planner.kernels.precompile import prepare_kernels
 
-        if find_spec('fcl') is None:
-            raise ModelError(
-                'python-fcl: not installed, expected for the second check of every motion '
-                '(pip install python-fcl)'
-            )
         prepare_kernels(self.get_logger().info)
 
     def _on_parameters(self, _: Any) -> None:
         before = self._reporter.parameters
         now = self._reporter.parameters = current_parameters(self, before.arm)
-        if type(now.options) is not type(before.options):
+        if (
+            type(now.options) is not type(before.options)
+            or now.second_checker != before.second_checker
+        ):
             # Not within the time of the next plan; requests wait until it is done.
-            self._queue.prepare(lambda: self._planner.warm_up(now.arm, now.options))
+            self._queue.prepare(
+                lambda: self._planner.warm_up(now.arm, now.options, now.second_checker)
+            )
 
     async def _on_plan(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         found = await self._queue.respond(None)

@@ -97,7 +97,7 @@ def test_a_disagreement_that_happens_again_is_reproduced(monkeypatch, capsys):
     disagree(monkeypatch)
     assert replay.replay(incident) == 0
     out = capsys.readouterr().out
-    assert 'python-fcl: ray at 0.0123000 m from "head" at 0.2500 s' in out
+    assert 'second checker, fcl: ray at 0.0123000 m from "head" at 0.2500 s' in out
     assert out.splitlines()[-1].startswith('reproduced: ')
 
 
@@ -174,9 +174,9 @@ def test_all_checkers_agree_on_every_piece(monkeypatch):
         assert (piece.begin, piece.end) == tuple(trajectory.times[i : i + 2])
     for piece in comparison.pieces:
         assert piece.certificate == 'proven'
-        assert piece.begin <= piece.fcl.time <= piece.end + 1e-12
+        assert piece.begin <= piece.second.time <= piece.end + 1e-12
         # They sample nearly the same instants.
-        assert piece.fcl.distance == pytest.approx(piece.reference, abs=1e-4)
+        assert piece.second.distance == pytest.approx(piece.reference, abs=1e-4)
     assert comparison.clearance >= MARGIN
 
 
@@ -237,7 +237,7 @@ def test_versions_that_differ_are_named(monkeypatch, capsys):
         (None, 'No such file'),
         ('a: [', 'expected a readable YAML file'),
         ('', 'incident: None, expected a mapping'),
-        ('format: 9', 'format: 9, expected 3'),
+        ('format: 9', 'format: 9, expected 4'),
         ('\x00', 'expected a readable YAML file'),
         ('[' * 900, 'or 20 in one another; expected a readable YAML file'),
     ],

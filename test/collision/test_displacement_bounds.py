@@ -4,7 +4,7 @@
 
 from hypothesis import given, strategies as st
 import numpy as np
-from rrth_planner.collision.fcl_checker import displacements
+from rrth_planner.collision.second_checker import displacements
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import examples, oracle_bars, random_chain, table_1_arm
 

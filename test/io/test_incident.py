@@ -220,7 +220,7 @@ del_ = object()
 @pytest.mark.parametrize(
     ('path', 'value', 'sentence'),
     [
-        (('format',), 1, 'format: 1, expected 3'),
+        (('format',), 1, 'format: 1, expected 4'),
         (('kind',), 'storm', "kind: 'storm', expected disagreement or error"),
         (('kind',), [], 'kind: '),
         (('question',), None, 'question: None, expected a mapping'),

@@ -47,7 +47,7 @@ from worlds import (
 )
 
 pytest.importorskip('fcl')
-from rrth_planner.collision import fcl_checker, trajectory_validation  # noqa: E402
+from rrth_planner.collision import second_checker, trajectory_validation  # noqa: E402
 from rrth_planner.pipeline import plan_motion  # noqa: E402
 
 ESCAPE_DEPTH, TARGET = 0.05, [1.5, 0.0, 0.3]
@@ -514,7 +514,7 @@ def test_a_target_in_the_wearer_is_rejected_wherever_the_arm_is():
 
 def second_opinion(arm, scene, world, trajectory):
     depths = escape_depths(world, trajectory.positions[0])
-    return fcl_checker.first_escape_violation(
+    return second_checker.first_escape_violation(
         arm, scene, depths, trajectory, trajectory.duration, MARGIN, RAY
     )
 

@@ -45,7 +45,6 @@ LIBRARIES = {
 }
 # What single modules import beyond that.
 OWN = {
-    'rrth_planner.collision.fcl_objects': {'fcl'},
     'rrth_planner.io.motion_capture_file': {'pybvh', 'c3d'},
     'rrth_planner.io.resources': {'ament_index_python'},
     'rrth_planner.io.text_file': {'yaml'},
@@ -60,9 +59,9 @@ OWN = {
 }
 # The live viewer shows what a node of its own hears.
 FEED = ('rrth_planner.visualization.viewer.live_page', 'rrth_planner.ros.client.viewer_feed')
-# Who may import python-fcl, by way of its checker.
-FCL_USERS = {
-    'rrth_planner.collision.fcl_checker',
+# Who may use the second checker.
+SECOND_USERS = {
+    'rrth_planner.collision.second_checker',
     'rrth_planner.collision.trajectory_validation',
     'rrth_planner.collision.checker_comparison',
 }
@@ -137,8 +136,8 @@ def test_a_module_imports_only_what_its_package_may(module):
         assert may_import(module, name), f'{module} may not import {name}'
         if name.startswith('rrth_planner') and module not in LATE:
             assert is_top, f'{module} imports {name} below the top'
-        if name.startswith('rrth_planner.collision.fcl_'):
-            assert module in FCL_USERS, f'{module} imports {name}'
+        if name == 'rrth_planner.collision.second_checker':
+            assert module in SECOND_USERS, f'{module} imports {name}'
 
 
 def graph_of_modules():
@@ -171,8 +170,8 @@ def test_the_rooms_are_those_of_the_table():
     }
 
 
-def test_the_fcl_checker_shares_nothing_with_the_certificate():
-    graph, found = graph_of_modules(), {'rrth_planner.collision.fcl_checker'}
+def test_the_second_checker_shares_nothing_with_the_certificate():
+    graph, found = graph_of_modules(), {'rrth_planner.collision.second_checker'}
     while new := {name for module in found for name in graph[module]} - found:
         found |= new
     assert not [name for name in found if 'certificate' in name]

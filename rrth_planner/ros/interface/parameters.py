@@ -10,6 +10,7 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rrth_planner.collision.distance_library import LIBRARIES, require_library
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.settings import (
     HIGHEST_LIMIT,
@@ -38,6 +39,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
     latency = 'age at reception of a body without stamp'
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
+    second = 'library behind the second check of every motion'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
         Setting('base_frame', 'torso', 'frame id', 'frame of the wearer', is_read_only=True),
@@ -47,6 +49,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('ray_guard_length', 1.0, 'm', ray, 0.0, 100.0),
         Setting('reserve', 0.05, 'm', reserve, 0.0, 1.0),
         Setting('escape_depth', 0.05, 'm', escape, 0.0, 1.0),
+        Setting('second_checker', 'fcl', ' or '.join(LIBRARIES), second),
         Setting('max_velocity', [1.5] * dof, 'rad/s', f'greatest velocity {each}', *limit),
         Setting(
             'max_acceleration', [4.0] * dof, 'rad/s^2', f'greatest acceleration {each}', *limit
@@ -103,9 +106,12 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     ------
     OptionsError
         The first value that is rejected: its name, what was given, what is expected, the unit.
+    ModelError
+        The library of the second checker is not installed.
 
     """
     settings = settings_from_values(values, arm.dof)
+    require_library(settings.second_checker)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
     own = (

@@ -83,7 +83,8 @@ def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
         return None
     parameters, trajectory = stop.parameters, stop.trajectory
     arm, margin, ray = parameters.arm, parameters.margin, parameters.ray_guard_length
-    violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray)
+    library = parameters.second_checker
+    violation = planner.violation_seen(arm, stop.scene, trajectory, margin, ray, ray, 0.0, library)
     if violation is None:
         return None
     question = PlanQuestion(
@@ -98,5 +99,6 @@ def incident_of_stop(stop: Stop, planner: Planner) -> Incident | None:
         seed=max(0, parameters.seed),
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,
+        second_checker=parameters.second_checker,
     )
     return disagreement_incident(question, Disagreement(trajectory, violation))

@@ -192,4 +192,5 @@ def _question(
         moving=None if handover is None else handover.start_state,
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,
+        second_checker=parameters.second_checker,
     )

@@ -75,6 +75,7 @@ class Revalidation:
             parameters.ray_guard_length,
             self._target_distance,
             self.plan.escape_time,
+            parameters.second_checker,
         )
         if violation is None:
             return None

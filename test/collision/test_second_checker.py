@@ -1,12 +1,16 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""python-fcl agrees with the kernels and with the reference checker."""
+"""python-fcl and coal agree with the kernels and with the reference checker."""
 
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rrth_planner.collision import second_checker
 from rrth_planner.collision.bar_pairs import pair_names, pairs_of
+from rrth_planner.collision.distance_library import LIBRARIES, library_of
 from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import bars_of, mount_bars, tool_pose
@@ -23,8 +27,16 @@ from worlds import (
     wearer,
 )
 
-fcl_check = pytest.importorskip('rrth_planner.collision.fcl_checker', exc_type=ImportError)
-fcl_shapes = pytest.importorskip('rrth_planner.collision.fcl_objects', exc_type=ImportError)
+
+@pytest.fixture(params=LIBRARIES)
+def checker(request):
+    """Give the functions of the second checker by each library."""
+    pytest.importorskip(request.param)
+    return SimpleNamespace(
+        nearest=partial(second_checker.nearest, library=request.param),
+        first_violation=partial(second_checker.first_violation, library=request.param),
+        library=library_of(request.param),
+    )
 
 
 def straight(q_from, q_to, duration=1.0):
@@ -38,12 +50,12 @@ def straight(q_from, q_to, duration=1.0):
     )
 
 
-def check_nearest(arm, scene, rng, n):
+def check_nearest(checker, arm, scene, rng, n):
     world = arm_world(arm, scene, 0.0, 1.0)
     n_apart = 0
     for q in rng.uniform(*arm.bounds, (n, arm.dof)):
         distances = world.clearances(q)
-        violation = fcl_check.nearest(arm, scene, q, 1.0)
+        violation = checker.nearest(arm, scene, q, 1.0)
         least = distances.min()
         if least > 1e-4:
             n_apart += 1
@@ -57,23 +69,25 @@ def check_nearest(arm, scene, rng, n):
     return n_apart
 
 
-def test_nearest_is_the_kernels_least_clearance():
+def test_nearest_is_the_kernels_least_clearance(checker):
     rng = np.random.default_rng(21)
     arm = table_1_arm()
-    assert check_nearest(arm, wearer(), rng, 400) > 200
+    assert check_nearest(checker, arm, wearer(), rng, 400) > 200
     for _ in range(4):
-        assert check_nearest(arm, varied_body(rng), rng, 150) > 50
+        assert check_nearest(checker, arm, varied_body(rng), rng, 150) > 50
 
 
-def test_nearest_of_thick_and_sliding_chains_is_the_kernels():
+def test_nearest_of_thick_and_sliding_chains_is_the_kernels(checker):
     rng = np.random.default_rng(22)
     n_apart = 0
     for i in range(15):
-        n_apart += check_nearest(compiled_chain(rng, i % 2 == 0), random_boxes(rng, 3), rng, 30)
+        n_apart += check_nearest(
+            checker, compiled_chain(rng, i % 2 == 0), random_boxes(rng, 3), rng, 30
+        )
     assert n_apart > 100
 
 
-def test_contacts_deeper_than_a_millimetre_are_found():
+def test_contacts_deeper_than_a_millimetre_are_found(checker):
     rng = np.random.default_rng(23)
     arm = table_1_arm()
     n_touching = n_free = 0
@@ -84,7 +98,7 @@ def test_contacts_deeper_than_a_millimetre_are_found():
         trajectory = straight(q_from, q_to)
         dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 4001))
         curve = np.stack([q_from, q_to - q_from])
-        violation = fcl_check.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
+        violation = checker.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
         # Round corners: what the grown boxes touch only at their edges may pass the margin.
         if min(world.clearances(q).min() for q in dense[::8]) < -0.0125:
             assert violation is not None
@@ -118,17 +132,17 @@ def wiggle(rng, arm, scale):
     )
 
 
-def first_touch_by_brute_force(arm, scene, trajectory, margin, ray):
+def first_touch_by_brute_force(checker, arm, scene, trajectory, margin, ray):
     """Return the time of the first millisecond at which the library finds less, or None."""
-    n = int(np.ceil(trajectory.duration / fcl_check.PERIOD))
+    n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
     times = np.linspace(0.0, trajectory.duration, n + 1)
     for time, q in zip(times, sample(trajectory, times)[0], strict=True):
-        if fcl_check.nearest(arm, scene, q, ray).distance < margin - fcl_check.TOLERANCE:
+        if checker.nearest(arm, scene, q, ray).distance < margin - second_checker.TOLERANCE:
             return time
     return None
 
 
-def test_the_first_violation_is_that_of_a_check_every_millisecond():
+def test_the_first_violation_is_that_of_a_check_every_millisecond(checker):
     rng = np.random.default_rng(24)
     n_touching = n_free = 0
     for i in range(120):
@@ -139,12 +153,12 @@ def test_the_first_violation_is_that_of_a_check_every_millisecond():
             scale = rng.choice([0.3, 1.0, 3.0])
             trajectory = wiggle(rng, arm, scale)
             start, _, _ = sample(trajectory, [0.0])
-            if fcl_check.nearest(arm, scene, start[0], 0.5).distance < 0.02:
+            if checker.nearest(arm, scene, start[0], 0.5).distance < 0.02:
                 continue
             # Touching by as little as can be, and not touching by as little, too.
             margin = rng.choice([0.0, 0.02, 0.1])
-            expected = first_touch_by_brute_force(arm, scene, trajectory, margin, 0.5)
-            violation = fcl_check.first_violation(arm, scene, trajectory, margin, 0.5, 0.5)
+            expected = first_touch_by_brute_force(checker, arm, scene, trajectory, margin, 0.5)
+            violation = checker.first_violation(arm, scene, trajectory, margin, 0.5, 0.5)
             assert (violation and violation.time) == expected
             n_touching += expected is not None
             n_free += expected is None
@@ -152,25 +166,25 @@ def test_the_first_violation_is_that_of_a_check_every_millisecond():
     assert n_free > 40
 
 
-def test_a_violation_of_one_instant_is_found():
+def test_a_violation_of_one_instant_is_found(checker):
     rng = np.random.default_rng(25)
     arm, n_found = table_1_arm(), 0
     for _ in range(40):
         scene = varied_body(rng)
         trajectory = wiggle(rng, arm, 1.0)
-        n = int(np.ceil(trajectory.duration / fcl_check.PERIOD))
+        n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
         times = np.linspace(0.0, trajectory.duration, n + 1)
         q, _, _ = sample(trajectory, times)
-        least = [fcl_check.nearest(arm, scene, one, 1.0).distance for one in q]
+        least = [checker.nearest(arm, scene, one, 1.0).distance for one in q]
         lowest = int(np.argmin(least))
         if least[lowest] < 0.0:
             continue
         n_found += 1
-        margin = least[lowest] + 2 * fcl_check.TOLERANCE
-        violation = fcl_check.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
+        margin = least[lowest] + 2 * second_checker.TOLERANCE
+        violation = checker.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
         assert violation is not None
-        assert violation.distance == pytest.approx(least[lowest], abs=2 * fcl_check.TOLERANCE)
-        assert fcl_check.first_violation(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
+        assert violation.distance == pytest.approx(least[lowest], abs=2 * second_checker.TOLERANCE)
+        assert checker.first_violation(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
     assert n_found > 10
 
 
@@ -181,33 +195,33 @@ def plate_beside(arm, q, gap):
     return Scene((Box('plate', center, (0.1, 0.2, 0.4), T[:3, :3]),))
 
 
-def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre():
+def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre(checker):
     arm = table_1_arm()
     q = np.array([0.3, -1.2, 0.4, 0.7])
     hold = straight(q, q)
     for gap in (0.01, 0.02, 0.05):
         scene = plate_beside(arm, q, gap)
-        assert fcl_check.first_violation(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
-        violation = fcl_check.first_violation(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
+        assert checker.first_violation(arm, scene, hold, gap - 1e-5, 1.0, 0.5) is None
+        violation = checker.first_violation(arm, scene, hold, gap + 1e-5, 1.0, 0.5)
         assert violation is not None
         assert (violation.time, violation.bar, violation.box) == (0.0, 'pointing ray', 'plate')
         assert violation.distance == pytest.approx(gap, abs=5e-6)
 
 
-def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over():
+def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over(checker):
     arm = table_1_arm()
     q_from, q_to = np.array([-1.5, -0.8, 0.0, 0.5]), np.array([1.5, -0.8, 0.0, 0.5])
     T = tool_pose(arm, np.array([0.31, -0.8, 0.0, 0.5]))
     thin = Scene((Box('blade', T[:3, 3] + 0.9 * T[:3, 2], (0.002,) * 3, np.eye(3)),))
     for duration in (0.3, 1.0, 5.0):
-        violation = fcl_check.first_violation(
+        violation = checker.first_violation(
             arm, thin, straight(q_from, q_to, duration), 0.02, 1.0, 1.0
         )
         assert violation is not None
         assert violation.box == 'blade'
 
 
-def test_only_at_the_end_the_ray_counts_out_to_the_target():
+def test_only_at_the_end_the_ray_counts_out_to_the_target(checker):
     arm = table_1_arm()
     q_from, q_to = np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5])
 
@@ -216,26 +230,27 @@ def test_only_at_the_end_the_ray_counts_out_to_the_target():
         return Scene((Box('far', T[:3, 3] + 1.8 * T[:3, 2], (0.1,) * 3, np.eye(3)),))
 
     trajectory = straight(q_from, q_to)
-    assert fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
-    violation = fcl_check.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
+    assert checker.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 1.5) is None
+    violation = checker.first_violation(arm, far_box(q_to), trajectory, 0.02, 1.0, 2.0)
     assert violation is not None
     assert violation.time == trajectory.duration
     middle = 0.5 * (q_from + q_to)
-    assert fcl_check.first_violation(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
+    assert checker.first_violation(arm, far_box(middle), trajectory, 0.02, 1.0, 2.0) is None
 
 
-def test_nothing_collides_where_there_is_nothing():
+def test_nothing_collides_where_there_is_nothing(checker):
     arm = table_1_arm()
     trajectory = straight(np.array([-0.5, -0.8, 0.0, 0.5]), np.array([0.5, -0.8, 0.0, 0.5]))
-    assert fcl_check.first_violation(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
+    assert checker.first_violation(arm, Scene(()), trajectory, 0.02, 1.0, 1.0) is None
 
 
-def test_objects_of_the_library_are_used_again(monkeypatch):
+def test_objects_of_the_library_are_used_again(checker, monkeypatch):
     rng = np.random.default_rng(26)
     arm = table_1_arm()
     bodies = [random_boxes(rng, 1 + i) for i in range(12)]
     q_from, q_to = np.array([-1.5, -0.8, 0.0, 0.5]), np.array([1.5, -1.6, 0.6, 0.5])
-    made, new = [], fcl_shapes.fcl.CollisionObject
+    made, library = [], checker.library._module
+    new = library.CollisionObject
 
     def counted(*arguments):
         made.append(arguments)
@@ -244,7 +259,7 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
     def look():
         motion = straight(q_from, q_to)
         violations = [
-            fcl_check.first_violation(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies
+            checker.first_violation(arm, body, motion, 0.05, 1.0, 1.5) for body in bodies
         ]
         return [
             violation and (violation.time, violation.distance, violation.bar, violation.box)
@@ -252,7 +267,7 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
         ]
 
     before = look()
-    monkeypatch.setattr(fcl_shapes.fcl, 'CollisionObject', counted)
+    monkeypatch.setattr(library, 'CollisionObject', counted)
     assert look() == before
     # Each that is deleted would leave some bytes behind.
     assert not made
@@ -261,17 +276,17 @@ def test_objects_of_the_library_are_used_again(monkeypatch):
 
 
 @pytest.mark.parametrize('seed', [0, 2])
-def test_capsules_are_as_far_from_boxes_as_by_the_kernels(seed):
+def test_capsules_are_as_far_from_boxes_as_by_the_kernels(checker, seed):
     arm = capsule_arm(np.random.default_rng(seed))
     names = sorted({bar.name for bar in (*bars_of(arm), *mount_bars(arm))})
     rng = np.random.default_rng(30 + seed)
     allowed = replace(arm, allowed=((names[1], 'box_0'), (names[-2], 'box_1')))
     for one in (arm, allowed):
-        assert check_nearest(one, random_boxes(rng, 3), rng, 60) > 20
+        assert check_nearest(checker, one, random_boxes(rng, 3), rng, 60) > 20
 
 
 @pytest.mark.parametrize('seed', [0, 2, 3])
-def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(seed):
+def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(checker, seed):
     arm, rng = capsule_arm(np.random.default_rng(seed)), np.random.default_rng(40 + seed)
     nothing, n_free, n_touching = Scene(()), 0, 0
     pairs = {frozenset(pair_names(arm, pair)) for pair in pairs_of(arm)}
@@ -288,7 +303,7 @@ def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(seed)
             ).min()
             for p in pairs_of(arm)
         )
-        violation = fcl_check.first_violation(arm, nothing, trajectory, 0.02, 0.4, 0.4)
+        violation = checker.first_violation(arm, nothing, trajectory, 0.02, 0.4, 0.4)
         if least > 1e-4:
             n_free += 1
             assert violation is None or least < 5e-3

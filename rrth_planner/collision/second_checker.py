@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The independent check of a trajectory, by the Flexible Collision Library (python-fcl)."""
+"""The independent check of a trajectory, by a library of distances: python-fcl or coal."""
 
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.bar_pairs import pairs_of
-from rrth_planner.collision.fcl_objects import boxes_of, DOUBT, PlacedBar, PlacedPair
+from rrth_planner.collision.distance_library import DOUBT
+from rrth_planner.collision.distance_objects import boxes_of, PlacedBar, PlacedPair
 from rrth_planner.collision.violation import Violation
 from rrth_planner.model.arm import ArmModel, bars_of, forward_kinematics, is_called
 from rrth_planner.model.arrays import Array
@@ -38,12 +39,14 @@ _THIRD = np.array([[6.0, 0.0, 0.0], [6.0, 12.0, 0.0], [6.0, 24.0, 60.0]])
 _CHORD = 0.125 / INTERVALS**2
 
 
-def nearest(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Violation:
+def nearest(
+    arm: ArmModel, scene: Scene, q: Array, ray_length: float, library: str = 'fcl'
+) -> Violation:
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
-    boxes, poses = boxes_of(scene), forward_kinematics(arm, q)
+    boxes, poses = boxes_of(scene, library), forward_kinematics(arm, q)
     least, where = math.inf, ('', '')
     for k in range(len(bars_of(arm))):
-        bar = PlacedBar(arm, k, ray_length)
+        bar = PlacedBar(arm, k, ray_length, library)
         distance, box = bar.nearest(boxes, _unknown(arm, scene, bar.name), q, poses)
         if distance < least:
             least, where = distance, (bar.name, box)
@@ -116,17 +119,23 @@ class _Advancement:
     """Conservative advancement along a trajectory, and the first violation found."""
 
     def __init__(
-        self, arm: ArmModel, scene: Scene, trajectory: Trajectory, margin: float, ray_length: float
+        self,
+        arm: ArmModel,
+        scene: Scene,
+        trajectory: Trajectory,
+        margin: float,
+        ray_length: float,
+        library: str,
     ) -> None:
         self._arm, self._trajectory, self._margin = arm, trajectory, margin
-        self._boxes = boxes_of(scene)
+        self._library, self._boxes = library, boxes_of(scene, library)
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.displacements = displacements(arm, trajectory, self._times, ray_length)
-        self.bars = [PlacedBar(arm, k, ray_length) for k in range(len(bars_of(arm)))]
+        self.bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
         self.parts: list[_Part] = [*self.bars]
         self.parts += [
-            PlacedPair(arm, pair, len(self.bars) + n, ray_length)
+            PlacedPair(arm, pair, len(self.bars) + n, ray_length, library)
             for n, pair in enumerate(pairs_of(arm))
         ]
         unknown = [_unknown(arm, scene, bar.name) for bar in self.bars]
@@ -160,9 +169,9 @@ class _Advancement:
     def take_end(self, reach: float) -> None:
         """Take samples of the pointing ray at the end, as far as the target [m]."""
         ray = self.bars[-1].k
-        parts: list[_Part] = [PlacedBar(self._arm, ray, reach)]
+        parts: list[_Part] = [PlacedBar(self._arm, ray, reach, self._library)]
         parts += [
-            PlacedPair(self._arm, pair, len(self.bars) + n, reach)
+            PlacedPair(self._arm, pair, len(self.bars) + n, reach, self._library)
             for n, pair in enumerate(pairs_of(self._arm))
             if pair.outer == ray
         ]
@@ -189,6 +198,7 @@ def first_violation(
     margin: float,
     ray_guard_length: float,
     reach: float,
+    library: str = 'fcl',
 ) -> Violation | None:
     """
     Return the first clearance violation of a trajectory, or None.
@@ -199,9 +209,10 @@ def first_violation(
     or proven free.
 
     The scene is in the base frame. margin: distance to keep from every box; ray_guard_length,
-    reach: how much of the ray must stay clear in motion, and at the end [m].
+    reach: how much of the ray must stay clear in motion, and at the end [m]; library: name of one
+    of `distance_library.LIBRARIES`.
     """
-    advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length)
+    advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length, library)
     end = advancement.last
     starts = sorted({0, end // 2, end})
     samples = iter(
@@ -233,6 +244,7 @@ def first_escape_violation(
     escape_time: float,
     margin: float,
     ray_guard_length: float,
+    library: str = 'fcl',
 ) -> Violation | None:
     """
     Return the first violation of a motion that escapes from boxes, or None.
@@ -246,7 +258,7 @@ def first_escape_violation(
     if escape_time == 0.0:
         return None
     escape = part_of(trajectory, 0.0, escape_time)
-    is_void = _entered(arm, scene, trajectory.positions[0], ray_guard_length)
+    is_void = _entered(arm, scene, trajectory.positions[0], ray_guard_length, library)
     violations = []
     for ray, depth in ((0.0, depths[0]), (ray_guard_length, depths.max(axis=0))):
         boxes: list[Box] = []
@@ -260,7 +272,7 @@ def first_escape_violation(
                 return Violation(0.0, by, 'the arm', box.name)
             boxes.append(Box(box.name, box.center, size, box.rotation))
             kept[box.name] = max(by, kept.get(box.name, by))
-        violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray, 0.0)
+        violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray, 0.0, library)
         if violation is not None:
             if not violation.is_of_arm:
                 distance = violation.distance - APART + kept[violation.box]
@@ -269,7 +281,9 @@ def first_escape_violation(
     return min(violations, key=lambda violation: violation.time, default=None)
 
 
-def _entered(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> NDArray[np.bool_]:
+def _entered(
+    arm: ArmModel, scene: Scene, q: Array, ray_length: float, library: str
+) -> NDArray[np.bool_]:
     """Return which boxes the pointing ray is in at q, shape (dof,)."""
     # As in the separating axes, its radius grows the boxes.
     radius = float(arm.radii[-1])
@@ -277,7 +291,7 @@ def _entered(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> NDArra
         Box(box.name, box.center, box.size + 2.0 * radius, box.rotation) for box in scene.boxes
     ]
     distances = np.full(len(grown), -math.inf)
-    ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length)
-    ray.nearest(boxes_of(Scene(tuple(grown))), distances, q, forward_kinematics(arm, q))
+    ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length, library)
+    ray.nearest(boxes_of(Scene(tuple(grown)), library), distances, q, forward_kinematics(arm, q))
     found: NDArray[np.bool_] = distances <= DOUBT
     return found

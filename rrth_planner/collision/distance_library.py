@@ -1,0 +1,130 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Libraries of distances between boxes and capsules: python-fcl and coal, whichever is chosen."""
+
+from collections.abc import Callable
+import functools
+from importlib import import_module
+from importlib.util import find_spec
+import math
+from typing import Any
+
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import ModelError
+from rrth_planner.model.scene import Box
+
+# Module and package of each, by the name of the choice.
+LIBRARIES = {'fcl': 'python-fcl', 'coal': 'coal'}
+# Bars become capsules this thin, and their radius is taken off the distance: of thick ones fcl
+# overestimates it by up to half a millimetre. Then both are good to a few micrometres, rarely
+# worse; this bound covers it [m].
+THINNEST, DOUBT = 1e-6, 1e-3
+
+
+class Shape:
+    """A geometry of a library and its object, pooled for reuse."""
+
+    def __init__(self, geometry: Any, item: Any) -> None:
+        """Keep both."""
+        self.geometry, self.item = geometry, item
+
+
+class DistanceLibrary:
+    """
+    Boxes and thin capsules of one library, and the distances between them.
+
+    Shapes are pooled: python-fcl 0.7 does not free an object wholly, since the counter of its
+    shared pointer stays. Append and pop are atomic for all threads.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Load the library of that name, which is installed."""
+        self._module = import_module(name)
+        self._boxes: list[Shape] = []
+        self._capsules: list[Shape] = []
+        if name == 'fcl':
+            # No distance is less than this result, so fcl spends no time filling it in.
+            result = self._module.DistanceResult(-math.inf)
+            self._distance = self._module.distance
+            self._arguments = (self._module.DistanceRequest(), result)
+        else:
+            request = self._module.DistanceRequest()
+            # Nobody asks how deep a contact is.
+            request.enable_signed_distance = False
+            self._distance = _coal_distance(self._module)
+            self._arguments = (request, self._module.DistanceResult())
+        self._is_fcl = name == 'fcl'
+
+    def placed_box(self, box: Box) -> Shape:
+        """Return a shape of a box where it is."""
+        shape = self._taken(self._boxes, lambda: self._module.Box(1.0, 1.0, 1.0))
+        if self._is_fcl:
+            shape.geometry.side = box.size
+        else:
+            shape.geometry.halfSide = 0.5 * box.size
+        shape.geometry.computeLocalAABB()
+        self.place(shape, box.rotation, box.center)
+        return shape
+
+    def capsule(self, length: float) -> Shape:
+        """Return a shape of a thin capsule along its own z, centred."""
+        shape = self._taken(self._capsules, lambda: self._module.Capsule(THINNEST, 1.0))
+        self.stretch(shape, length)
+        return shape
+
+    def stretch(self, capsule: Shape, length: float) -> None:
+        """Give a capsule a length [m]."""
+        if self._is_fcl:
+            capsule.geometry.lz = length
+        else:
+            capsule.geometry.halfLength = 0.5 * length
+        capsule.geometry.computeLocalAABB()
+
+    def place(self, shape: Shape, rotation: Array, center: Array) -> None:
+        """Move a shape."""
+        shape.item.setRotation(rotation)
+        shape.item.setTranslation(center)
+
+    def distance(self, one: Shape, other: Shape) -> float:
+        """Return the distance of two shapes [m]; 0 or less where they meet."""
+        found: float = self._distance(one.item, other.item, *self._arguments)
+        return found
+
+    def release(self, shapes: list[Shape], *, are_boxes: bool) -> None:
+        """Take shapes back that nobody uses any more."""
+        (self._boxes if are_boxes else self._capsules).extend(shapes)
+
+    def _taken(self, spare: list[Shape], make: Callable[[], Any]) -> Shape:
+        try:
+            return spare.pop()
+        except IndexError:
+            geometry = make()
+            return Shape(geometry, self._module.CollisionObject(geometry))
+
+
+def require_library(name: str) -> None:
+    """Raise ModelError where a library of distances is unknown or not installed."""
+    if name not in LIBRARIES:
+        raise ModelError(f'second_checker: "{name}", expected {" or ".join(LIBRARIES)}')
+    if find_spec(name) is None:
+        package = LIBRARIES[name]
+        raise ModelError(
+            f'second_checker: {package} is not installed, expected for the second check of every '
+            f'motion (pip install {package})'
+        )
+
+
+@functools.lru_cache
+def library_of(name: str) -> DistanceLibrary:
+    """Return the library of a name, or raise ModelError where it is unknown or not installed."""
+    require_library(name)
+    return DistanceLibrary(name)
+
+
+def _coal_distance(coal: Any) -> Callable[..., float]:
+    def distance(one: Any, other: Any, request: Any, result: Any) -> float:
+        result.clear()
+        found: float = coal.distance(one, other, request, result)
+        return found
+
+    return distance
