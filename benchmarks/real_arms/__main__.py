@@ -36,6 +36,8 @@ from benchmarks.common.random_draws import free_configurations, random_target
 MARGIN, RAY = 0.02, 0.5
 # Between two instants that are judged [rad].
 SPACING = 0.02
+# No point of a mesh is further from an axis that moves it [m].
+FARTHEST = 2.0
 # File below the folder of robots, tool link and its ray.
 ARMS = {
     'panda': ('panda_description/urdf/panda.urdf', 'panda_hand', '+z'),
@@ -62,15 +64,20 @@ class Judge:
         length = np.abs(np.diff(trajectory.positions, axis=0)).sum(axis=1).sum()
         times = np.linspace(0.0, trajectory.duration, int(length / SPACING) + 2)
         data, shapes = self.model.createData(), pin.GeometryData(self.geometry)
-        least, colliding = np.inf, set()
+        least, colliding, before = np.inf, set(), None
+        # Lower bounds of the distances from boxes: what cannot be the least is not asked.
+        bounds = np.full(self.n_boxes, -np.inf)
         for positions in positions_at(trajectory, times):
-            q = self.q.copy()
+            if before is not None:
+                bounds -= FARTHEST * np.abs(positions - before).sum()
+            before, q = positions, self.q.copy()
             q[list(self.columns)] = positions
             pin.updateGeometryPlacements(self.model, data, self.geometry, shapes, q)
             for k, pair in enumerate(self.geometry.collisionPairs):
                 if k < self.n_boxes:
-                    result = pin.computeDistance(self.geometry, shapes, k)
-                    least = min(least, result.min_distance)
+                    if bounds[k] < least:
+                        bounds[k] = pin.computeDistance(self.geometry, shapes, k).min_distance
+                        least = min(least, bounds[k])
                 elif pin.computeCollision(self.geometry, shapes, k):
                     objects = self.geometry.geometryObjects
                     colliding.add(f'{objects[pair.first].name} and {objects[pair.second].name}')

@@ -8,6 +8,7 @@ from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import StringIO
 import os
+from pathlib import Path
 import socket
 import sys
 from typing import Any
@@ -21,7 +22,9 @@ from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.text_file import parse_yaml
+from rrth_planner.io.urdf.placed_robot import place_robot, PlacedRobot
 from rrth_planner.io.wearer_file import load_body, WEARER_HELP
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.examples import example_target, start_of
@@ -103,6 +106,12 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
         metavar='NAME',
         help='what makes boxes of that recording (%(default)s)',
     )
+    add(
+        '--urdf',
+        type=Path,
+        metavar='FILE',
+        help='the URDF that the arm was read from: its meshes are shown beside the capsules',
+    )
     add('--live', action='store_true', help='show the running nodes instead of planning')
     add_files(parser, screenshot='save a picture of the page with the arm at the goal, and exit')
     return parser.parse_args(arguments)
@@ -141,7 +150,7 @@ def _run_planning(options: argparse.Namespace) -> None:
         _run_person(options, question, person, skeleton)
         return
     with _served(options) as (server, url):
-        page = ViewerPage(server, question)
+        page = ViewerPage(server, question, _robot(options, arm))
         try:
             if options.screenshot is None:
                 page.run()
@@ -164,7 +173,7 @@ def _run_person(
     from rrth_planner.visualization.viewer.person_page import PersonPage
 
     with _served(options) as (server, url):
-        page = PersonPage(server, question, person, skeleton)
+        page = PersonPage(server, question, person, skeleton, _robot(options, question.arm))
         try:
             if options.screenshot is None:
                 page.run()
@@ -191,7 +200,12 @@ def _run_live(options: argparse.Namespace, ros_args: list[str]) -> None:
         following(options.arm, options.settings, ros_args) as feed,
         _served(options) as (server, _),
     ):
-        LivePage(server, feed).run()
+        LivePage(server, feed, _robot(options, feed.arm)).run()
+
+
+def _robot(options: argparse.Namespace, arm: ArmModel) -> PlacedRobot | None:
+    """Return the robot of --urdf, where the arm is."""
+    return None if options.urdf is None else place_robot(options.urdf, arm)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from rrth_planner.collision.bar_pairs import BarPair
 from rrth_planner.collision.distance_library import DOUBT, library_of, Shape, THINNEST
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule, mount_bars
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.rotation import turned_to
 from rrth_planner.model.scene import Scene
 
 
@@ -62,7 +63,7 @@ class PlacedBar:
             self._offset = float(np.linalg.norm(end - begin))
             self._middle = 0.5 * (begin + end)
             if self._offset > 0.0:
-                self._turn = _turn_to((end - begin) / self._offset)
+                self._turn = turned_to((end - begin) / self._offset)
         else:
             row, kind = bar.source
             is_a, is_ray = kind == 'a', kind == 'd' and row == arm.dof
@@ -123,10 +124,3 @@ class PlacedPair:
         distance = self._library.distance(one, other)
         radii = self._inner.radius + self._outer.radius
         return distance + 2.0 * THINNEST - radii, self._outer.name
-
-
-def _turn_to(z: Array) -> Array:
-    """Return a rotation whose z axis is a unit vector."""
-    x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z], axis=1)

@@ -329,6 +329,13 @@ def reach_to(arm: ArmModel, target: Array, q: Array) -> float:
     return float(np.linalg.norm(target - tool_pose(arm, q)[:3, 3]))
 
 
+def capsule_ends(arm: ArmModel, q: Array) -> Array:
+    """Return the lines of the arm's capsules in the base frame, (n, 2, 3) [m]."""
+    poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
+    ends = [c.ends @ poses[c.link, :3, :3].T + poses[c.link, :3, 3] for c in arm.capsules]
+    return np.array(ends).reshape(-1, 2, 3)
+
+
 def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:
     """Return the distance of the pointing ray from a target of the base frame [m]."""
     T = tool_pose(arm, q)

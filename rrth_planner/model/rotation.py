@@ -74,3 +74,11 @@ def pose_matrix(position: ArrayLike, quaternion: ArrayLike) -> Array:
     T[:3, :3] = rotation_matrix(quaternion)
     T[:3, 3] = position
     return T
+
+
+def turned_to(z: Array) -> Array:
+    """Return a rotation, (3, 3), whose z axis is a unit vector, (3,)."""
+    # Any axis that is not along z will do for the others.
+    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)

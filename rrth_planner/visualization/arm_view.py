@@ -46,13 +46,6 @@ def arm_points(arm: ArmModel, q: Array) -> Array:
     return np.array(points)
 
 
-def capsule_ends(arm: ArmModel, q: Array) -> Array:
-    """Return the lines of the arm's capsules in the base frame, (n, 2, 3) [m]."""
-    poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
-    ends = [c.ends @ poses[c.link, :3, :3].T + poses[c.link, :3, 3] for c in arm.capsules]
-    return np.array(ends).reshape(-1, 2, 3)
-
-
 def ray_of(pose: Array, length: float) -> Array:
     """Return both ends of the pointing ray of a tool pose, (4, 4) -> (2, 3) [m]."""
     return np.array([pose[:3, 3], pose[:3, 3] + length * pose[:3, 2]])

@@ -50,6 +50,7 @@ OWN = {
     'rrth_planner.io.text_file': {'yaml'},
     'rrth_planner.io.urdf.chain': {'yourdfpy', 'trimesh'},
     'rrth_planner.io.urdf.geometry': {'trimesh'},
+    'rrth_planner.io.urdf.placed_robot': {'yourdfpy'},
     'rrth_planner.reproduction.cluster': {'tqdm', 'distributed'},
     'rrth_planner.reproduction.row_store': {'pyarrow'},
     'rrth_planner.ros.client.recorder': {'mcap'},

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages to the core's types and back: round trips, and a sentence for each rejection."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 from hypothesis import given, settings, strategies as st
@@ -11,8 +12,9 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import Point  # noqa: E402
+from rrth_planner.collision.reference_checker import bar_ends_at  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
-from rrth_planner.model.arm import tool_pose  # noqa: E402
+from rrth_planner.model.arm import bars_of, mount_bars, tool_pose  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.model.rotation import pose_matrix, rotation_matrix  # noqa: E402
 from rrth_planner.model.status import PlanStatus  # noqa: E402
@@ -29,6 +31,7 @@ from rrth_planner.ros.messages.frames import FrameError
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import configuration_from_msg, has_joint_of
 from rrth_planner.ros.messages.marker_edits import measured_at, read_edits
+from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import (
     joint_trajectory_from_msg,
     joint_trajectory_to_msg,
@@ -452,3 +455,44 @@ def test_a_bad_frame_has_a_code_of_its_own():
     for other in (ErrorCode.INVALID_GOAL_CONSTRAINTS, ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA):
         assert code_of_rejection(MessageError('x'), other) is other
         assert code_of_rejection(FrameError('x'), other) is ErrorCode.FRAME_TRANSFORM_FAILURE
+
+
+def test_markers_show_capsules_and_what_may_meet():
+    arm = replace(
+        worlds.capsule_arm(np.random.default_rng(0)), allowed=(('base', 'torso'), ('part 2', 'x'))
+    )
+    q = np.linspace(-0.5, 0.5, 7)
+    still = np.zeros((2, 7))
+    trajectory = Trajectory(
+        times=[0.0, 1.0],
+        positions=np.stack([q, -q]),
+        velocities=still,
+        accelerations=still,
+    )
+    path = tool_path_to_msg(arm, trajectory, 'chest', 20)
+    msg = plan_markers(arm, worlds.wearer(), 0.02, trajectory, np.ones(3), path)
+    placed = {}
+    for m in msg.markers[1:]:
+        assert m.header.frame_id == 'chest'
+        assert (m.ns, m.id) not in placed
+        placed[m.ns, m.id] = m
+    for ns, at in (('arm_start_capsules', q), ('arm_goal_capsules', -q)):
+        shown = [m for (name, _), m in placed.items() if name == ns]
+        bars = bars_of(arm)[:-1]
+        lines = np.delete(bar_ends_at(arm, at[None], 1.0)[0], len(bars), axis=0)
+        for line, bar in zip(lines, (*bars, *mount_bars(arm)), strict=True):
+            places = [
+                [m.pose.position.x, m.pose.position.y, m.pose.position.z]
+                for m in shown
+                if m.type == Marker.SPHERE and abs(m.scale.x - 2.0 * bar.radius) < 1e-12
+            ]
+            for end in line:
+                assert np.abs(np.array(places) - end).max(axis=1).min() < 1e-9
+            (height,) = {
+                round(m.scale.z, 9)
+                for m in shown
+                if m.type == Marker.CYLINDER and abs(m.scale.x - 2.0 * bar.radius) < 1e-12
+            }
+            assert height == pytest.approx(np.linalg.norm(line[1] - line[0]), abs=1e-8)
+    text = placed['allowed', 0].text
+    assert text == 'base may meet torso\npart 2 may meet x'

@@ -19,6 +19,7 @@ from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.io.urdf.placed_robot import place_robot
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.errors import OptionsError
@@ -37,6 +38,7 @@ from rrth_planner.visualization.viewer.panel import response_html
 from rrth_planner.visualization.viewer.person_page import PersonPage
 from rrth_planner.visualization.viewer.planning_worker import ViewerModel
 from rrth_planner.visualization.viewer.player import Player
+from rrth_planner.visualization.viewer.scene_view import LAYERS, SceneView
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import excerpt, posture_at
 
@@ -276,6 +278,29 @@ def test_a_missing_browser_is_one_sentence(monkeypatch, tmp_path):
     monkeypatch.setattr(screenshot, 'find_browser', lambda: None)
     with pytest.raises(OptionsError, match='no browser found'):
         screenshot.save_picture('http://127.0.0.1:9', tmp_path / 'a.png')
+
+
+def test_meshes_of_the_urdf_move_with_the_capsules(tmp_path):
+    pytest.importorskip('yourdfpy')
+    file = resource_path('config/examples/chest_arm.urdf')
+    arm = load_arm(resource_path('config/examples/chest_arm.yaml'))
+    robot = place_robot(file, arm)
+    with _served(Namespace(host='127.0.0.1', port=0, open=False, screenshot=None)) as (server, _):
+        view = SceneView(server, arm, 0.5, robot)
+        assert set(view.layers) == {*LAYERS, 'meshes'}
+        for q in np.random.default_rng(0).uniform(*arm.bounds, (5, arm.dof)):
+            view.show_configuration(q, None)
+            names = list(robot.model.actuated_joint_names)
+            shown = dict(zip(names, np.asarray(robot.model.cfg), strict=True))
+            np.testing.assert_allclose([shown[name] for name in arm.joint_names], q)
+
+
+def test_the_urdf_of_another_arm_is_one_sentence(capsys):
+    file = resource_path('config/examples/chest_arm.urdf')
+    assert main(['--urdf', str(file), '--port', '0', '--no-open']) == 1
+    said = capsys.readouterr().err
+    assert 'no joint "joint_1", expected those of the arm' in said
+    assert said.count('\n') == 1
 
 
 @pytest.fixture(name='person_page')

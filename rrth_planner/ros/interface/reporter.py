@@ -146,6 +146,7 @@ class Reporter:
             'least clearance [m]': f'{report.clearance:.4f}',
             'boxes': body.n_boxes,
             'lost parts': body.lost_names(),
+            'allowed contacts': '; '.join(map(': '.join, self.parameters.arm.allowed)),
             'monitor': monitor,
             'last stop': reason,
             'age of body at decisions': self._body_ages,

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from geometry_msgs.msg import Point
 from nav_msgs.msg import Path
 import numpy as np
-from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arm import ArmModel, capsule_ends, forward_kinematics
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.rotation import quaternion_xyzw, turned_to
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import Trajectory
 from visualization_msgs.msg import Marker, MarkerArray
@@ -21,7 +21,12 @@ START: Color = (0.45, 0.45, 0.50, 1.0)
 GOAL: Color = (0.10, 0.35, 0.75, 1.0)
 RAY: Color = (0.90, 0.15, 0.15, 0.9)
 TOOL_PATH: Color = (0.15, 0.60, 0.30, 1.0)
+TEXT: Color = (0.15, 0.15, 0.15, 1.0)
 BAR_WIDTH, LINE_WIDTH = 0.02, 0.006
+# How opaque capsules are, and lengths without a cylinder [m].
+SHADE, SHORTEST = 0.4, 1e-6
+# Of letters, and where they stand above the mount [m].
+TEXT_HEIGHT, TEXT_ABOVE = 0.03, 0.15
 
 
 def plan_markers(
@@ -45,6 +50,9 @@ def plan_markers(
         *(box_marker('body', k, box, BODY, margin) for k, box in enumerate(scene.boxes)),
         _line('arm_start', _points(_bars(arm, q_start)), BAR_WIDTH, START),
         _line('arm_goal', _points(_bars(arm, q_goal)), BAR_WIDTH, GOAL),
+        *_capsules('arm_start_capsules', arm, q_start, (*START[:3], SHADE)),
+        *_capsules('arm_goal_capsules', arm, q_goal, (*GOAL[:3], SHADE)),
+        *_meetings(arm),
         _line('ray', _points((tool, target)), LINE_WIDTH, RAY),
         _line('tool_path', steps, LINE_WIDTH, TOOL_PATH),
     ]
@@ -62,6 +70,34 @@ def _bars(arm: ArmModel, q: Array) -> list[Array]:
             if np.abs(corner - corners[-1]).max() > 1e-9:
                 corners.append(corner)
     return corners
+
+
+def _capsules(ns: str, arm: ArmModel, q: Array, color: Color) -> list[Marker]:
+    """Return the capsules of the arm: cylinders with a sphere at both ends."""
+    markers: list[Marker] = []
+    for (begin, end), capsule in zip(capsule_ends(arm, q), arm.capsules, strict=True):
+        width, length = 2.0 * capsule.radius, float(np.linalg.norm(end - begin))
+        rotation, parts = np.eye(3), [(Marker.SPHERE, begin, width)]
+        if length > SHORTEST:
+            rotation = turned_to((end - begin) / length)
+            middle = 0.5 * (begin + end)
+            parts += [(Marker.SPHERE, end, width), (Marker.CYLINDER, middle, length)]
+        for kind, center, height in parts:
+            marker = _marker(ns, len(markers), kind, color)
+            _place(marker, center, rotation, np.array([width, width, height]))
+            markers.append(marker)
+    return markers
+
+
+def _meetings(arm: ArmModel) -> list[Marker]:
+    """Return what may meet as a text at the mount; nothing where nothing may."""
+    if not arm.allowed:
+        return []
+    marker = _marker('allowed', 0, Marker.TEXT_VIEW_FACING, TEXT)
+    marker.text = '\n'.join(f'{part} may meet {other}' for part, other in arm.allowed)
+    place = arm.T_base_mount[:3, 3] + [0.0, 0.0, TEXT_ABOVE]
+    _place(marker, place, np.eye(3), np.array([0.0, 0.0, TEXT_HEIGHT]))
+    return [marker]
 
 
 def _points(positions: Iterable[Array]) -> list[Point]:
@@ -83,8 +119,12 @@ def _line(ns: str, points: list[Point], width: float, color: Color) -> Marker:
 def box_marker(ns: str, index: int, box: Box, color: Color, margin: float = 0.0) -> Marker:
     """Return a box, grown by a margin on every side [m], as a marker without a frame."""
     marker = _marker(ns, index, Marker.CUBE, color)
-    p, o, s = marker.pose.position, marker.pose.orientation, marker.scale
-    p.x, p.y, p.z = box.center.tolist()
-    o.x, o.y, o.z, o.w = quaternion_xyzw(box.rotation).tolist()
-    s.x, s.y, s.z = (box.size + 2.0 * margin).tolist()
+    _place(marker, box.center, box.rotation, box.size + 2.0 * margin)
     return marker
+
+
+def _place(marker: Marker, center: Array, rotation: Array, size: Array) -> None:
+    p, o, s = marker.pose.position, marker.pose.orientation, marker.scale
+    p.x, p.y, p.z = center.tolist()
+    o.x, o.y, o.z, o.w = quaternion_xyzw(rotation).tolist()
+    s.x, s.y, s.z = size.tolist()

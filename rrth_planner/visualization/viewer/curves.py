@@ -5,7 +5,7 @@
 import numpy as np
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.rotation import quaternion_xyzw
+from rrth_planner.model.rotation import quaternion_xyzw, turned_to
 from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.planning.result import Tree
 
@@ -66,10 +66,7 @@ def along_z(begin: Array, end: Array) -> tuple[Array, Array, float]:
     v = end - begin
     length = float(np.linalg.norm(v))
     z = v / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
-    # Any axis that is not along z will do for the others.
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return 0.5 * (begin + end), wxyz(np.stack([x, np.cross(z, x), z], axis=1)), length
+    return 0.5 * (begin + end), wxyz(turned_to(z)), length
 
 
 def wxyz(rotation: Array) -> Array:

@@ -7,6 +7,7 @@ import time
 from typing import Any, NoReturn
 
 import numpy as np
+from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.ros.client.viewer_feed import ViewerFeed
 from rrth_planner.visualization.viewer.curves import tool_positions, trajectory_curve
 from rrth_planner.visualization.viewer.examples import example_target
@@ -20,12 +21,14 @@ FRAME = 1.0 / 30.0
 class LivePage:
     """Show the messages of a feed; dragging the target publishes it and requests a plan."""
 
-    def __init__(self, server: viser.ViserServer, feed: ViewerFeed) -> None:
-        """Draw nothing yet."""
+    def __init__(
+        self, server: viser.ViserServer, feed: ViewerFeed, robot: PlacedRobot | None = None
+    ) -> None:
+        """Draw nothing yet; robot as for `SceneView`."""
         self._feed = feed
         self._drawn: dict[str, Any] = {}
         self._is_dragged = False
-        self.view = SceneView(server, feed.arm, feed.ray_guard_length)
+        self.view = SceneView(server, feed.arm, feed.ray_guard_length, robot)
         self.view.layers['start'].visible = False
         self.panel = Panel(server, self.view.layers, is_live=True)
         self.view.target.on_update(self._on_drag)

@@ -9,6 +9,7 @@ import time
 from typing import Any, NoReturn
 
 import numpy as np
+from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.curves import path_curve, tool_positions, trajectory_curve
@@ -26,8 +27,13 @@ FRAME, NAP = 1.0 / 30.0, 0.5
 class ViewerPage:
     """Show a first request, let it be changed, and show and play the resulting motion."""
 
-    def __init__(self, server: viser.ViserServer, question: PlanQuestion) -> None:
-        """Draw what is known, and request a plan."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        question: PlanQuestion,
+        robot: PlacedRobot | None = None,
+    ) -> None:
+        """Draw what is known, and request a plan; robot as for `SceneView`."""
         self._own = question
         self._arm = question.arm
         self._lock, self._wake = Lock(), Event()
@@ -36,7 +42,7 @@ class ViewerPage:
         self._trajectory: Trajectory | None = None
         self._drawn: Response | None = None
         self._body: Any = None
-        self.view = SceneView(server, question.arm, question.ray_guard_length)
+        self.view = SceneView(server, question.arm, question.ray_guard_length, robot)
         self.panel = Panel(server, self.view.layers, is_live=False)
         panel = self.panel
         panel.target.value = tuple(question.goal.target.tolist())

@@ -21,6 +21,7 @@ SHOWN = {
     'first': 'first path',
     'short': 'path after shortcuts',
     'timed': 'trajectory with corner blends',
+    'meshes': 'meshes of the URDF',
 }
 BRAND = (59, 111, 182)
 GOOD, BAD = '#14804a', '#b3261e'

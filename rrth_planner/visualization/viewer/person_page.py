@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, retargeted, started
+from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.pipeline.request import PlanQuestion
@@ -38,8 +39,13 @@ class PersonPage:
         question: PlanQuestion,
         person: RecordedPerson,
         skeleton: Skeleton,
+        robot: PlacedRobot | None = None,
     ) -> None:
-        """Draw nothing yet; the question's scene is the wearer at the beginning."""
+        """
+        Draw nothing yet; the question's scene is the wearer at the beginning.
+
+        robot: as for `SceneView`.
+        """
         self._person, self._skeleton = person, skeleton
         self._scene = question.scene
         self._margin, self._arm = question.margin, question.arm
@@ -57,7 +63,7 @@ class PersonPage:
         # The number of the request that is being planned, 0: none; when to ask again [s].
         self.asked, self._next = 0, 0.0
         self._read: Response | None = None
-        self.view = SceneView(server, question.arm, question.ray_guard_length)
+        self.view = SceneView(server, question.arm, question.ray_guard_length, robot)
         for name in ('start', 'tree', 'first', 'short'):
             self.view.layers[name].visible = False
         self.panel = Panel(server, self.view.layers, is_live=True)

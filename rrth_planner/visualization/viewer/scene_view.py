@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, pointing_error, tool_pose
+from rrth_planner.io.urdf.placed_robot import PlacedRobot
+from rrth_planner.model.arm import ArmModel, capsule_ends, pointing_error, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.result import Tree
-from rrth_planner.visualization.arm_view import arm_points, capsule_ends, ray_of
+from rrth_planner.visualization.arm_view import arm_points, ray_of
 from rrth_planner.visualization.viewer.curves import (
     along_z,
     segments_of,
@@ -18,6 +19,7 @@ from rrth_planner.visualization.viewer.curves import (
     tree_segments,
     wxyz,
 )
+from rrth_planner.visualization.viewer.robot_meshes import NAME, RobotMeshes
 import viser
 
 Color = tuple[int, int, int]
@@ -87,8 +89,18 @@ class ArmShape:
 class SceneView:
     """Draw into a server's scene, x forward, y left, z up [m]."""
 
-    def __init__(self, server: viser.ViserServer, arm: ArmModel, ray_guard_length: float) -> None:
-        """Set up camera, floor and layers; a ray that meets no target is drawn so long [m]."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        arm: ArmModel,
+        ray_guard_length: float,
+        robot: PlacedRobot | None = None,
+    ) -> None:
+        """
+        Set up camera, floor and layers; a ray that meets no target is drawn so long [m].
+
+        robot: the one that the arm was read from; its meshes are shown, and the arm transparent.
+        """
         self._scene, self._arm, self._ray_length = server.scene, arm, ray_guard_length
         server.scene.set_up_direction('+z')
         server.initial_camera.position, server.initial_camera.look_at = CAMERA, LOOK_AT
@@ -98,7 +110,11 @@ class SceneView:
         self.layers = {
             name: server.scene.add_frame(f'/{name}', show_axes=False) for name in LAYERS
         }
-        self.arm = ArmShape(server, '/arm', arm)
+        self._meshes = None
+        if robot is not None:
+            self._meshes = RobotMeshes(server, robot)
+            self.layers[NAME] = self._meshes.layer
+        self.arm = ArmShape(server, '/arm', arm, None if robot is None else 0.45)
         self.start = ArmShape(server, '/start', arm, 0.35)
         self._ray = server.scene.add_cylinder('/ray', RAY_RADIUS, 1.0, RAY, cast_shadow=False)
         self.target = server.scene.add_transform_controls(
@@ -144,6 +160,8 @@ class SceneView:
     def show_configuration(self, q: Array, target: Array | None) -> None:
         """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""
         self.arm.move(q)
+        if self._meshes is not None:
+            self._meshes.move(q)
         pose, length = tool_pose(self._arm, q), self._ray_length
         if target is not None and pointing_error(self._arm, q, target) < AIMED:
             length = float(np.linalg.norm(target - pose[:3, 3]))
