@@ -4,15 +4,69 @@
 A dense check of many edges, compiled, for an arm of revolute joints.
 
 Nothing is shared with the kernels: frames are multiplied out, bars are clipped by the slabs of the
-boxes. An interval of an edge is passed at once where the arm at its middle does not collide with
-the boxes grown by the most that any of its points moves until the ends.
+boxes, and the distance of two bars is that of their ends from the other bar, or of their lines. An
+interval of an edge is passed at once where the arm at its middle does not collide with the boxes
+grown by the most that any of its points moves until the ends.
 """
+
+from dataclasses import dataclass
 
 from numba import njit
 import numpy as np
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, NO_BARS
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bars:
+    """
+    The moving bars of an arm, and the capsules of its mount, each in a frame.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (n,)
+        0: that of the mount, i: that which joint i moves; the tool's row has one of its own.
+    ends : ndarray, shape (n, 2, 3)
+        In that frame [m].
+    radii : ndarray, shape (n,)
+        [m].
+    bodies : ndarray of int, shape (n,)
+        How many joints move it.
+    names : tuple of str
+        Of capsules; empty for other bars.
+
+    """
+
+    frames: Array
+    ends: Array
+    radii: Array
+    bodies: Array
+    names: tuple[str, ...]
+
+
+def bars_in_frames(arm: ArmModel, ray_length: float) -> Bars:
+    """Return the bars of an arm of revolute joints; the last one is the pointing ray."""
+    assert not any(arm.is_prismatic)
+    found = [(c.link, c.ends, c.radius, c.name) for c in arm.capsules]
+    for row in range(1, arm.dof + 1):
+        radius, (_, a, _, d) = float(arm.radii[row]), arm.dh[row]
+        is_ray = row == arm.dof
+        if radius != NO_BARS and a != 0.0:
+            found.append((row, np.array([[0.0, 0.0, 0.0], [a, 0.0, 0.0]]), radius, ''))
+        if is_ray:
+            line = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, ray_length]])
+            found.append((row + 1, line, radius, ''))
+        elif radius != NO_BARS and d != 0.0:
+            found.append((row + 1, np.array([[0.0, 0.0, -d], [0.0, 0.0, 0.0]]), radius, ''))
+    frames, ends, radii, names = zip(*found, strict=True)
+    return Bars(
+        frames=np.array(frames),
+        ends=np.array(ends),
+        radii=np.array(radii),
+        bodies=np.minimum(frames, arm.dof),
+        names=names,
+    )
 
 
 def colliding_edges(
@@ -22,9 +76,10 @@ def colliding_edges(
     margin: float,
     edges: tuple[Array, Array],
     spacing: float,
+    pairs: Array | None = None,
 ) -> Array:
     """
-    Return which edges collide with a box at any of their samples, shape (n,).
+    Return which edges collide with a box, or the arm with itself, at any of their samples, (n,).
 
     Parameters
     ----------
@@ -39,20 +94,25 @@ def colliding_edges(
         Starts and ends [rad].
     spacing : float
         Between two instants [rad].
+    pairs : ndarray of int, shape (m, 2), optional
+        Of `bars_in_frames`, which must not collide.
 
     """
-    assert not any(arm.is_prismatic)
-    reach = float(np.abs(arm.dh[1:, [1, 3]]).sum() + ray_length)
+    bars = bars_in_frames(arm, ray_length)
+    reach = float(np.abs(arm.dh[1:, [1, 3]]).sum() + np.linalg.norm(bars.ends, axis=2).max())
     flags = np.zeros(len(edges[0]), dtype=np.bool_)
     _check(
         arm.dh,
         arm.T_base_mount,
-        ray_length,
-        arm.radii,
+        bars.frames,
+        bars.ends,
+        bars.radii,
+        bars.bodies,
+        np.empty((0, 2), np.int64) if pairs is None else pairs,
         reach,
-        np.array([box.center for box in scene.boxes]),
-        np.array([box.rotation for box in scene.boxes]),
-        np.array([0.5 * box.size + margin for box in scene.boxes]),
+        np.array([box.center for box in scene.boxes]).reshape(-1, 3),
+        np.array([box.rotation for box in scene.boxes]).reshape(-1, 3, 3),
+        np.array([0.5 * box.size + margin for box in scene.boxes]).reshape(-1, 3),
         np.ascontiguousarray(edges[0]),
         np.ascontiguousarray(edges[1]),
         spacing,
@@ -62,21 +122,45 @@ def colliding_edges(
 
 
 @njit(nogil=True)
-def _check(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, spacing, flags):
+def _check(
+    dh, T, frames, ends, radii, bodies, pairs, reach, centers, rotations, halves, q0, q1, spacing,
+    flags,
+):  # fmt: skip
     stack = np.empty((128, 2), np.int64)
-    for e in range(starts.shape[0]):
-        step = ends[e] - starts[e]
+    placed, speeds = np.empty((frames.shape[0], 2, 3)), np.empty(dh.shape[0])
+    for e in range(q0.shape[0]):
+        step = q1[e] - q0[e]
         n = max(1, int(np.ceil(np.sqrt((step * step).sum()) / spacing)))
-        # No point moves faster than the farthest one would round every axis at once.
-        speed = reach * np.abs(step).sum() / n
+        # No point moves faster than the farthest one would round every axis below it at once.
+        speeds[0] = 0.0
+        for i in range(step.shape[0]):
+            speeds[i + 1] = speeds[i] + reach * abs(step[i]) / n
         size, stack[0, 0], stack[0, 1] = 1, 0, n
         while size > 0 and not flags[e]:
             size -= 1
             first, last = stack[size, 0], stack[size, 1]
             middle = (first + last) // 2
-            q = starts[e] + middle / n * step
-            growth = speed * max(last - middle, middle - first)
-            if not _collides(dh, T, ray, radii, centers, rotations, halves, q, growth):
+            length = max(last - middle, middle - first)
+            _place(dh, T, frames, ends, q0[e] + middle / n * step, placed)
+            is_free = True
+            for k in range(frames.shape[0]):
+                # What no joint moves is worn.
+                if bodies[k] > 0:
+                    growth = radii[k] + length * speeds[bodies[k]]
+                    if _bar_collides(
+                        placed[k, 0], placed[k, 1], growth, centers, rotations, halves
+                    ):
+                        is_free = False
+                        break
+            if is_free:
+                for m in range(pairs.shape[0]):
+                    i, j = pairs[m, 0], pairs[m, 1]
+                    # Only the joints between them move one bar to the other.
+                    moved = length * abs(speeds[bodies[j]] - speeds[bodies[i]])
+                    if _distance(placed[i], placed[j]) <= radii[i] + radii[j] + moved:
+                        is_free = False
+                        break
+            if is_free:
                 continue
             if first == last:
                 flags[e] = True
@@ -87,32 +171,65 @@ def _check(dh, T, ray, radii, reach, centers, rotations, halves, starts, ends, s
 
 
 @njit(nogil=True)
-def _collides(dh, T, ray, radii, centers, rotations, halves, q, growth):
+def _place(dh, T, frames, ends, q, placed):
     dof = q.shape[0]
-    R, p = T[:3, :3].copy(), T[:3, 3].copy()
-    turned, corner, end = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for i in range(dof + 1):
+    R, p, turned = T[:3, :3].copy(), T[:3, 3].copy(), np.empty((3, 3))
+    for i in range(dof + 2):
+        for k in range(frames.shape[0]):
+            if frames[k] == i:
+                for end in range(2):
+                    for r in range(3):
+                        placed[k, end, r] = p[r]
+                        for c in range(3):
+                            placed[k, end, r] += R[r, c] * ends[k, end, c]
+        if i > dof:
+            break
         alpha, a = dh[i, 0], dh[i, 1]
         theta = dh[i, 2] + (q[i] if i < dof else 0.0)
-        d = dh[i, 3] if i < dof else ray
+        d = dh[i, 3]
         ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
         for r in range(3):
             y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
-            corner[r] = p[r] + a * R[r, 0]
+            p[r] += a * R[r, 0] + d * z
             turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
             turned[r, 2] = z
-            end[r] = corner[r] + d * z
-        # The bars before the first joint are the mount's.
-        if i > 0:
-            if a != 0.0 and _bar_collides(
-                p, corner, radii[i] + growth, centers, rotations, halves
-            ):
-                return True
-            if _bar_collides(corner, end, radii[i] + growth, centers, rotations, halves):
-                return True
         R[:] = turned
-        p[:] = end
-    return False
+
+
+@njit(nogil=True)
+def _distance(one, other):
+    least = min(
+        min(_to_line(one[0], other[0], other[1]), _to_line(one[1], other[0], other[1])),
+        min(_to_line(other[0], one[0], one[1]), _to_line(other[1], one[0], one[1])),
+    )
+    # The lines are nearest between the ends of both, or an end is what is nearest.
+    square, s, t, across = 0.0, 0.0, 0.0, 0.0
+    for r in range(3):
+        i, j = (r + 1) % 3, (r + 2) % 3
+        ui, uj = one[1, i] - one[0, i], one[1, j] - one[0, j]
+        vi, vj = other[1, i] - other[0, i], other[1, j] - other[0, j]
+        wi, wj = one[0, i] - other[0, i], one[0, j] - other[0, j]
+        normal = ui * vj - uj * vi
+        square += normal * normal
+        s -= (wi * vj - wj * vi) * normal
+        t -= (wi * uj - wj * ui) * normal
+        across += (one[0, r] - other[0, r]) * normal
+    if square > 1e-18 and 0.0 <= s <= square and 0.0 <= t <= square:
+        least = min(least, abs(across) / np.sqrt(square))
+    return least
+
+
+@njit(nogil=True)
+def _to_line(point, begin, end):
+    square, along = 0.0, 0.0
+    for r in range(3):
+        square += (end[r] - begin[r]) ** 2
+        along += (point[r] - begin[r]) * (end[r] - begin[r])
+    share = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+    gap = 0.0
+    for r in range(3):
+        gap += (point[r] - begin[r] - share * (end[r] - begin[r])) ** 2
+    return np.sqrt(gap)
 
 
 @njit(nogil=True)

@@ -32,6 +32,7 @@ from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
 from benchmarks.common.random_draws import free_configurations, random_target
+from benchmarks.real_arms.edges import count_colliding
 
 MARGIN, RAY = 0.02, 0.5
 # Between two instants that are judged [rad].
@@ -56,7 +57,7 @@ class Judge:
     model: Any
     geometry: Any
     q: Array
-    columns: tuple[int, ...]
+    columns: tuple[tuple[int, int], ...]
     n_boxes: int
 
     def judge(self, trajectory: Trajectory) -> tuple[float, list[str]]:
@@ -70,8 +71,7 @@ class Judge:
         for positions in positions_at(trajectory, times):
             if before is not None:
                 bounds -= FARTHEST * np.abs(positions - before).sum()
-            before, q = positions, self.q.copy()
-            q[list(self.columns)] = positions
+            before, q = positions, self._values(positions)
             pin.updateGeometryPlacements(self.model, data, self.geometry, shapes, q)
             for k, pair in enumerate(self.geometry.collisionPairs):
                 if k < self.n_boxes:
@@ -82,6 +82,15 @@ class Judge:
                     objects = self.geometry.geometryObjects
                     colliding.add(f'{objects[pair.first].name} and {objects[pair.second].name}')
         return float(least), sorted(colliding)
+
+    def _values(self, positions: Array) -> Array:
+        """Return pinocchio's values of all joints; a continuous one has its cosine and sine."""
+        q = self.q.copy()
+        for (column, width), position in zip(self.columns, positions, strict=True):
+            q[column : column + width] = (
+                position if width == 1 else (np.cos(position), np.sin(position))
+            )
+        return q
 
 
 def arm_of(file: Path, tool: str, ray: str, mount: tuple[float, ...]) -> ArmModel:
@@ -119,7 +128,8 @@ def judge_of(file: Path, arm: ArmModel, scene: Scene, mount: tuple[float, ...]) 
         for j, other in checked[i + 1 :]:
             if frozenset((one, other)) in pairs:
                 geometry.addCollisionPair(pin.CollisionPair(k, j))
-    columns = tuple(model.joints[model.getJointId(name)].idx_q for name in arm.joint_names)
+    joints = [model.joints[model.getJointId(name)] for name in arm.joint_names]
+    columns = tuple((joint.idx_q, joint.nq) for joint in joints)
     return Judge(model, geometry, pin.neutral(model), columns, n_boxes)
 
 
@@ -129,7 +139,24 @@ def main() -> None:
     parser.add_argument('--robots', type=Path, required=True, metavar='FOLDER')
     parser.add_argument('--motions', type=int, default=100, metavar='N', help='each (100)')
     parser.add_argument('--arms', nargs='*', default=list(ARMS), choices=ARMS)
+    parser.add_argument(
+        '--edges',
+        type=int,
+        metavar='N',
+        help='instead of motions: certify N random edges of each arm, and check them densely',
+    )
     options = parser.parse_args()
+    if options.edges is not None:
+        print('| arm | worn on | random edges | certified | collide |')
+        print('| --- | --- | --- | --- | --- |')
+        for name in options.arms:
+            file, tool, ray = ARMS[name]
+            for mount, place in MOUNTS.items():
+                arm, scene = arm_of(options.robots / file, tool, ray, place), load_body()
+                world, rng = arm_world(arm, scene, MARGIN, RAY), np.random.default_rng(0)
+                counts = count_colliding(rng, arm, scene, world, MARGIN, options.edges)
+                print(f'| {name} | {mount} | {" | ".join(map(str, counts))} |', flush=True)
+        return
     print(
         '| arm | worn on | free configurations | solved | nearer than the margin | least [mm] | '
         'collide with themselves |'

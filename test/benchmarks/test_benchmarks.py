@@ -22,9 +22,13 @@ from benchmarks.planners.main import main
 from benchmarks.planners.report import report
 from benchmarks.planners.table import peer_lines, survival_lines, TARGET_HEADER, target_lines
 from benchmarks.planners.targets import TARGETS
+from benchmarks.real_arms.edges import checked_pairs
 import numpy as np
+from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.scene import Scene
 from rrth_planner.planning.visibility_graph import shortest_path
+from worlds import capsule_arm
 
 NAMES = (*MAPS, *QUERIES)
 
@@ -149,6 +153,33 @@ def test_the_dense_check_agrees_with_the_reference_checker():
             table_1_arm(), wearer(), np.array(edge), world.ray_length, 0.0
         )
         assert is_free is not bool(is_colliding)
+
+
+def test_the_dense_check_of_capsules_agrees_with_the_reference_checker():
+    rng, nothing, ray = np.random.default_rng(2), Scene(()), 0.4
+    arm = capsule_arm(np.random.default_rng(0))
+    pairs = checked_pairs(rng, arm, ray)
+    bars = dense_checker.bars_in_frames(arm, ray)
+    n_colliding = 0
+    for q_from in rng.uniform(*arm.bounds, (40, arm.dof)):
+        q_to = np.clip(q_from + 0.1 * rng.standard_normal(arm.dof), *arm.bounds)
+        (flag,) = dense_checker.colliding_edges(
+            arm, nothing, ray, 0.0, (q_from[None], q_to[None]), numpy_checker.SPACING, pairs
+        )
+        q = np.linspace(q_from, q_to, 400)
+        ends = bar_ends_at(arm, q, ray)
+        # The reference checker has another order: mount last, ray before.
+        own = np.argsort([*np.flatnonzero(bars.bodies > 0), *np.flatnonzero(bars.bodies == 0)])
+        ends = ends[:, own]
+        least = min(
+            (bar_distances(ends[:, i], ends[:, j]) - bars.radii[i] - bars.radii[j]).min()
+            for i, j in pairs
+        )
+        # Where both sample the grids differ.
+        if abs(least) > 1e-3:
+            assert bool(flag) is (least < 0.0)
+            n_colliding += bool(flag)
+    assert 5 < n_colliding < 35
 
 
 def test_boxes_are_split_into_parts_of_the_same_volume():
