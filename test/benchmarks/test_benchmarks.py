@@ -177,7 +177,7 @@ def test_the_dense_check_of_capsules_agrees_with_the_reference_checker():
         )
         # Where both sample the grids differ.
         if abs(least) > 1e-3:
-            assert bool(flag) is (least < 0.0)
+            assert bool(flag) is bool(least < 0.0)
             n_colliding += bool(flag)
     assert 5 < n_colliding < 35
 

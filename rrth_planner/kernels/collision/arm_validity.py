@@ -204,11 +204,11 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     return n_open
 
 
-@kernel(int64(OUT_VEC, int64, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64))
-def open_pair(points, a, b, p, width, bows, dof, robot, pool, n_open):
+@kernel(int64(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, MAT, OUT_POOL, int64))
+def open_pair(points, a, b, p, width, speed, curvature, bows, robot, pool, n_open):
     """Append pair p to the pool if it is open; return the new length; -1: there is no room."""
-    row = int64(robot[dof + 1, FIRST_PAIR]) + p
-    if not is_pair_open(points, a, b, row, width, bows, BOW_SIZE * p, dof, robot):
+    row = int64(robot[speed.shape[0] + 1, FIRST_PAIR]) + p
+    if not is_pair_open(points, a, b, row, width, speed, curvature, bows, BOW_SIZE * p, robot):
         return n_open
     if n_open >= MAX_OPEN:
         return -1
@@ -272,7 +272,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         tail += 4
     curvature_bounds(robot, n_bars, speed, curvature, bows)
     if n_pairs > 0:
-        pair_bounds(robot, speed, curvature, pair_bows)
+        pair_bounds(robot, speed, pair_bows)
     while head < tail:
         a, b = int64(queue[head]), int64(queue[head + 1])
         first, last = int64(queue[head + 2]), int64(queue[head + 3])
@@ -289,7 +289,17 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
                     return -1
             for p in range(n_pairs):
                 n_open = open_pair(
-                    points, a * stride, b * stride, p, width, pair_bows, dof, robot, pool, n_open
+                    points,
+                    a * stride,
+                    b * stride,
+                    p,
+                    width,
+                    speed,
+                    curvature,
+                    pair_bows,
+                    robot,
+                    pool,
+                    n_open,
                 )
                 if n_open < 0:
                     return -1
@@ -298,7 +308,17 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
             if pool[ENTRY * row] < 0:
                 p = -1 - int64(pool[ENTRY * row])
                 n_open = open_pair(
-                    points, a * stride, b * stride, p, width, pair_bows, dof, robot, pool, n_open
+                    points,
+                    a * stride,
+                    b * stride,
+                    p,
+                    width,
+                    speed,
+                    curvature,
+                    pair_bows,
+                    robot,
+                    pool,
+                    n_open,
                 )
             else:
                 n_open = open_again(

@@ -25,7 +25,8 @@ from rrth_planner.kernels.layout import (
 # Bars that come nearer than this are in contact: rounding of kinematics, with room [m].
 CONTACT = 1e-9
 # What is known of the motion of a pair: bounds of the second derivatives of both ends of the inner
-# bar and of the outer one, seen from the link of the inner one, and of the sum of their speeds.
+# bar and of the outer one, seen from the link of the inner one, < 0 until they are needed, and of
+# the sum of their speeds.
 BOW_SIZE, SPEED = 5, 4
 BOWS_ROOM = BOW_SIZE * MAX_PAIRS
 # Two bars at two instants.
@@ -78,6 +79,20 @@ def segment_gap(first, i, second, j, gap):
     return square
 
 
+@kernel(boolean(OUT_VEC, int64, int64, float64), inline='always')
+def are_far(points, a, b, distance):
+    """Return whether the middles of two bars prove them further apart than a distance [m]."""
+    between = half = other = 0.0
+    for c in range(3):
+        p, q, r, s = points[a + c], points[a + 4 + c], points[b + c], points[b + 4 + c]
+        between += (r + s - p - q) * (r + s - p - q)
+        half += (q - p) * (q - p)
+        other += (s - r) * (s - r)
+    # Twice the distance of the middles, and twice the half lengths.
+    far = math.sqrt(half) + math.sqrt(other) + 2.0 * distance
+    return between > far * far
+
+
 @kernel(int64(OUT_VEC, int64, int64, MAT))
 def colliding_pair(points, at, dof, robot):
     """Return the first pair of bars in contact with the arm at points[at], or -1: exact."""
@@ -87,6 +102,8 @@ def colliding_pair(points, at, dof, robot):
         a = at + BAR_SIZE * int64(robot[row, INNER])
         b = at + BAR_SIZE * int64(robot[row, OUTER])
         radius = points[a + 7] + points[b + 7] + CONTACT
+        if are_far(points, a, b, radius):
+            continue
         # Also for NaN, which must never count as apart.
         if not segment_gap(points, a, points, b, gap) > radius * radius:
             return row - first
@@ -125,9 +142,9 @@ def curvature_bound(robot, row, end, first, speed, curvature):
     return total
 
 
-@kernel(void(MAT, VEC, VEC, OUT_VEC))
-def pair_bounds(robot, speed, curvature, bows):
-    """Write what is known of the motion of each pair, BOW_SIZE numbers each."""
+@kernel(void(MAT, VEC, OUT_VEC))
+def pair_bounds(robot, speed, bows):
+    """Write what is known of the motion of each pair at first, BOW_SIZE numbers each."""
     dof = speed.shape[0]
     first = int64(robot[dof + 1, FIRST_PAIR])
     for row in range(first, robot.shape[0]):
@@ -137,13 +154,12 @@ def pair_bounds(robot, speed, curvature, bows):
             bar = dof + 2 + int64(robot[row, OUTER if k else INNER])
             fastest = 0.0
             for end in range(2):
-                bows[n + 2 * k + end] = curvature_bound(robot, bar, end, body, speed, curvature)
                 along = 0.0
                 for j in range(body, dof):
                     along += robot[bar, REACH + end * dof + j] * speed[j]
                 fastest = max(fastest, along)
             total += fastest
-        bows[n + SPEED] = total
+        bows[n], bows[n + SPEED] = -1.0, total
 
 
 @kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64))
@@ -162,16 +178,23 @@ def seen_from(points, bar, frame, seen, to):
             seen[to + 4 * end + k] = value
 
 
-@kernel(boolean(OUT_VEC, OUT_VEC, int64, OUT_VEC, int64, float64, float64))
-def keeps_apart(gap, seen, here, bows, n, bow, radius):
-    """
-    Return whether a direction separates the hulls of two moving bars.
+@kernel(void(OUT_VEC, int64, OUT_VEC))
+def turned_to(points, frame, v):
+    """Turn a vector of the base into the frame at points[frame]."""
+    x, y, z = v[0], v[1], v[2]
+    for k in range(3):
+        row = frame + 3 + 3 * k
+        v[k] = points[row] * x + points[row + 1] * y + points[row + 2] * z
 
-    seen: both bars at two instants, inner and outer at each; here: which instant the direction
-    is taken at, from nearest point to nearest point, for which `gap` is room.
+
+@kernel(boolean(OUT_VEC, float64, OUT_VEC, OUT_VEC, int64, float64, float64))
+def keeps_apart(gap, length, seen, bows, n, bow, radius):
     """
-    square = segment_gap(seen, 2 * BAR_SIZE * here, seen, 2 * BAR_SIZE * here + BAR_SIZE, gap)
-    low, high, length = math.inf, -math.inf, math.sqrt(square)
+    Return whether a direction, `gap` of some length, separates the hulls of two moving bars.
+
+    seen: both bars at two instants, inner and outer at each, in the frame of the direction.
+    """
+    low, high = math.inf, -math.inf
     for instant in range(2):
         for end in range(2):
             at = 2 * BAR_SIZE * instant + 4 * end
@@ -184,16 +207,17 @@ def keeps_apart(gap, seen, here, bows, n, bow, radius):
     return low - high > length * radius
 
 
-@kernel(boolean(OUT_VEC, int64, int64, int64, float64, OUT_VEC, int64, int64, MAT))
-def is_pair_open(points, a, b, row, width, bows, n, dof, robot):
+@kernel(boolean(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, int64, MAT))
+def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
     """
     Return whether a pair of bars is not proven apart between two instants.
 
     points[a], points[b]: the arm at both; width: of the interval of the curve's parameter; row:
-    that of the pair in `robot`; n: where its bounds are in `bows`. Apart are: bars that do not
-    move to each other, those too far away to meet within the interval, and those whose hulls at
-    both instants, thickened by width^2 / 8 times the second derivative and seen from the link of
-    the inner bar, are separated by the direction in which they are nearest at one of the instants
+    that of the pair in `robot`; speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint;
+    n: where those of the pair are in `bows`. Apart are: bars that do not move to each other, those
+    too far away from each other to meet within the interval, and those whose hulls at both
+    instants, thickened by width^2 / 8 times the second derivative and seen from the link of the
+    inner bar, are separated by the direction in which they are nearest at one of the instants
     (`docs/algorithms.md`, section 3).
     """
     if bows[n + SPEED] == 0.0:
@@ -201,18 +225,21 @@ def is_pair_open(points, a, b, row, width, bows, n, dof, robot):
         return False
     inner, outer = BAR_SIZE * int64(robot[row, INNER]), BAR_SIZE * int64(robot[row, OUTER])
     radius = points[a + inner + 7] + points[a + outer + 7] + CONTACT
-    between = half = other = 0.0
-    for c in range(3):
-        p, q = points[a + inner + c], points[a + inner + 4 + c]
-        r, s = points[a + outer + c], points[a + outer + 4 + c]
-        between += (r + s - p - q) * (r + s - p - q)
-        half += (q - p) * (q - p)
-        other += (s - r) * (s - r)
-    # Twice the distance of the middles, and twice the half lengths.
-    far = math.sqrt(half) + math.sqrt(other) + 2.0 * (radius + bows[n + SPEED] * width)
-    if between > far * far:
+    if are_far(points, a + inner, a + outer, radius + bows[n + SPEED] * width):
         return False
-    seen, gap = scratch.floats(SEEN_ROOM), scratch.floats(3)
+    one, other = scratch.floats(3), scratch.floats(3)
+    length_one = math.sqrt(segment_gap(points, a + inner, points, a + outer, one))
+    length_other = math.sqrt(segment_gap(points, b + inner, points, b + outer, other))
+    # On the way from one distance to the other they would have to lose both.
+    if length_one + length_other > 2.0 * radius + bows[n + SPEED] * width:
+        return False
+    dof = speed.shape[0]
+    if bows[n] < 0.0:
+        body = int64(robot[row, BODY])
+        for k in range(4):
+            bar = dof + 2 + int64(robot[row, INNER if k < 2 else OUTER])
+            bows[n + k] = curvature_bound(robot, bar, k % 2, body, speed, curvature)
+    seen = scratch.floats(SEEN_ROOM)
     slot = int64(robot[row, FRAME])
     frame = int64(robot[dof + 1, FRAMES]) + FRAME_SIZE * slot if slot >= 0 else -1
     for instant in range(2):
@@ -220,8 +247,11 @@ def is_pair_open(points, a, b, row, width, bows, n, dof, robot):
         at = base + frame if slot >= 0 else -1
         seen_from(points, base + inner, at, seen, 2 * BAR_SIZE * instant)
         seen_from(points, base + outer, at, seen, 2 * BAR_SIZE * instant + BAR_SIZE)
+    if slot >= 0:
+        turned_to(points, a + frame, one)
+        turned_to(points, b + frame, other)
     bow = 0.125 * width * width
     return not (
-        keeps_apart(gap, seen, 0, bows, n, bow, radius)
-        or keeps_apart(gap, seen, 1, bows, n, bow, radius)
+        keeps_apart(one, length_one, seen, bows, n, bow, radius)
+        or keeps_apart(other, length_other, seen, bows, n, bow, radius)
     )
