@@ -7,6 +7,7 @@ python -m benchmarks.real_arms --robots FOLDER: the folder `robots` of example-r
 """
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 import sys
@@ -32,6 +33,7 @@ from rrth_planner.model.trajectory import positions_at, Trajectory
 from rrth_planner.pipeline.plan_motion import plan_motion, warm_up
 
 from benchmarks.common.random_draws import free_configurations, random_target
+from benchmarks.real_arms.costs import costs
 from benchmarks.real_arms.edges import count_colliding
 
 MARGIN, RAY = 0.02, 0.5
@@ -44,6 +46,7 @@ ARMS = {
     'panda': ('panda_description/urdf/panda.urdf', 'panda_hand', '+z'),
     'z1': ('z1_description/urdf/z1.urdf', 'gripperStator', '+x'),
     'kinova': ('kinova_description/robots/kinova.urdf', 'j2s6s200_end_effector', '+z'),
+    'xarm7': ('xarm_description/urdf/xarm7.urdf', 'link7', '+z'),
     'ur5': ('ur_description/urdf/ur5_robot.urdf', 'ee_link', '+x'),
 }
 # Where the first link is worn, in the wearer's base frame [m].
@@ -145,17 +148,14 @@ def main() -> None:
         metavar='N',
         help='instead of motions: certify N random edges of each arm, and check them densely',
     )
+    text = 'instead of motions: what proving two parts of an arm apart costs'
+    parser.add_argument('--costs', action='store_true', help=text)
     options = parser.parse_args()
+    if options.costs:
+        print_costs(options.robots, options.arms)
+        return
     if options.edges is not None:
-        print('| arm | worn on | random edges | certified | collide |')
-        print('| --- | --- | --- | --- | --- |')
-        for name in options.arms:
-            file, tool, ray = ARMS[name]
-            for mount, place in MOUNTS.items():
-                arm, scene = arm_of(options.robots / file, tool, ray, place), load_body()
-                world, rng = arm_world(arm, scene, MARGIN, RAY), np.random.default_rng(0)
-                counts = count_colliding(rng, arm, scene, world, MARGIN, options.edges)
-                print(f'| {name} | {mount} | {" | ".join(map(str, counts))} |', flush=True)
+        print_edges(options.robots, options.arms, options.edges)
         return
     print(
         '| arm | worn on | free configurations | solved | nearer than the margin | least [mm] | '
@@ -167,6 +167,35 @@ def main() -> None:
         for mount, place in MOUNTS.items():
             print(_row(name, mount, options.robots / file, tool, ray, place, options.motions))
             sys.stdout.flush()
+
+
+def print_edges(robots: Path, names: Sequence[str], n: int) -> None:
+    """Print a row for each arm and mount: how many certified edges collide."""
+    print('| arm | worn on | random edges | certified | collide |')
+    print('| --- | --- | --- | --- | --- |')
+    for name in names:
+        file, tool, ray = ARMS[name]
+        for mount, place in MOUNTS.items():
+            arm, scene = arm_of(robots / file, tool, ray, place), load_body()
+            world, rng = arm_world(arm, scene, MARGIN, RAY), np.random.default_rng(0)
+            counts = count_colliding(rng, arm, scene, world, MARGIN, n)
+            print(f'| {name} | {mount} | {" | ".join(map(str, counts))} |', flush=True)
+
+
+def print_costs(robots: Path, names: Sequence[str]) -> None:
+    """Print a row for each arm and length of edges."""
+    print('| arm | pairs | edge [rad] | edge [us] | a pair [us] | a bar, 8 boxes [us] | ratio |')
+    print('| --- | --- | --- | --- | --- | --- | --- |')
+    for name in names:
+        file, tool, ray = ARMS[name]
+        arm = arm_of(robots / file, tool, ray, MOUNTS['back'])
+        for length in (0.5, 1.0):
+            n, whole, pair, bar = costs(np.random.default_rng(5), arm, RAY, length)
+            print(
+                f'| {name} | {n} | {length:g} | {1e6 * whole:.1f} | {1e6 * pair:.3f} | '
+                f'{1e6 * bar:.3f} | {pair / bar:.2f} |',
+                flush=True,
+            )
 
 
 def _row(

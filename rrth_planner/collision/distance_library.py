@@ -9,7 +9,6 @@ from importlib.util import find_spec
 import math
 from typing import Any
 
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.scene import Box
 
@@ -33,6 +32,9 @@ class DistanceLibrary:
     """
     Boxes and thin capsules of one library, and the distances between them.
 
+    `query`, of two objects, `request` and `result`, returns their distance [m], 0 or less where
+    they meet: without a method between, since it is asked a hundred times a motion.
+
     Shapes are pooled: python-fcl 0.7 does not free an object wholly, since the counter of its
     shared pointer stays. Append and pop are atomic for all threads.
     """
@@ -45,14 +47,13 @@ class DistanceLibrary:
         if name == 'fcl':
             # No distance is less than this result, so fcl spends no time filling it in.
             result = self._module.DistanceResult(-math.inf)
-            self._distance = self._module.distance
-            self._arguments = (self._module.DistanceRequest(), result)
+            self.query = self._module.distance
+            self.request, self.result = self._module.DistanceRequest(), result
         else:
-            request = self._module.DistanceRequest()
+            self.query = _coal_distance(self._module)
+            self.request, self.result = self._module.DistanceRequest(), None
             # Nobody asks how deep a contact is.
-            request.enable_signed_distance = False
-            self._distance = _coal_distance(self._module)
-            self._arguments = (request, self._module.DistanceResult())
+            self.request.enable_signed_distance = False
         self._is_fcl = name == 'fcl'
 
     def placed_box(self, box: Box) -> Shape:
@@ -63,7 +64,8 @@ class DistanceLibrary:
         else:
             shape.geometry.halfSide = 0.5 * box.size
         shape.geometry.computeLocalAABB()
-        self.place(shape, box.rotation, box.center)
+        shape.item.setRotation(box.rotation)
+        shape.item.setTranslation(box.center)
         return shape
 
     def capsule(self, length: float) -> Shape:
@@ -79,16 +81,6 @@ class DistanceLibrary:
         else:
             capsule.geometry.halfLength = 0.5 * length
         capsule.geometry.computeLocalAABB()
-
-    def place(self, shape: Shape, rotation: Array, center: Array) -> None:
-        """Move a shape."""
-        shape.item.setRotation(rotation)
-        shape.item.setTranslation(center)
-
-    def distance(self, one: Shape, other: Shape) -> float:
-        """Return the distance of two shapes [m]; 0 or less where they meet."""
-        found: float = self._distance(one.item, other.item, *self._arguments)
-        return found
 
     def release(self, shapes: list[Shape], *, are_boxes: bool) -> None:
         """Take shapes back that nobody uses any more."""
@@ -122,9 +114,8 @@ def library_of(name: str) -> DistanceLibrary:
 
 
 def _coal_distance(coal: Any) -> Callable[..., float]:
-    def distance(one: Any, other: Any, request: Any, result: Any) -> float:
-        result.clear()
-        found: float = coal.distance(one, other, request, result)
+    def distance(one: Any, other: Any, request: Any, _: None) -> float:
+        found: float = coal.distance(one, other, request, coal.DistanceResult())
         return found
 
     return distance

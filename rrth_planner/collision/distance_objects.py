@@ -4,10 +4,11 @@
 
 import functools
 import math
+from typing import Any
 
 import numpy as np
 from rrth_planner.collision.bar_pairs import BarPair
-from rrth_planner.collision.distance_library import DOUBT, library_of, Shape, THINNEST
+from rrth_planner.collision.distance_library import DOUBT, library_of, THINNEST
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule, mount_bars
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import turned_to
@@ -25,18 +26,19 @@ class Boxes:
     def __del__(self) -> None:
         self._library.release(self._shapes, are_boxes=True)
 
-    def nearest(self, item: Shape, bounds: Array) -> tuple[float, int]:
+    def nearest(self, item: Any, bounds: Array) -> tuple[float, int]:
         """
         Return the distance of an object from the nearest box [m], and the index of that box.
 
         bounds (m,): lower bounds of the distances [m]; replaced by the distance of each box that
         is checked.
         """
-        least, nearest = math.inf, -1
+        least, nearest, library = math.inf, -1, self._library
+        query, request, result = library.query, library.request, library.result
         for j in np.argsort(bounds).tolist():
             if bounds[j] - DOUBT >= least:
                 break
-            bounds[j] = distance = self._library.distance(item, self._shapes[j])
+            bounds[j] = distance = query(item, self._shapes[j].item, request, result)
             if distance < least:
                 least, nearest = distance, j
         return least, nearest
@@ -84,7 +86,7 @@ class PlacedBar:
     def __del__(self) -> None:
         self._library.release([self._capsule], are_boxes=False)
 
-    def place(self, q: Array, poses: Array) -> Shape:
+    def place(self, q: Array, poses: Array) -> Any:
         """Return the object at q (dof,), with the frames of the arm there, (dof + 1, 4, 4)."""
         pose = poses[self._frame] if self._frame >= 0 else self._mount
         middle = self._middle
@@ -93,9 +95,10 @@ class PlacedBar:
             self._library.stretch(self._capsule, abs(offset))
             middle = np.array([0.0, 0.0, -0.5 * offset])
         rotation = pose[:3, :3]
-        turned = rotation if self._turn is None else rotation @ self._turn
-        self._library.place(self._capsule, turned, pose[:3, 3] + rotation @ middle)
-        return self._capsule
+        item = self._capsule.item
+        item.setRotation(rotation if self._turn is None else rotation @ self._turn)
+        item.setTranslation(pose[:3, 3] + rotation @ middle)
+        return item
 
     def nearest(self, boxes: Boxes, bounds: Array, q: Array, poses: Array) -> tuple[float, str]:
         """
@@ -121,6 +124,7 @@ class PlacedPair:
     def nearest(self, boxes: Boxes, bounds: Array, q: Array, poses: Array) -> tuple[float, str]:
         """Return the distance of the two bars [m], and the name of the outer one."""
         one, other = self._inner.place(q, poses), self._outer.place(q, poses)
-        distance = self._library.distance(one, other)
+        library = self._library
+        distance = library.query(one, other, library.request, library.result)
         radii = self._inner.radius + self._outer.radius
         return distance + 2.0 * THINNEST - radii, self._outer.name
