@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from rrth_planner.collision import distance_objects
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.reference_checker import first_contact
 from rrth_planner.collision.violation import Violation
@@ -265,6 +266,25 @@ def test_the_same_seed_gives_the_same_bits(answers):
                 assert first.tobytes() == second.tobytes()
             assert again.clearance == plan.clearance
     assert n_compared > 3
+
+
+def test_another_second_checker_changes_no_motion(answers, monkeypatch):
+    pytest.importorskip('coal')
+    asked, library_of = set(), distance_objects.library_of
+
+    def noted(name):
+        asked.add(name)
+        return library_of(name)
+
+    monkeypatch.setattr(distance_objects, 'library_of', noted)
+    for scene, q_start, target, before in answers[:20]:
+        after = ask(scene, q_start, target, second_checker='coal')
+        assert after.status is before.status
+        if before.trajectory is not None:
+            np.testing.assert_array_equal(after.trajectory.positions, before.trajectory.positions)
+    assert asked == {'coal'}
+    with pytest.raises(OptionsError, match="second_checker: 'bullet', expected fcl or coal"):
+        ask(wearer(), FOLDED, [1.5, 0.3, 0.4], second_checker='bullet')
 
 
 def test_a_request_that_is_cancelled_gives_no_motion(answers):

@@ -10,6 +10,7 @@ pytest.importorskip('rclpy')
 
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
+from rrth_planner.collision import distance_library  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
@@ -97,6 +98,7 @@ def test_a_change_is_there_for_the_next_plan(started):
         ('max_acceleration', [0.0] * 4, '1e+06 [rad/s^2]'),
         ('max_jerk', [-1.0], '[rad/s^3]'),
         ('algorithm', 'prm', 'algorithm: "prm", expected one that is available: rrt_h, rrt,'),
+        ('second_checker', 'bullet', 'second_checker: "bullet", expected fcl or coal'),
         ('time_limit', 'soon', 'Wrong parameter type'),
         ('arm', 'other.yaml', 'read-only'),
         ('base_frame', 'camera', 'read-only'),
@@ -110,6 +112,18 @@ def test_a_bad_value_is_rejected_and_changes_nothing(started, name, value, sente
     assert sentence in result.reason
     assert '\n' not in result.reason
     assert node.get_parameter(name).value == before
+
+
+def test_a_second_checker_that_is_not_installed_is_rejected_by_name(started, monkeypatch):
+    monkeypatch.setattr(distance_library, 'find_spec', lambda name: None if name == 'coal' else 1)
+    node, parameters = started()
+    assert parameters.second_checker == 'fcl'
+    (result,) = node.set_parameters([Parameter(name='second_checker', value='coal')])
+    assert result.reason == (
+        'second_checker: coal is not installed, expected for the second check of every motion '
+        '(pip install coal)'
+    )
+    assert current_parameters(node, parameters.arm).second_checker == 'fcl'
 
 
 def test_an_empty_array_is_rejected(started):
