@@ -17,7 +17,8 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
-from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
+from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
+from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
@@ -57,6 +58,26 @@ def test_an_arm_stops_whether_or_not_its_stop_is_free(monitored, ahead, capfd):
     took = float(re.search('; published after (.*) ms$', line)[1])
     assert took == pytest.approx(1e3 * monitored.took[0], abs=0.01)
     assert level in line
+
+
+def test_drives_that_can_do_more_stop_sooner_and_before_the_hand():
+    node, stops = Node('choice'), []
+    usual = declare_parameters(node)
+    strong = MotionLimits(usual.limits.velocity, np.full(4, 10.0), np.full(4, 400.0))
+    for limits in (usual.stop_limits, strong):
+        monitored = Monitored(node, replace(usual, stop_limits=limits))
+        # So near that only the stronger stop ends before it.
+        monitored.see(monitored.hand(0.28, 0.0))
+        ((stop, _),) = monitored.published
+        stops.append(stop)
+        assert ('not proven free either' in monitored.reporter.monitor_state[1]) == (
+            limits is not strong
+        )
+        _, v, a = sample(stop, np.linspace(0.0, stop.duration, 2000))
+        assert (np.abs(v) <= 1.01 * limits.velocity).all()
+        assert (np.abs(a) <= 1.01 * limits.acceleration).all()
+    node.destroy_node()
+    assert stops[1].duration < 0.6 * stops[0].duration
 
 
 def test_the_clearance_of_a_stop_that_is_not_free_is_reported(monitored):

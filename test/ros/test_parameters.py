@@ -79,6 +79,17 @@ def test_a_single_value_counts_for_every_joint(started):
     assert parameters.limits.jerk.tolist() == [1.0, 2.0, 3.0, 4.0]
 
 
+def test_stops_have_the_limits_of_motions_or_greater_ones(started):
+    _, parameters = started(max_jerk=[50.0])
+    assert parameters.stop_limits.rows[0].tolist() == parameters.limits.velocity.tolist()
+    assert parameters.stop_limits.acceleration.tolist() == [4.0] * 4
+    assert parameters.stop_limits.jerk.tolist() == [50.0] * 4
+    _, parameters = started(stop_acceleration=[10.0, 2.0, 0.0, 5.0], stop_jerk=[400.0])
+    assert parameters.stop_limits.acceleration.tolist() == [10.0, 4.0, 4.0, 5.0]
+    assert parameters.stop_limits.jerk.tolist() == [400.0] * 4
+    assert parameters.limits.acceleration.tolist() == [4.0] * 4
+
+
 def test_a_change_is_there_for_the_next_plan(started):
     node, before = started()
     assert node.set_parameters([Parameter(name='margin', value=0.05)])[0].successful
@@ -97,6 +108,9 @@ def test_a_change_is_there_for_the_next_plan(started):
         ('max_velocity', [NAN], 'max_velocity: [nan], expected finite numbers [rad/s]'),
         ('max_acceleration', [0.0] * 4, '1e+06 [rad/s^2]'),
         ('max_jerk', [-1.0], '[rad/s^3]'),
+        ('stop_jerk', [-1.0], 'stop_jerk: [-1.0], expected 4 values, or one for all joints, 0 or'),
+        ('stop_acceleration', [1.0, 2.0], 'stop_acceleration: [1.0, 2.0], expected 4 values'),
+        ('stop_acceleration', [NAN], 'stop_acceleration: [nan], expected finite'),
         ('algorithm', 'prm', 'algorithm: "prm", expected one that is available: rrt_h, rrt,'),
         ('second_checker', 'bullet', 'second_checker: "bullet", expected fcl or coal'),
         ('time_limit', 'soon', 'Wrong parameter type'),

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -19,12 +20,15 @@ from rrth_planner.io.settings import (
     settings_from_values,
 )
 from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError
+from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
+STOP_LIMITS = {'stop_acceleration': 'rad/s^2', 'stop_jerk': 'rad/s^3'}
 LONGEST_TIMEOUT, LONGEST_LATENCY = 86400.0, 10.0
 
 
@@ -55,6 +59,10 @@ def declared(dof: int) -> tuple[Setting, ...]:
             'max_acceleration', [4.0] * dof, 'rad/s^2', f'greatest acceleration {each}', *limit
         ),
         Setting('max_jerk', [40.0] * dof, 'rad/s^3', f'greatest jerk {each}', *limit),
+        *(
+            Setting(name, [0.0], unit, f'of fail-safe stops, {each}; 0: as of motions')
+            for name, unit in STOP_LIMITS.items()
+        ),
         Setting('body_timeout', 0.0, 's', 'an older body is rejected; 0: never', *timeout),
         Setting('body_latency', 0.03, 's', latency, 0.0, LONGEST_LATENCY, is_read_only=True),
         Setting('keep_lost', 2.0, 's', lost, *timeout),
@@ -76,6 +84,8 @@ class PlannerParameters(PlanSettings):
 
     Parameters
     ----------
+    stop_limits : MotionLimits
+        Of fail-safe stops.
     body_timeout, joint_timeout : float
         [s]; 0: never.
     body_latency, keep_lost : float
@@ -89,6 +99,7 @@ class PlannerParameters(PlanSettings):
 
     arm: ArmModel
     base_frame: str
+    stop_limits: MotionLimits
     body_timeout: float
     joint_timeout: float
     body_latency: float
@@ -122,9 +133,29 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     pairs = tuple(pair for pair in values['allowed'] or () if pair)
     return PlannerParameters(
         arm=_with_allowed(arm, pairs) if pairs else arm,
+        stop_limits=_stop_limits(values, settings.limits),
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
+    )
+
+
+def _stop_limits(values: Mapping[str, Any], limits: MotionLimits) -> MotionLimits:
+    """Return the limits of fail-safe stops: those of motions where they are not greater."""
+    dof, given = len(limits.velocity), {}
+    for name, unit in STOP_LIMITS.items():
+        value = frozen_array(values[name], (None,), name, unit, OptionsError)
+        is_within = (value == 0.0) | ((value >= LOWEST_LIMIT) & (value <= HIGHEST_LIMIT))
+        if len(value) not in (1, dof) or not is_within.all():
+            raise OptionsError(
+                f'{name}: {value.tolist()}, expected {dof} values, or one for all joints, 0 or '
+                f'from {LOWEST_LIMIT:g} to {HIGHEST_LIMIT:g} [{unit}]'
+            )
+        given[name] = value
+    return MotionLimits(
+        velocity=limits.velocity,
+        acceleration=np.maximum(limits.acceleration, given['stop_acceleration']),
+        jerk=np.maximum(limits.jerk, given['stop_jerk']),
     )
 
 

@@ -166,7 +166,7 @@ class ExecutionMonitor:
         """Return the fail-safe stop from where the arm is."""
         # Before a handover the stop begins with the new motion.
         start = running.start_time if phase < 0.0 else now
-        stop = fast_stop(running.trajectory, phase, self._parameters.limits)
+        stop = fast_stop(running.trajectory, phase, self._parameters.stop_limits)
         return ExecutingMotion(trajectory=stop, start_time=start)
 
     def on_body(self, body: WearerBody, arrived: int) -> None:
