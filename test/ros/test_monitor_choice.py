@@ -67,7 +67,7 @@ def test_drives_that_can_do_more_stop_sooner_and_before_the_hand():
     for limits in (usual.stop_limits, strong):
         monitored = Monitored(node, replace(usual, stop_limits=limits))
         # So near that only the stronger stop ends before it.
-        monitored.see(monitored.hand(0.28, 0.0))
+        monitored.see(monitored.hand(0.36, 0.0))
         ((stop, _),) = monitored.published
         stops.append(stop)
         assert ('not proven free either' in monitored.reporter.monitor_state[1]) == (
