@@ -1033,7 +1033,7 @@ def test_a_new_algorithm_is_warmed_up_before_the_next_request(start, monkeypatch
     say_all(planner, stranger)
     order, plan_motion = [], in_process_planner.plan_question
 
-    def warm_up(_, options):
+    def warm_up(_, options, __):
         time.sleep(0.2)
         order.append(type(options).__name__)
 
