@@ -114,6 +114,8 @@ def library_of(name: str) -> DistanceLibrary:
 
 
 def _coal_distance(coal: Any) -> Callable[..., float]:
+    """Return coal's distance of two objects [m], with a result of its own for each query."""
+
     def distance(one: Any, other: Any, request: Any, _: None) -> float:
         found: float = coal.distance(one, other, request, coal.DistanceResult())
         return found

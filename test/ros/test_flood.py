@@ -37,7 +37,7 @@ N_QUIET, N_FLOODED, N_STILL = 100, 25, 2
 # So many times the work of a request without a flood may the node do until it answers one under
 # a flood, in the mean and the worst. By a clock, or in messages of the flood, it would be the
 # machine that is tested, and what it does besides.
-MEAN, WORST = 25.0, 60.0
+MEAN, WORST = 15.0, 40.0
 
 
 @pytest.fixture(name='client', scope='module')
