@@ -1,0 +1,146 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Separation from a wearer who moves: what is assumed of him, and where his parts may be."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from rrth_planner.model.arrays import Array, frozen_array
+from rrth_planner.model.errors import OptionsError, SceneError
+from rrth_planner.model.scene import Scene
+
+# Greatest speeds of parts of the body by words of their names, the first that fits [m/s]; the base
+# frame is the torso's.
+BODY_SPEEDS = (
+    ('torso', 0.0),
+    ('chest', 0.0),
+    ('head', 1.0),
+    ('neck', 1.0),
+    ('upper arm', 1.6),
+    ('forearm', 2.0),
+    ('hand', 2.0),
+    ('pelvis', 1.0),
+    ('thigh', 1.0),
+    ('shin', 2.0),
+    ('foot', 2.0),
+    ('', 2.0),
+)
+# Faster than any part of a body [m/s].
+FASTEST = 100.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeparationRules:
+    """
+    What a commanded motion has to keep clear of, and how fast a part of the arm is at rest.
+
+    Parameters
+    ----------
+    contact_speed : float
+        No faster point of the arm may meet the wearer; 0: none that moves at all [m/s].
+    body_speeds : sequence of (str, float)
+        Greatest speed [m/s] of the parts of the body whose names have some words; the first that
+        fits counts. Underscores and hyphens count as spaces, capitals as small letters.
+    body_error : float
+        Greatest error of a box [m].
+    controller_delay : float
+        The arm executes a motion at most so late [s].
+
+    Raises
+    ------
+    OptionsError
+        A value that is negative or not a number, or body speeds without one for any other part.
+
+    """
+
+    contact_speed: float = 0.1
+    body_speeds: tuple[tuple[str, float], ...] = BODY_SPEEDS
+    body_error: float = 0.01
+    controller_delay: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        object.__setattr__(self, 'body_speeds', tuple((w, float(v)) for w, v in self.body_speeds))
+        for name, unit, greatest in (
+            ('contact_speed', 'm/s', FASTEST),
+            ('body_error', 'm', 10.0),
+            ('controller_delay', 's', 10.0),
+        ):
+            value = getattr(self, name)
+            if not 0.0 <= value <= greatest:
+                raise OptionsError(f'{name}: {value}, expected 0 to {greatest:g} [{unit}]')
+        for words, speed in self.body_speeds:
+            if not 0.0 <= speed <= FASTEST:
+                raise OptionsError(
+                    f'body_speeds: "{words}: {speed}", expected 0 to {FASTEST:g} [m/s]'
+                )
+        if not any(words == '' for words, _ in self.body_speeds):
+            raise OptionsError(
+                'body_speeds: none for any other part of the body, expected ": 2.0" or the like'
+            )
+
+
+def speed_bound(rules: SeparationRules, name: str) -> float:
+    """Return the greatest speed that is assumed of a part of the body, by its name [m/s]."""
+    given = _plain(name)
+    return next(speed for words, speed in rules.body_speeds if _plain(words) in given)
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace('_', ' ').replace('-', ' ')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenBody:
+    """
+    The wearer as he was last seen, at some instant.
+
+    Parameters
+    ----------
+    scene : Scene
+        The boxes as they were seen.
+    ages : array_like, shape (m,)
+        How long before the instant each box was seen [s].
+    speeds : array_like, shape (m,)
+        Greatest speed of each box since then [m/s].
+
+    Raises
+    ------
+    SceneError
+        Not one age and speed >= 0 for each box.
+
+    """
+
+    scene: Scene
+    ages: Array
+    speeds: Array
+
+    def __post_init__(self) -> None:
+        """Validate and freeze."""
+        for name, unit in (('ages', 's'), ('speeds', 'm/s')):
+            shape = (len(self.scene.boxes),)
+            value = frozen_array(getattr(self, name), shape, name, unit, SceneError)
+            if not (value >= 0.0).all():
+                raise SceneError(f'{name}: {value.tolist()}, expected values >= 0 [{unit}]')
+            object.__setattr__(self, name, value)
+
+
+def seen_body(scene: Scene, ages: float | Sequence[float], rules: SeparationRules) -> SeenBody:
+    """Return a body seen some time ago, one age for all boxes or one each [s], >= 0."""
+    speeds = np.array([speed_bound(rules, box.name) for box in scene.boxes])
+    return SeenBody(scene, np.broadcast_to(np.asarray(ages, dtype=np.float64), len(speeds)), speeds)
+
+
+def growth_at(
+    body: SeenBody, rules: SeparationRules, margin: float, time: float
+) -> Array:
+    """
+    Return by how much each box has to be grown at a time after the instant of the body, (m,) [m].
+
+    margin + error + speed (time + delay - when it was seen): a part of the arm that keeps further
+    away than this is clear of whatever the body does meanwhile (`docs/algorithms.md`).
+    """
+    elapsed = time + rules.controller_delay + body.ages
+    grown: Array = margin + rules.body_error + body.speeds * np.maximum(elapsed, 0.0)
+    return grown
