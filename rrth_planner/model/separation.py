@@ -129,12 +129,12 @@ class SeenBody:
 def seen_body(scene: Scene, ages: float | Sequence[float], rules: SeparationRules) -> SeenBody:
     """Return a body seen some time ago, one age for all boxes or one each [s], >= 0."""
     speeds = np.array([speed_bound(rules, box.name) for box in scene.boxes])
-    return SeenBody(scene, np.broadcast_to(np.asarray(ages, dtype=np.float64), len(speeds)), speeds)
+    return SeenBody(
+        scene, np.broadcast_to(np.asarray(ages, dtype=np.float64), len(speeds)), speeds
+    )
 
 
-def growth_at(
-    body: SeenBody, rules: SeparationRules, margin: float, time: float
-) -> Array:
+def growth_at(body: SeenBody, rules: SeparationRules, margin: float, time: float) -> Array:
     """
     Return by how much each box has to be grown at a time after the instant of the body, (m,) [m].
 

@@ -1,0 +1,76 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The proof that a motion keeps separate from a wearer who moves."""
+
+from dataclasses import dataclass
+import functools
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4
+from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
+from rrth_planner.kernels.collision.separation import first_blocked
+from rrth_planner.model.arm import ArmModel, bars_of
+from rrth_planner.model.separation import growth_at, SeenBody, SeparationRules
+from rrth_planner.model.trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """When a motion is not proven separate from the wearer [s], by which bar and which box."""
+
+    time: float
+    bar: str
+    box: str
+
+
+def first_unproven(
+    trajectory: Trajectory,
+    begin: float,
+    arm: ArmModel,
+    body: SeenBody,
+    rules: SeparationRules,
+    margin: float,
+) -> Blocked | None:
+    """
+    Return where a motion is not proven separate from a moving wearer; None: it is proven.
+
+    At no instant after `begin` [s] is a point of the arm that is faster than the contact speed in
+    a box that has been growing at its greatest speed since it was seen, margin [m] and error
+    added (`growth_at`). The body is that of the time 0 of the motion. The pointing ray is left
+    out: it has no body. It holds between any two instants, too (`docs/algorithms.md`, section 8).
+    """
+    boxes = body.scene.boxes
+    if not boxes or len(trajectory.times) == 1:
+        return None
+    robot, chain = arm_rows(arm, 0.0)
+    found = np.empty(2)
+    blocking = first_blocked(
+        trajectory.times,
+        *trajectory.states,
+        begin,
+        rules.contact_speed,
+        moving_joints(arm),
+        chain,
+        robot,
+        body.scene.numbers,
+        box_classes(arm, body.scene),
+        mount_inverse(arm),
+        growth_at(body, rules, margin + SLACK, 0.0),
+        body.speeds,
+        BERNSTEIN_4,
+        BERNSTEIN_3,
+        found,
+    )
+    if blocking < 0:
+        return None
+    bar, box = divmod(blocking, len(boxes))
+    return Blocked(float(found[0]), bars_of(arm)[bar].name, boxes[box].name)
+
+
+@functools.lru_cache(maxsize=16)
+def moving_joints(arm: ArmModel) -> NDArray[np.int64]:
+    """Return how many joints move each bar, (n,), the pointing ray left out."""
+    joints = np.array([bar.body for bar in bars_of(arm)[:-1]], dtype=np.int64)
+    joints.setflags(write=False)
+    return joints

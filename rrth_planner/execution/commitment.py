@@ -1,0 +1,268 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Commitments: motions that are given to a controller, each safe by itself up to its end."""
+
+from dataclasses import dataclass
+import math
+
+import numpy as np
+from rrth_planner.collision.separation import Blocked, first_unproven, moving_joints
+from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
+from rrth_planner.kernels.collision.separation import permitted_rates
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.separation import growth_at, SeenBody, SeparationRules
+from rrth_planner.model.trajectory import (
+    MotionLimits,
+    piece_coefficients,
+    sample,
+    Trajectory,
+)
+from rrth_planner.timing.fast_stop import fast_stop
+from rrth_planner.timing.rate_profile import (
+    continued,
+    rate_state,
+    RateProfile,
+    scaled,
+    steered,
+)
+
+# How long a commitment goes on before its stop begins: the next one is there by then, or the one
+# after that [s].
+STRETCH = 0.027
+# How far ahead the permitted rate is asked for [s], at so many places of the motion.
+AHEAD, PLACES = 0.6, 20
+# Share of its limits that a motion slows down with; how much of a ramp that takes from the way.
+GENTLE, RAMP = 0.5, 0.5
+# Rates that are tried where the permitted one is not proven, as shares of the present one.
+LOWER = (1.0, 0.7)
+# Shares of the permitted rate that a motion from rest may begin with.
+BEGINNINGS = (1.0, 0.5, 0.2)
+# A slower joint is at rest [rad/s].
+REST = 1e-6
+# A rate at which the rest of the motion is tried as a whole.
+WHOLE = 0.999
+# A motion is at its end so shortly before it [s].
+END = 1e-6
+# How far an arm may be from a new commitment when that begins, late or after a stop, and what that
+# is at the tip of an arm of some metres [rad, m].
+JUMP, JUMP_WAY = 2e-4, 5e-4
+# Spacing of the samples by which a stop is localized on its motion [s].
+SPACING = 2e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Commitment:
+    """
+    A motion that was given to the controller: a stretch of the planned motion, then a stop.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The planned motion, to rest.
+    trajectory : Trajectory
+        The commitment, along the path of the motion, to rest.
+    start_time : float
+        When it begins [s].
+    profile : RateProfile
+        Where within the motion it is until the stop begins, and what was intended after that.
+    stretch : float
+        When the stop begins, after the start; infinite for the whole rest of the motion [s].
+
+    """
+
+    motion: Trajectory
+    trajectory: Trajectory
+    start_time: float
+    profile: RateProfile
+    stretch: float
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is the whole rest of the motion."""
+        return self.stretch == math.inf
+
+    @property
+    def end_time(self) -> float:
+        """When the arm is at rest [s]."""
+        return self.start_time + self.trajectory.duration
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Separation:
+    """
+    What commitments are proven with.
+
+    Parameters
+    ----------
+    margin : float
+        [m].
+    limits, stop_limits : MotionLimits
+        Of the motion, and of the stop that ends a commitment.
+
+    """
+
+    arm: ArmModel
+    rules: SeparationRules
+    margin: float
+    limits: MotionLimits
+    stop_limits: MotionLimits
+
+
+def path_state(commitment: Commitment, time: float) -> Array:
+    """
+    Return where within the planned motion a commitment is at a time [s], and how fast.
+
+    (3,): the time within the motion [s], the rate and its derivative [1/s]; those of `rate_state`.
+    """
+    elapsed = time - commitment.start_time
+    if elapsed <= commitment.stretch:
+        return rate_state(commitment.profile, max(elapsed, 0.0))
+    begin = float(rate_state(commitment.profile, commitment.stretch)[0])
+    motion, stop = commitment.motion, commitment.trajectory
+    q, v, a = (row[0] for row in sample(stop, [min(elapsed, stop.duration)]))
+    # Between its points a stop is up to 1e-4 rad from the path: the nearest place of that counts.
+    ahead = min(motion.duration, begin + elapsed - commitment.stretch)
+    places = np.linspace(begin, ahead, 2 + int((ahead - begin) / SPACING))
+    gaps = ((sample(motion, places)[0] - q) ** 2).sum(axis=1)
+    tau = float(places[int(gaps.argmin())])
+    for _ in range(4):
+        p, w, _ = (row[0] for row in sample(motion, [tau]))
+        tau = min(max(tau + float((q - p) @ w) / max(float(w @ w), 1e-12), begin), ahead)
+    _, w, b = (row[0] for row in sample(motion, [tau]))
+    square = max(float(w @ w), 1e-12)
+    rate = min(max(float(v @ w) / square, 0.0), 1.0)
+    return np.array([tau, rate, float((a - b * rate**2) @ w) / square])
+
+
+def permitted_ahead(
+    motion: Trajectory, places: Array, body: SeenBody, settings: Separation
+) -> Array:
+    """
+    Return the rates that are permitted at places of a motion, (n,) [s] -> (n, 3).
+
+    The greatest rate from which a stop would keep clear of the wearer, up to 1 [-], and how fast
+    the rate may change there: its first and its second derivative [1/s, 1/s^2]. body: the wearer
+    as he will be known when such a stop begins. An estimate: `first_unproven` proves.
+    """
+    arm, rules = settings.arm, settings.rules
+    robot, chain = arm_rows(arm, 0.0)
+    found = np.empty((len(places), 3))
+    permitted_rates(
+        piece_coefficients(motion),
+        motion.times,
+        places,
+        *settings.limits.rows[1:],
+        *settings.stop_limits.rows[1:],
+        rules.contact_speed,
+        moving_joints(arm),
+        chain,
+        robot,
+        body.scene.numbers,
+        box_classes(arm, body.scene),
+        mount_inverse(arm),
+        growth_at(body, rules, settings.margin + SLACK + JUMP_WAY, STRETCH),
+        body.speeds,
+        found,
+    )
+    return found
+
+
+def permitted(motion: Trajectory, time: float, body: SeenBody, settings: Separation) -> float:
+    """Return the rate at a time from which a motion can slow down to what is permitted ahead."""
+    places = np.linspace(time, min(time + AHEAD, motion.duration), PLACES)
+    rates, slows, fades = permitted_ahead(motion, places, body, settings).T
+    # The square of the rate falls by 2 s_ddot along the way, less what the ramps take of that.
+    way = np.maximum(places - time - RAMP * slows / fades, 0.0)
+    return float(np.sqrt(rates**2 + 2.0 * GENTLE * slows * way).min(initial=1.0))
+
+
+def first_commitment(
+    motion: Trajectory, time: float, body: SeenBody, settings: Separation
+) -> Commitment | Blocked:
+    """
+    Return the first commitment of a motion, from its beginning at a time on [s].
+
+    body: the wearer at that time. Else where the motion is not proven separate from him: it can
+    not even begin.
+    """
+    is_at_rest = bool((np.abs(motion.velocities[0]) < REST).all())
+    # At rest the motion may begin at any rate.
+    rate = permitted(motion, 0.0, body, settings) if is_at_rest else 1.0
+    for share in BEGINNINGS if is_at_rest else (1.0,):
+        state = np.array([0.0, rate * share, 0.0])
+        found = _committed(motion, time, state, None, body, settings)
+        if isinstance(found, Commitment):
+            break
+    return found
+
+
+def extended(
+    commitment: Commitment, time: float, body: SeenBody, settings: Separation
+) -> Commitment | Blocked | None:
+    """
+    Return the commitment that replaces the present one from a time on [s].
+
+    body: the wearer at that time. None where the present one leads to the end of the motion, is
+    over, or has arrived there; where no longer one is proven, what keeps it from it: then the
+    present one, which is proven, ends in its stop.
+    """
+    if commitment.is_whole:
+        return None
+    state = path_state(commitment, time)
+    if state[0] >= commitment.motion.duration - END:
+        return None
+    elapsed = time - commitment.start_time
+    held = continued(commitment.profile, elapsed) if elapsed <= commitment.stretch else None
+    return _committed(commitment.motion, time, state, held, body, settings)
+
+
+def _committed(
+    motion: Trajectory,
+    time: float,
+    state: Array,
+    held: RateProfile | None,
+    body: SeenBody,
+    settings: Separation,
+) -> Commitment | Blocked:
+    """Return the fastest commitment from a state that is proven, or what keeps it from it."""
+    rules, margin = settings.rules, settings.margin + JUMP_WAY
+    blocked: Blocked | None = None
+
+    def is_proven(curve: Trajectory) -> bool:
+        nonlocal blocked
+        found = first_unproven(curve, 0.0, settings.arm, body, rules, margin)
+        blocked = blocked or found
+        return found is None
+
+    target = permitted(motion, float(state[0]), body, settings)
+    for share in (None, *LOWER):
+        rate = target if share is None else min(target, share * float(state[1]))
+        profile = steered(motion, state, rate, settings.limits)
+        if profile is None and share is None:
+            # At a limit already: the rate goes on changing as it was to.
+            profile = held
+        if profile is None:
+            continue
+        intended = scaled(motion, profile)
+        if len(intended.times) == 1:
+            # It would never move.
+            continue
+        if rate >= WHOLE and is_proven(intended):
+            return Commitment(
+                motion=motion,
+                trajectory=intended,
+                start_time=time,
+                profile=profile,
+                stretch=math.inf,
+            )
+        curve = fast_stop(intended, 0.0, settings.stop_limits, STRETCH)
+        if len(curve.times) > 1 and is_proven(curve):
+            return Commitment(
+                motion=motion,
+                trajectory=curve,
+                start_time=time,
+                profile=profile,
+                stretch=min(STRETCH, curve.duration),
+            )
+    return blocked or Blocked(0.0, 'the arm', 'its limits')

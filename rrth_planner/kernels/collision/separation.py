@@ -1,0 +1,379 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Separation of a moving arm from boxes that move too: the proof, and the rate that it permits."""
+
+import math
+
+from numba.core.types import boolean, float64, int64, void
+import numpy as np
+from rrth_planner.kernels import scratch
+from rrth_planner.kernels.collision.arm_validity import BARS_ROOM, curvature_bounds, ENDS_ROOM
+from rrth_planner.kernels.collision.bar_box import bar_box_distance
+from rrth_planner.kernels.collision.boxes import rows_of
+from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS, VEC
+from rrth_planner.kernels.layout import (
+    ALLOWED,
+    BAR_SIZE,
+    BOX_CLASS,
+    BOX_HALF,
+    BOX_OFFSET,
+    BOX_ROWS,
+    KIND,
+    MAX_DOF,
+    PRISMATIC,
+    REVOLUTE,
+)
+from rrth_planner.kernels.trajectory.lookahead import derivatives_on
+from rrth_planner.kernels.trajectory.quintics import bound, fit
+
+# Intervals that a motion is first cut into are no longer than this [s], and are halved so often
+# before the proof gives up: 0.05 ms.
+FIRST, HALVINGS = 0.0128, 8
+# Rounding of a speed [m/s].
+AT_REST = 1e-9
+# Steps of the search for the permitted rate; the time between two places of a difference [s].
+STEPS, STEP = 5, 1e-4
+# Smallest velocities that are divided by [rad/s].
+TINY, SLOW = 1e-6, 1e-3
+
+# A wearer as he was seen: boxes (m, 15) and classes (m,) as in `layout`, T_arm_base (4, 4), by how
+# much each box is grown at time 0 (m,) [m], and its greatest speed (m,) [m/s].
+BODY = (MAT, VEC, MAT, VEC, VEC)
+
+
+@kernel(void(MAT, float64, float64, OUT_MAT))
+def cut(curve, begin, end, part):
+    """
+    Write the part of a polynomial between two shares of it, again over u from 0 to 1.
+
+    curve, part (degree + 1, dof), lowest power first: q(begin + (end - begin) u), by Horner's
+    scheme (Taylor shift).
+    """
+    n, dof = curve.shape
+    for k in range(dof):
+        for i in range(n):
+            part[i, k] = curve[i, k]
+        for i in range(n - 1):
+            for j in range(n - 2, i - 1, -1):
+                part[j, k] += begin * part[j + 1, k]
+        scale = 1.0
+        for i in range(n):
+            part[i, k] *= scale
+            scale *= end - begin
+
+
+@kernel(boolean(OUT_VEC, int64, float64, float64, float64, MAT, int64))
+def is_apart(points, at, low, high, distance, rows, box):
+    """
+    Return whether a part of a line is further away from a box than a distance [m].
+
+    The line from points[at] to points[at + 4], of it the part between two shares; rows (16, m) as
+    from `boxes.rows_of`.
+    """
+    start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
+    gap = -math.inf
+    for r in range(3):
+        first = last = rows[BOX_OFFSET + r, box]
+        for c in range(3):
+            cosine = rows[3 * r + c, box]
+            first += cosine * points[at + c]
+            last += cosine * points[at + 4 + c]
+        begin, end = first + low * (last - first), first + high * (last - first)
+        start[r], step[r], half[r] = begin, end - begin, rows[BOX_HALF + r, box]
+        gap = max(gap, min(begin, end) - half[r], -max(begin, end) - half[r])
+    # Mostly a face of the box shows it. Not for NaN, which must never count as apart.
+    return gap > distance or bar_box_distance(start, step, half) > distance
+
+
+@kernel(boolean(float64, float64, float64, OUT_VEC))
+def fast_part(begin, end, contact, part):
+    """
+    Write the part of a bar that may be faster than at rest, shares of it; return if there is one.
+
+    begin, end: bounds of the speeds of its two ends, between which the speed is no greater than
+    the straight line (it is convex); contact: the speed that counts as rest.
+    """
+    part[0], part[1] = 0.0, 1.0
+    # Also for NaN, which is never at rest.
+    if begin <= contact and end <= contact:
+        return False
+    if begin < contact:
+        part[0] = (contact - begin) / (end - begin)
+    elif end < contact:
+        part[1] = (contact - begin) / (end - begin)
+    return True
+
+
+@kernel(int64(MAT, float64, float64, float64, READ_INTS, CHAIN, MAT, MAT, VEC, VEC, MAT, MAT))
+def blocking_box(
+    part, begin, end, contact, bodies, chain, robot, rows, growths, speeds, quartic, cubic
+):
+    """
+    Return which box is not proven apart from an arm in motion, bar * m + box; -1: none.
+
+    part (6, dof): the motion between two times [s], over u from 0 to 1; contact: speed up to which
+    a point of the arm counts as at rest [m/s]; bodies (n_bars,): how many joints move each bar,
+    the pointing ray left out; rows (16, m), growths at time 0 and speeds (m,): the boxes; quartic
+    and cubic as for `quintics.bound`. With dp the way of an end of a bar and b the bound of its second
+    derivative by u, it is no faster than |dp| + b / 2, and within |dp| / 2 + b / 8 of the mean of
+    its two places (`docs/algorithms.md`).
+    """
+    dof, m, width, n_bars = part.shape[1], rows.shape[1], end - begin, bodies.shape[0]
+    q, middle, after = (
+        scratch.floats(MAX_DOF),
+        scratch.floats(ENDS_ROOM),
+        scratch.floats(ENDS_ROOM),
+    )
+    moved, share, bows = scratch.floats(2), scratch.floats(2), scratch.floats(BARS_ROOM)
+    top, bend = np.empty((1, dof)), np.empty((1, dof))
+    for k in range(dof):
+        q[k] = part[0, k]
+    chain(q[:dof], 0.0, middle, 0)
+    for k in range(dof):
+        for i in range(1, part.shape[0]):
+            q[k] += part[i, k]
+    chain(q[:dof], 0.0, after, 0)
+    bound(part.reshape((1, part.shape[0], dof)), quartic, cubic, top, bend)
+    curvature_bounds(robot, n_bars, top[0], bend[0], bows)
+    for bar in range(n_bars):
+        at, turned = BAR_SIZE * bar, 0.0
+        for k in range(bodies[bar]):
+            turned += top[0, k] if robot[k, KIND] == REVOLUTE else 0.0
+        for i in range(2):
+            square = 0.0
+            for c in range(3):
+                x, y = middle[at + 4 * i + c], after[at + 4 * i + c]
+                square += (y - x) * (y - x)
+                middle[at + 4 * i + c] = 0.5 * (x + y)
+            moved[i] = math.sqrt(square)
+        radius, bow, other = after[at + 7], bows[2 * bar], bows[2 * bar + 1]
+        # The flesh is faster than the line within it where the bar turns, and so is what slides
+        # within a bar that a joint extends.
+        sliding = top[0, bodies[bar] - 1] if robot[bodies[bar] - 1, KIND] == PRISMATIC else 0.0
+        rest = (contact + AT_REST) * width - radius * turned - sliding
+        if not fast_part(moved[0] + 0.5 * bow, moved[1] + 0.5 * other, rest, share):
+            continue
+        strays = 0.0
+        for i in range(2):
+            # Between the two ends of the part it is no greater: convex, and linear.
+            s = share[i]
+            way, bent = (1.0 - s) * moved[0] + s * moved[1], (1.0 - s) * bow + s * other
+            strays = max(strays, 0.5 * way + 0.125 * bent)
+        classes = int64(robot[dof + 2 + bar, ALLOWED])
+        for box in range(m):
+            if (classes >> int64(rows[BOX_CLASS, box])) & 1:
+                continue
+            needed = radius + strays + growths[box] + speeds[box] * end
+            if not is_apart(middle, at, share[0], share[1], needed, rows, box):
+                return bar * m + box
+    return -1
+
+
+@kernel(void(MAT, VEC, MAT, OUT_MAT))
+def seen_rows(boxes, classes, T_arm_base, rows):
+    """Write the rows of boxes as they were seen, (16, m), as `boxes.rows_of` does."""
+    rows_of(boxes, T_arm_base, 0.0, rows)
+    for i in range(boxes.shape[0]):
+        rows[BOX_CLASS, i] = classes[i]
+
+
+@kernel(
+    int64(
+        *(VEC, MAT, MAT, MAT, float64, float64),
+        *(READ_INTS, CHAIN, MAT, *BODY, MAT, MAT, OUT_VEC),
+    ),
+    is_short=True,
+)
+def first_blocked(
+    times,
+    positions,
+    velocities,
+    accelerations,
+    begin,
+    contact,
+    bodies,
+    chain,
+    robot,
+    boxes,
+    classes,
+    T_arm_base,
+    growths,
+    speeds,
+    quartic,
+    cubic,
+    found,
+):
+    """
+    Return -1 where a motion is proven separate from a moving wearer, else bar * m + box.
+
+    times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of the motion,
+    of which only what comes after `begin` counts. The rest: as for `BODY` and `blocking_box`.
+    found (2,): begin and end of the interval that is not proven [s]. Intervals are halved until
+    each is proven; conservative advancement to both sides of their middles.
+    """
+    n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
+    curves, part = np.empty((n_pieces, 6, dof)), np.empty((6, dof))
+    rows = np.empty((BOX_ROWS, boxes.shape[0]))
+    fit(times, positions, velocities, accelerations, curves)
+    seen_rows(boxes, classes, T_arm_base, rows)
+    for i in range(n_pieces):
+        length = times[i + 1] - times[i]
+        share = min(max(0.0, (begin - times[i]) / length), 1.0)
+        n_parts = max(1, math.ceil((1.0 - share) * length / FIRST - 1e-9))
+        smallest = (1.0 - share) / n_parts / 2.0**HALVINGS
+        left = share
+        step = (1.0 - share) / n_parts
+        # From the first instant to the last: what is left of a halved interval comes next.
+        while left < 1.0:
+            right = left + step
+            if right > 1.0 - 0.5 * smallest:
+                right = 1.0
+            cut(curves[i], left, right, part)
+            t, end = times[i] + left * length, times[i] + right * length
+            blocking = blocking_box(
+                part, t, end, contact, bodies, chain, robot, rows, growths, speeds, quartic, cubic
+            )
+            if blocking >= 0:
+                if step <= smallest:
+                    found[0], found[1] = t, end
+                    return blocking
+                step *= 0.5
+                continue
+            left = right
+            # The next one may be wider again.
+            step = min(2.0 * step, (1.0 - share) / n_parts)
+    return -1
+
+
+@kernel(float64(float64, float64, float64))
+def stop_time(v, a, j):
+    """Return how long a joint takes from a velocity to rest, within limits of the stop [s]."""
+    return v / a + a / j if v * j >= a * a else 2.0 * math.sqrt(v / j)
+
+
+@kernel(float64(float64, float64, float64))
+def last_of_stop(v, a, j):
+    """Return how long before the end of a stop a joint has slowed down to a velocity [s]."""
+    at_ramp = 0.5 * a * a / j
+    return math.sqrt(2.0 * v / j) if v <= at_ramp else a / j + (v - at_ramp) / a
+
+
+@kernel(
+    boolean(
+        *(float64, float64, float64, float64, float64, OUT_VEC, OUT_VEC),
+        *(float64, READ_INTS, int64, MAT, MAT, VEC, VEC),
+    )
+)
+def is_rate_safe(
+    rate, v, gains, a, j, points, ends, contact, bodies, dof, robot, rows, growths, speeds
+):
+    """
+    Return whether a stop that begins at a place, at a rate, would keep clear of a moving wearer.
+
+    v, gains, a, j: of the joint that takes longest to stop, velocity and acceleration at rate 1,
+    the latter 0 where it slows down, and the limits of the stop; points: the bars there; ends
+    (2 n_bars,): the speeds of their ends at rate 1 [m/s]; growths, speeds (m,): of the boxes when the stop begins. Of a bar the part that is faster than
+    `contact` counts, for as long as it is. An estimate: it takes the bar to move straight on.
+    """
+    share, m = scratch.floats(2), rows.shape[1]
+    # What accelerates goes on for a while.
+    fades = rate * rate * gains / j
+    top = rate * v + 0.5 * fades * fades * j
+    lasts = fades + stop_time(top, a, j)
+    for bar in range(bodies.shape[0]):
+        at, first, last = BAR_SIZE * bar, rate * ends[2 * bar], rate * ends[2 * bar + 1]
+        if not fast_part(first, last, contact, share):
+            continue
+        fastest = max(first, last)
+        slow = last_of_stop(rate * v * contact / fastest, a, j)
+        moves = max(lasts - slow, 0.0)
+        way = (0.5 * (lasts - fades) + fades) * fastest * top / max(rate * v, TINY)
+        classes = int64(robot[dof + 2 + bar, ALLOWED])
+        for box in range(m):
+            if (classes >> int64(rows[BOX_CLASS, box])) & 1:
+                continue
+            needed = points[at + 7] + way + growths[box] + speeds[box] * moves
+            if not is_apart(points, at, share[0], share[1], needed, rows, box):
+                return False
+    return True
+
+
+@kernel(
+    void(
+        *(CUBE, VEC, VEC, VEC, VEC, VEC, VEC, float64),
+        *(READ_INTS, CHAIN, MAT, *BODY, OUT_MAT),
+    ),
+    is_short=True,
+)
+def permitted_rates(
+    curves,
+    times,
+    places,
+    acceleration,
+    jerk,
+    stop_acceleration,
+    stop_jerk,
+    contact,
+    bodies,
+    chain,
+    robot,
+    boxes,
+    classes,
+    T_arm_base,
+    growths,
+    speeds,
+    found,
+):
+    """
+    Write the greatest rates at some places of a motion from which a stop would keep clear.
+
+    curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, increasing [s];
+    acceleration, jerk, stop_acceleration, stop_jerk (dof,): limits of the motion and of a stop;
+    growths (m,): of the boxes when a stop begins. The rest as for `BODY` and `first_blocked`.
+    found (m, 3): the rate, up to 1, and how fast the rate may change there: its first and its
+    second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes a motion smooth, and
+    proves nothing.
+    """
+    dof, n_bars = curves.shape[2], bodies.shape[0]
+    q, v, nearby, state = np.empty(dof), np.empty(dof), np.empty(dof), np.empty((4, dof))
+    points, other = scratch.floats(ENDS_ROOM), scratch.floats(ENDS_ROOM)
+    ends, rows = scratch.floats(BARS_ROOM), np.empty((BOX_ROWS, boxes.shape[0]))
+    seen_rows(boxes, classes, T_arm_base, rows)
+    piece = 0
+    for i in range(places.shape[0]):
+        while piece < curves.shape[0] - 1 and times[piece + 1] <= places[i]:
+            piece += 1
+        derivatives_on(curves, times, piece, places[i], state)
+        slowest, joint, slows, fades = 0.0, 0, math.inf, math.inf
+        for k in range(dof):
+            q[k], v[k] = state[0, k], abs(state[1, k])
+            nearby[k] = q[k] + STEP * state[1, k]
+            takes = stop_time(v[k], stop_acceleration[k], stop_jerk[k])
+            if takes > slowest:
+                slowest, joint = takes, k
+            slows = min(slows, acceleration[k] / max(v[k], SLOW))
+            fades = min(fades, jerk[k] / max(v[k], SLOW))
+        found[i, 1], found[i, 2] = slows, fades
+        chain(q, 0.0, points, 0)
+        chain(nearby, 0.0, other, 0)
+        for bar in range(n_bars):
+            for end in range(2):
+                square = 0.0
+                for c in range(3):
+                    p = BAR_SIZE * bar + 4 * end + c
+                    square += (other[p] - points[p]) ** 2
+                ends[2 * bar + end] = math.sqrt(square) / STEP
+        gains = max(0.0, math.copysign(state[2, joint], state[2, joint] * state[1, joint]))
+        limit = (v[joint], gains, stop_acceleration[joint], stop_jerk[joint])
+        place = (points, ends, contact, bodies, dof, robot, rows, growths, speeds)
+        low, high = 0.0, 1.0
+        if is_rate_safe(1.0, *limit, *place):
+            low = 1.0
+        else:
+            for _ in range(STEPS):
+                middle = 0.5 * (low + high)
+                if is_rate_safe(middle, *limit, *place):
+                    low = middle
+                else:
+                    high = middle
+        found[i, 0] = low
