@@ -8,12 +8,21 @@ against the slabs of the box, and a motion is checked instant by instant.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, bar_ends, Capsule, NO_BARS
+from rrth_planner.model.arm import ArmModel, bar_ends, bars_of, Capsule, is_called, NO_BARS
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.scene import Scene
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import growth_at, SeenBody, SeparationRules
 from rrth_planner.model.trajectory import Trajectory
+
+# Speeds [m/s] and depths [m] no further than this beyond what is allowed are rounding.
+ROUNDING = 1e-9
+# So small an imaginary part of a joint position that its square is nothing [s].
+TINY = 1e-30
+# A part of a bar is looked at in so many places, and once more in so many round the nearest one.
+PLACES, ROUNDS = 33, 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +35,14 @@ class Contact:
 
 
 def frames(arm: ArmModel, q: Array) -> Array:
-    """Return the poses of all link frames and of the tool, q (n, dof) -> (n, dof + 1, 4, 4)."""
-    n = len(q)
+    """
+    Return the poses of all link frames and of the tool, q (n, dof) -> (n, dof + 1, 4, 4).
+
+    They are analytic in q, which may be complex, and so are the bars: see `bar_velocities`.
+    """
+    n, kind = len(q), np.result_type(q.dtype, np.float64)
     T = np.tile(arm.T_base_mount, (n, 1, 1))
-    result = np.empty((n, arm.dof + 1, 4, 4))
+    result = np.empty((n, arm.dof + 1, 4, 4), dtype=kind)
     for i, (alpha, a, offset, d) in enumerate(arm.dh):
         value = q[:, i] if i < arm.dof else np.zeros(n)
         slides = i < arm.dof and arm.is_prismatic[i]
@@ -37,7 +50,7 @@ def frames(arm: ArmModel, q: Array) -> Array:
         rx = np.eye(4)
         rx[1:3, 1:3] = [[np.cos(alpha), -np.sin(alpha)], [np.sin(alpha), np.cos(alpha)]]
         rx[0, 3] = a
-        rz = np.tile(np.eye(4), (n, 1, 1))
+        rz = np.tile(np.eye(4, dtype=kind), (n, 1, 1))
         rz[:, 0, 0] = rz[:, 1, 1] = np.cos(theta)
         rz[:, 1, 0] = np.sin(theta)
         rz[:, 0, 1] = -np.sin(theta)
@@ -210,6 +223,13 @@ _HERMITE = np.array(
 )
 
 
+def instants(trajectory: Trajectory, period: float) -> Array:
+    """Return the times every `period`, and those of the points of a trajectory, (m,) [s]."""
+    times = trajectory.times
+    grid: Array = np.unique(np.concatenate([np.arange(0.0, times[-1], period), times]))
+    return grid
+
+
 def quintic_states(trajectory: Trajectory, period: float) -> tuple[Array, Array, Array, Array]:
     """
     Return what a quintic-interpolating controller commands, every `period` and at each point.
@@ -218,7 +238,10 @@ def quintic_states(trajectory: Trajectory, period: float) -> tuple[Array, Array,
     velocities, accelerations (m, dof) [rad, rad/s, rad/s^2].
     """
     times, positions = trajectory.times, trajectory.positions
-    grid = np.unique(np.concatenate([np.arange(0.0, times[-1], period), times]))
+    grid = instants(trajectory, period)
+    if len(times) == 1:
+        still = np.zeros_like(positions)
+        return grid, positions, still, still
     q, v, a = (np.empty((len(grid), positions.shape[1])) for _ in range(3))
     for i in range(len(times) - 1):
         # In units of the piece's own length the equations are well conditioned.
@@ -235,3 +258,144 @@ def quintic_states(trajectory: Trajectory, period: float) -> tuple[Array, Array,
         v[inside] = sum(k * c[k] * s ** (k - 1) for k in range(1, 6)) / T
         a[inside] = sum(k * (k - 1) * c[k] * s ** (k - 2) for k in range(2, 6)) / T**2
     return grid, q, v, a
+
+
+@dataclass(frozen=True, slots=True)
+class SeparationViolation:
+    """
+    A part of the arm that is faster than the contact speed, in a grown box of the wearer.
+
+    When [s], the index of the bar in `arm.bars_of`, which box, and how much further away the bar
+    would have to be [m].
+    """
+
+    time: float
+    bar: int
+    box: str
+    depth: float
+
+
+def separation_violations(
+    arm: ArmModel,
+    body: SeenBody,
+    trajectory: Trajectory,
+    rules: SeparationRules,
+    margin: float,
+    *,
+    period: float = 1e-3,
+) -> list[SeparationViolation]:
+    """
+    Return where a motion that begins at the instant of the body breaks the separation from it.
+
+    At each of the `instants` that are `period` [s] apart: every bar and every box, in the order of
+    time; empty: none. The pointing ray has no body and does not count; pairs of `arm.allowed` do
+    not either. margin: what has to be left between the two beyond all that is assumed [m].
+    """
+    times, q, v, _ = quintic_states(trajectory, period)
+    growths = np.array([growth_at(body, rules, margin, time) for time in times])
+    distances = fast_distances(arm, body.scene, q, v, rules.contact_speed, growths)
+    depths = growths[:, None, :] - distances
+    return [
+        SeparationViolation(
+            float(times[i]), int(bar), body.scene.boxes[k].name, float(depths[i, bar, k])
+        )
+        for i, bar, k in np.argwhere(depths > ROUNDING)
+    ]
+
+
+def fast_distances(
+    arm: ArmModel, scene: Scene, q: Array, v: Array, contact_speed: float, within: Array
+) -> Array:
+    """
+    Return how far the fast part of each bar is from each box, (n, n_bars - 1, m) [m].
+
+    q, v (n, dof): states of the arm [rad, rad/s]; contact_speed: no slower place of a bar counts
+    [m/s]; within (n, m): how near a box matters [m]. Bars as in `arm.bars_of`, without the
+    pointing ray. Infinite where no place is fast, where the box is further away than matters, and
+    for the pairs of `arm.allowed`. A bar whose axis is in the box is its own radius deep.
+
+    The flesh round a place of the axis is as fast as the place and its radius times the sum of the
+    speeds of all joints that turn the bar.
+    """
+    bars = bars_of(arm)[:-1]
+    ends, velocities = bar_ends_at(arm, q, 0.0), bar_velocities(arm, q, v)
+    result = np.full((len(q), len(bars), len(scene.boxes)), np.inf)
+    for b, bar in enumerate(bars):
+        turns = np.abs(v[:, : bar.body]) @ ~np.array(arm.is_prismatic[: bar.body])
+        slow = contact_speed + ROUNDING - bar.radius * turns
+        parts = fast_parts(velocities[:, b], slow)
+        middle = ends[:, b].mean(axis=1)
+        half = np.linalg.norm(ends[:, b, 1] - middle, axis=1)
+        for k, box in enumerate(scene.boxes):
+            if any(part == bar.name and is_called(box.name, name) for part, name in arm.allowed):
+                continue
+            near = _distances(middle[:, None], box)[:, 0] - half - bar.radius <= within[:, k]
+            for part in (0, 1):
+                rows = near & (parts[:, part, 0] <= parts[:, part, 1])
+                least = _least_distances(ends[rows, b], parts[rows, part], box) - bar.radius
+                result[rows, b, k] = np.minimum(result[rows, b, k], least)
+    return result
+
+
+def bar_velocities(arm: ArmModel, q: Array, v: Array) -> Array:
+    """
+    Return the velocities of both ends of the bars as in `bar_ends_at`, (n, n_bars, 2, 3) [m/s].
+
+    q, v (n, dof): states of the arm. The ends are analytic functions of the positions: the
+    imaginary part of their values at q + i h v is h times their derivative along v, to rounding.
+    """
+    moved: Any = q + 1j * TINY * v
+    result: Array = bar_ends_at(arm, moved, 0.0).imag / TINY
+    return result
+
+
+def fast_parts(velocities: Array, slow: Array) -> Array:
+    """
+    Return the two parts of a bar, from its start and to its end, that are faster than a speed.
+
+    velocities (n, 2, 3) of its ends, slow (n,) [m/s]; < 0: all of it is. Each part from 0, the
+    start of the bar, to 1, its end; empty ones end before they begin. (n, 2, 2).
+    """
+    a, step = velocities[:, 0], velocities[:, 1] - velocities[:, 0]
+    square = (step * step).sum(axis=1)
+    is_even = square == 0.0
+    square = np.where(is_even, 1.0, square)
+    # The square of the speed at s is that of the least one, on the line through the bar, and
+    # square (s - slowest)^2.
+    slowest = -(a * step).sum(axis=1) / square
+    least = np.linalg.norm(a + slowest[:, None] * step, axis=1)
+    reach = np.sqrt(np.maximum(slow * slow - least * least, 0.0) / square)
+    reach[is_even] = np.inf
+    first, last = slowest - reach, slowest + reach
+    parts = np.empty((len(a), 2, 2))
+    parts[:, 0, 0], parts[:, 0, 1] = 0.0, np.minimum(first, 1.0)
+    parts[:, 1, 0], parts[:, 1, 1] = np.maximum(last, 0.0), 1.0
+    parts[slow < least] = [[0.0, 1.0], [1.0, 0.0]]
+    return parts
+
+
+def _least_distances(ends: Array, part: Array, box: Box) -> Array:
+    """
+    Return the least distance of the places of a part of a bar from a box, (n,) [m].
+
+    ends (n, 2, 3) [m]; part (n, 2): from where to where, 0 to 1. The distance is convex along the
+    bar: the nearest place is beside the nearest of those that are looked at.
+    """
+    rows, u = np.arange(len(ends)), np.linspace(0.0, 1.0, PLACES)
+    begin, end = part[:, 0], part[:, 1]
+    least = np.full(len(ends), np.inf)
+    for _ in range(ROUNDS):
+        s = begin[:, None] + (end - begin)[:, None] * u
+        points = ends[:, None, 0] + s[..., None] * (ends[:, None, 1] - ends[:, None, 0])
+        distances = _distances(points, box)
+        best = distances.argmin(axis=1)
+        least = np.minimum(least, distances[rows, best])
+        begin, end = s[rows, np.maximum(best - 1, 0)], s[rows, np.minimum(best + 1, PLACES - 1)]
+    return least
+
+
+def _distances(points: Array, box: Box) -> Array:
+    """Return the distances of points from a box, 0 inside, (n, m, 3) -> (n, m) [m]."""
+    local = (points - box.center) @ box.rotation
+    result: Array = np.linalg.norm(np.maximum(np.abs(local) - 0.5 * box.size, 0.0), axis=-1)
+    return result

@@ -65,6 +65,7 @@ SECOND_USERS = {
     'rrth_planner.collision.second_checker',
     'rrth_planner.collision.trajectory_validation',
     'rrth_planner.collision.checker_comparison',
+    'rrth_planner.collision.separation_checker',
 }
 # Modules that import parts of the project below their top. The executable of the node starts the
 # planning process before it loads the node; that process loads no kernels that are not compiled
@@ -171,8 +172,9 @@ def test_the_rooms_are_those_of_the_table():
     }
 
 
-def test_the_second_checker_shares_nothing_with_the_certificate():
-    graph, found = graph_of_modules(), {'rrth_planner.collision.second_checker'}
+@pytest.mark.parametrize('checker', ['second_checker', 'separation_checker'])
+def test_a_second_checker_shares_nothing_with_the_certificate(checker):
+    graph, found = graph_of_modules(), {f'rrth_planner.collision.{checker}'}
     while new := {name for module in found for name in graph[module]} - found:
         found |= new
     assert not [name for name in found if 'certificate' in name]
