@@ -114,9 +114,9 @@ def blocking_box(
     part (6, dof): the motion between two times [s], over u from 0 to 1; contact: speed up to which
     a point of the arm counts as at rest [m/s]; bodies (n_bars,): how many joints move each bar,
     the pointing ray left out; rows (16, m), growths at time 0 and speeds (m,): the boxes; quartic
-    and cubic as for `quintics.bound`. With dp the way of an end of a bar and b the bound of its second
-    derivative by u, it is no faster than |dp| + b / 2, and within |dp| / 2 + b / 8 of the mean of
-    its two places (`docs/algorithms.md`).
+    and cubic as for `quintics.bound`. With dp the way of an end of a bar and b the bound of its
+    second derivative by u, it is no faster than |dp| + b / 2, and within |dp| / 2 + b / 8 of the
+    mean of its two places (`docs/algorithms.md`).
     """
     dof, m, width, n_bars = part.shape[1], rows.shape[1], end - begin, bodies.shape[0]
     q, middle, after = (
@@ -271,9 +271,10 @@ def is_rate_safe(
     Return whether a stop that begins at a place, at a rate, would keep clear of a moving wearer.
 
     v, gains, a, j: of the joint that takes longest to stop, velocity and acceleration at rate 1,
-    the latter 0 where it slows down, and the limits of the stop; points: the bars there; ends
-    (2 n_bars,): the speeds of their ends at rate 1 [m/s]; growths, speeds (m,): of the boxes when the stop begins. Of a bar the part that is faster than
-    `contact` counts, for as long as it is. An estimate: it takes the bar to move straight on.
+    the latter 0 where it slows down, and the limits of the stop; points: the bars there; ends (2
+    n_bars,): the speeds of their ends at rate 1 [m/s]; growths, speeds (m,): of the boxes when the
+    stop begins. Of a bar the part that is faster than `contact` counts, for as long as it is. An
+    estimate: it takes the bar to move straight on.
     """
     share, m = scratch.floats(2), rows.shape[1]
     # What accelerates goes on for a while.
@@ -331,8 +332,8 @@ def permitted_rates(
     acceleration, jerk, stop_acceleration, stop_jerk (dof,): limits of the motion and of a stop;
     growths (m,): of the boxes when a stop begins. The rest as for `BODY` and `first_blocked`.
     found (m, 3): the rate, up to 1, and how fast the rate may change there: its first and its
-    second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes a motion smooth, and
-    proves nothing.
+    second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes a motion smooth,
+    and proves nothing.
     """
     dof, n_bars = curves.shape[2], bodies.shape[0]
     q, v, nearby, state = np.empty(dof), np.empty(dof), np.empty(dof), np.empty((4, dof))
