@@ -9,15 +9,9 @@ import numpy as np
 from rrth_planner.collision.separation import Blocked, first_unproven, moving_joints
 from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
 from rrth_planner.kernels.collision.separation import permitted_rates
-from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.separation import growth_at, SeenBody, SeparationRules
-from rrth_planner.model.trajectory import (
-    MotionLimits,
-    piece_coefficients,
-    sample,
-    Trajectory,
-)
+from rrth_planner.model.separation import growth_at, SeenBody, Separation
+from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.rate_profile import (
     continued,
@@ -34,8 +28,8 @@ STRETCH = 0.027
 AHEAD, PLACES = 0.6, 20
 # Share of its limits that a motion slows down with; how much of a ramp that takes from the way.
 GENTLE, RAMP = 0.5, 0.5
-# Rates that are tried where the permitted one is not proven, as shares of the present one.
-LOWER = (1.0, 0.7)
+# Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
+OF_PRESENT, OF_PERMITTED = (1.0, 0.7), (0.5, 0.25)
 # Shares of the permitted rate that a motion from rest may begin with.
 BEGINNINGS = (1.0, 0.5, 0.2)
 # A slower joint is at rest [rad/s].
@@ -86,27 +80,6 @@ class Commitment:
     def end_time(self) -> float:
         """When the arm is at rest [s]."""
         return self.start_time + self.trajectory.duration
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Separation:
-    """
-    What commitments are proven with.
-
-    Parameters
-    ----------
-    margin : float
-        [m].
-    limits, stop_limits : MotionLimits
-        Of the motion, and of the stop that ends a commitment.
-
-    """
-
-    arm: ArmModel
-    rules: SeparationRules
-    margin: float
-    limits: MotionLimits
-    stop_limits: MotionLimits
 
 
 def path_state(commitment: Commitment, time: float) -> Array:
@@ -236,10 +209,11 @@ def _committed(
         return found is None
 
     target = permitted(motion, float(state[0]), body, settings)
-    for share in (None, *LOWER):
-        rate = target if share is None else min(target, share * float(state[1]))
+    lower = [min(target, share * float(state[1])) for share in OF_PRESENT]
+    lower += [share * target for share in OF_PERMITTED]
+    for n, rate in enumerate((target, *lower)):
         profile = steered(motion, state, rate, settings.limits)
-        if profile is None and share is None:
+        if profile is None and n == 0:
             # At a limit already: the rate goes on changing as it was to.
             profile = held
         if profile is None:

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import MotionLimits
 
 # Greatest speeds of parts of the body by words of their names, the first that fits [m/s]; the base
 # frame is the torso's.
@@ -79,6 +81,27 @@ class SeparationRules:
             raise OptionsError(
                 'body_speeds: none for any other part of the body, expected ": 2.0" or the like'
             )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Separation:
+    """
+    What commitments are proven with.
+
+    Parameters
+    ----------
+    margin : float
+        [m].
+    limits, stop_limits : MotionLimits
+        Of the motion, and of the stop that ends a commitment.
+
+    """
+
+    arm: ArmModel
+    rules: SeparationRules
+    margin: float
+    limits: MotionLimits
+    stop_limits: MotionLimits
 
 
 def speed_bound(rules: SeparationRules, name: str) -> float:

@@ -88,6 +88,7 @@ class PlannerNode(Node):
             (Trigger, '~/plan', self._on_plan),
             (GetPlan, '~/get_plan', self._on_get_plan),
             (Trigger, '~/cancel', self._on_cancel),
+            (Trigger, '~/reset', self._on_reset),
         ):
             self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
@@ -104,7 +105,8 @@ class PlannerNode(Node):
         inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        publishers, self._reporter = PlanPublishers(self), Reporter(self, inputs, parameters)
+        publishers = PlanPublishers(self, parameters.separation is not None)
+        self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(
             self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
@@ -177,6 +179,12 @@ class PlannerNode(Node):
     def _on_cancel(self, _: Any, response: Trigger.Response) -> Trigger.Response:
         response.success = True
         response.message = answer(ErrorCode.SUCCESS, f'requests cancelled: {self._queue.cancel()}')
+        return response
+
+    def _on_reset(self, _: Any, response: Trigger.Response) -> Trigger.Response:
+        fault = self._monitor.reset()
+        response.success = True
+        response.message = answer(ErrorCode.SUCCESS, f'reset: {fault or "nothing"}')
         return response
 
 

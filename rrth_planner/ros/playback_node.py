@@ -38,6 +38,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 # Longer trajectories are not decoded, which would delay the joint states.
 MOST_BYTES = 2 * 1024 * 1024
+# Motions are reported at most this often [s].
+REPORT_PERIOD = 0.5
 # Two clocks are read at once where that takes no longer [ns]; else again, so many times.
 AT_ONCE, READINGS = 20_000, 5
 
@@ -153,9 +155,11 @@ class PlaybackNode(Node):
             stays = 'continues its motion' if is_moving else 'holds its position'
             self.get_logger().warning(f'joint_trajectory rejected, arm {stays}: {problem}')
             return
+        # Motions may come with every body of a tracker.
         self.get_logger().info(
             f'executing a motion: {len(trajectory.times)} points, at rest in '
-            f'{self._playback.end_time - time:.2f} s'
+            f'{self._playback.end_time - time:.2f} s',
+            throttle_duration_sec=REPORT_PERIOD,
         )
 
     def _on_liveliness(self, status: Any) -> None:

@@ -391,11 +391,11 @@ def test_it_plans_again_for_the_same_goal_only_where_it_may(monitored, replan):
 
 
 def test_the_outcome_of_an_older_motion_does_not_end_monitoring_of_a_newer_one(monitored, capfd):
-    monitored.monitor.hold('no way to the goal before')
+    monitored.monitor.report_hold('no way to the goal before')
     assert monitored.monitor._state is MonitorState.MONITORING
     monitored.see(monitored.hand(0.6, 0.0))
     assert len(monitored.published) == 1
-    monitored.monitor.hold('no way to the goal')
+    monitored.monitor.report_hold('no way to the goal')
     assert monitored.monitor._state is MonitorState.HOLDING
     said = 'arm holds its position: no way to the goal'
     assert monitored.reporter.monitor_state == ('holding', said)

@@ -22,6 +22,7 @@ from rrth_planner.io.settings import (
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError
+from rrth_planner.model.separation import BODY_SPEEDS, Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
@@ -30,13 +31,23 @@ from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reje
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 STOP_LIMITS = {'stop_acceleration': 'rad/s^2', 'stop_jerk': 'rad/s^3'}
 LONGEST_TIMEOUT, LONGEST_LATENCY = 86400.0, 10.0
+# A timeout that is not given: with separation these [s], else none.
+NOT_GIVEN = -1.0
+TIMEOUTS = {'body_timeout': 0.2, 'joint_timeout': 0.1}
+# Whether a motion that stopped goes on by itself, or after `~/reset`.
+AUTO, MANUAL = 'auto', 'manual'
+
+
+RULES = SeparationRules()
+SPEEDS = [f'{words}: {speed:g}' for words, speed in BODY_SPEEDS]
 
 
 def declared(dof: int) -> tuple[Setting, ...]:
     """Return all parameters but `arm`, for an arm of so many joints."""
     each = f'of each of the {dof} joints, or one value for all'
     limit = (LOWEST_LIMIT, HIGHEST_LIMIT)
-    timeout = (0.0, LONGEST_TIMEOUT)
+    timeout, given_timeout = (0.0, LONGEST_TIMEOUT), (NOT_GIVEN, LONGEST_TIMEOUT)
+    by_default = '0: never; -1: {:g} with separation, else never'
     ray = 'length of the pointing ray kept clear in motion'
     reserve = 'clearance beyond the margin that is planned with where there is room'
     escape = 'greatest depth of a bar in a box, margin included, to escape from; 0: none'
@@ -44,6 +55,11 @@ def declared(dof: int) -> tuple[Setting, ...]:
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     second = 'library behind the second check of every motion'
+    separate = 'publish only motions that are proven clear of a wearer who moves'
+    touching = 'no faster part of the arm may meet the wearer'
+    moving = 'greatest speeds of parts of the body by words of their names; the first that fits'
+    late = 'the controller executes a motion at most so late'
+    resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
         Setting('base_frame', 'torso', 'frame id', 'frame of the wearer', is_read_only=True),
@@ -63,7 +79,13 @@ def declared(dof: int) -> tuple[Setting, ...]:
             Setting(name, [0.0], unit, f'of fail-safe stops, {each}; 0: as of motions')
             for name, unit in STOP_LIMITS.items()
         ),
-        Setting('body_timeout', 0.0, 's', 'an older body is rejected; 0: never', *timeout),
+        Setting(
+            'body_timeout',
+            NOT_GIVEN,
+            's',
+            f'an older body is rejected; {by_default.format(TIMEOUTS["body_timeout"])}',
+            *given_timeout,
+        ),
         Setting('body_latency', 0.03, 's', latency, 0.0, LONGEST_LATENCY, is_read_only=True),
         Setting('keep_lost', 2.0, 's', lost, *timeout),
         Setting('required_boxes', [''], 'names', 'a body without one of these is rejected'),
@@ -71,8 +93,18 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('incident_folder', '', 'path', folder),
         Setting('replan', True, '-', 'plan again after a fail-safe stop'),
         Setting(
-            'joint_timeout', 0.0, 's', 'older joint positions are rejected; 0: never', *timeout
+            'joint_timeout',
+            NOT_GIVEN,
+            's',
+            f'older joint positions are rejected; {by_default.format(TIMEOUTS["joint_timeout"])}',
+            *given_timeout,
         ),
+        Setting('separation', False, '-', separate, is_read_only=True),
+        Setting('contact_speed', RULES.contact_speed, 'm/s', touching, 0.0, 10.0),
+        Setting('body_speeds', SPEEDS, 'words: m/s', moving),
+        Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
+        Setting('controller_delay', RULES.controller_delay, 's', late, 0.0, 1.0),
+        Setting('resume', AUTO, f'{AUTO} or {MANUAL}', resuming),
         *(Setting(f.name, f.default, **f.metadata) for f in OPTIONS.values()),
     )
 
@@ -86,6 +118,10 @@ class PlannerParameters(PlanSettings):
     ----------
     stop_limits : MotionLimits
         Of fail-safe stops.
+    separation : Separation or None
+        What commitments are proven with; None: motions are published as they are planned.
+    resume : str
+        `AUTO` or `MANUAL`.
     body_timeout, joint_timeout : float
         [s]; 0: never.
     body_latency, keep_lost : float
@@ -100,6 +136,8 @@ class PlannerParameters(PlanSettings):
     arm: ArmModel
     base_frame: str
     stop_limits: MotionLimits
+    separation: Separation | None
+    resume: str
     body_timeout: float
     joint_timeout: float
     body_latency: float
@@ -125,15 +163,31 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     require_library(settings.second_checker)
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
-    own = (
-        *('base_frame', 'body_timeout', 'joint_timeout', 'body_latency', 'keep_lost', 'replan'),
-        'incident_folder',
-    )
+    own = (*('base_frame', 'body_latency', 'keep_lost', 'replan', 'incident_folder', 'resume'),)
+    if values['resume'] not in (AUTO, MANUAL):
+        raise OptionsError(f'resume: "{values["resume"]}", expected {AUTO} or {MANUAL}')
+    timeouts = {
+        name: values[name] if values[name] >= 0.0 else default * values['separation']
+        for name, default in TIMEOUTS.items()
+    }
     # ROS has no type for an empty array.
     pairs = tuple(pair for pair in values['allowed'] or () if pair)
+    arm = _with_allowed(arm, pairs) if pairs else arm
+    stop_limits = _stop_limits(values, settings.limits)
+    rules = _separation_rules(values)
     return PlannerParameters(
-        arm=_with_allowed(arm, pairs) if pairs else arm,
-        stop_limits=_stop_limits(values, settings.limits),
+        arm=arm,
+        stop_limits=stop_limits,
+        separation=Separation(
+            arm=arm,
+            rules=rules,
+            margin=settings.margin,
+            limits=settings.limits,
+            stop_limits=stop_limits,
+        )
+        if values['separation']
+        else None,
+        **timeouts,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in own},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
@@ -156,6 +210,28 @@ def _stop_limits(values: Mapping[str, Any], limits: MotionLimits) -> MotionLimit
         velocity=limits.velocity,
         acceleration=np.maximum(limits.acceleration, given['stop_acceleration']),
         jerk=np.maximum(limits.jerk, given['stop_jerk']),
+    )
+
+
+def _separation_rules(values: Mapping[str, Any]) -> SeparationRules:
+    """Return the rules that parameters describe; also where they are not used."""
+    speeds = []
+    for entry in values['body_speeds'] or ():
+        words, colon, speed = entry.rpartition(':')
+        try:
+            speeds.append((words.strip(), float(speed)))
+        except ValueError:
+            colon = ''
+        if not colon:
+            raise OptionsError(
+                f'body_speeds: "{entry}", expected words of a name and a speed, as "upper arm: '
+                '1.6" [m/s]'
+            )
+    return SeparationRules(
+        contact_speed=values['contact_speed'],
+        body_speeds=tuple(speeds),
+        body_error=values['body_error'],
+        controller_delay=values['controller_delay'],
     )
 
 

@@ -11,7 +11,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
-from rrth_planner.ros.middleware.qos import COMMANDED, LATCHED
+from rrth_planner.ros.middleware.qos import COMMANDED, COMMITTED, LATCHED
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
@@ -22,9 +22,15 @@ LONGEST_FLUSH = 0.5
 class PlanPublishers:
     """The topics that the planner publishes; late subscribers get the last plan too."""
 
-    def __init__(self, node: Node) -> None:
-        """Advertise them."""
-        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', COMMANDED)
+    def __init__(self, node: Node, is_separated: bool = False) -> None:
+        """Advertise them; is_separated: each motion on `joint_trajectory` is safe by itself."""
+        # An old commitment must not be executed by a controller that comes late.
+        motions = COMMITTED if is_separated else COMMANDED
+        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', motions)
+        self._planned = None
+        if is_separated:
+            name = '~/planned_trajectory'
+            self._planned = node.create_publisher(JointTrajectory, name, LATCHED)
         self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
 
@@ -32,7 +38,7 @@ class PlanPublishers:
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
-        self.publish(self.motion(trajectory, parameters, begin))
+        self._trajectory.publish(self.motion(trajectory, parameters, begin))
 
     def motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
@@ -43,12 +49,13 @@ class PlanPublishers:
         )
 
     def publish(self, msg: JointTrajectory) -> None:
-        """Publish the message of a motion."""
-        self._trajectory.publish(msg)
+        """Publish the message of a planned motion: to the arm, or with separation to be seen."""
+        (self._planned or self._trajectory).publish(msg)
 
     def assert_liveliness(self) -> None:
         """Assert that the running motion is monitored."""
-        self._trajectory.assert_liveliness()
+        if self._planned is None:
+            self._trajectory.assert_liveliness()
 
     def flush(self) -> None:
         """Wait briefly until all subscribers have the last motion."""

@@ -10,16 +10,25 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rrth_planner.execution.body_motion import BodyMotion
 from rrth_planner.model.errors import one_line
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.separation_status import (
+    separation_to_msg,
+    SeparationStatus,
+)
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.diagnostics import status_to_msg
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
+from rrth_planner.ros.middleware.qos import LATCHED
 
 # Diagnostics are published at least this often [s].
 PERIOD = 1.0
+# Warnings of fast parts are logged at most this often [s].
+WARNING_PERIOD = 5.0
 # Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
@@ -74,6 +83,12 @@ class Reporter:
         self._remaining_motion_checks, self._stops_published = Figures(), Figures()
         self._body_ages = Figures()
         self._n_incidents, self._last_incident = 0, ''
+        self._separation, self._commitments = SeparationStatus(), Figures()
+        self._body: BodyMotion | None = None
+        self._state: Publisher | None = None
+        if parameters.separation is not None:
+            self._state = node.create_publisher(DiagnosticStatus, '~/state', LATCHED)
+            self._publish_state()
         # Held while the threads of executor and worker count and publish.
         self._lock = Lock()
         self._published = -SHORTEST_PERIOD
@@ -100,6 +115,34 @@ class Reporter:
         """Count a decision, to publish a motion or to go on with one, by the body's age [s]."""
         with self._lock:
             self._body_ages.add(age)
+
+    def commitment_published(self, elapsed: float) -> None:
+        """Count a published commitment, and what it took to find and prove it [s]."""
+        with self._lock:
+            self._commitments.add(elapsed)
+
+    def body_observed(self, body: BodyMotion) -> None:
+        """Keep what is known of the wearer's speeds, and log who was faster than assumed."""
+        with self._lock:
+            self._body = body
+        if body.faster:
+            named = ', '.join(f'{one_line(name)}: {v:.1f} m/s' for name, v in body.faster)
+            self._node.get_logger().warning(
+                f'faster than body_speeds: {named}; assumed to be that fast for a while',
+                throttle_duration_sec=WARNING_PERIOD,
+            )
+
+    def separation_status(self, status: SeparationStatus) -> None:
+        """Publish how the running motion is executed, where that has changed."""
+        before, self._separation = self._separation, status
+        if status.state is not before.state or status.cause != before.cause:
+            self._publish_state()
+            self.publish_soon()
+
+    def _publish_state(self) -> None:
+        if self._state is not None:
+            name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
+            self._state.publish(separation_to_msg(name, self._separation))
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -155,6 +198,8 @@ class Reporter:
             'incidents': self._n_incidents,
             'last incident': self._last_incident,
         }
+        if self._state is not None:
+            values |= self._separation_values()
         for name, topic in self._inputs.all.items():
             values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
             values[f'good messages, {name}'] = topic.n_good
@@ -163,6 +208,19 @@ class Reporter:
         level, message = summary(now, self._inputs, self.parameters, report)
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
         return status_to_msg(name, level, message, values)
+
+    def _separation_values(self) -> dict[str, object]:
+        """Return what is known of separation."""
+        status, body = self._separation, self._body
+        n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
+        return {
+            'separation': status.state.name,
+            'cause': status.cause,
+            'rate [-]': f'{status.rate:.3f}',
+            'commitments': self._commitments,
+            'sights of parts': n_seen,
+            'faster than assumed': f'{n_faster} ({n_faster / max(n_seen, 1):.2%})',
+        }
 
     def _warn_of_lost(self, now: float) -> None:
         """Log each lost part once."""

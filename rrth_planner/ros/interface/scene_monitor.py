@@ -109,10 +109,10 @@ class SceneMonitor:
         while self._waiting:
             msg, arrival, since = self._waiting.popleft()
             waited = time.monotonic() - since
+            # Of a body without stamp.
+            age = self._latency + 1e-9 * max(0, time.time_ns() - arrival.received)
             try:
-                edits = read_edits(
-                    msg, self._now(), self._base_frame, self._frames.lookup, self._latency
-                )
+                edits = read_edits(msg, self._now(), self._base_frame, self._frames.lookup, age)
             except Exception as problem:
                 may_wait = waited < LONGEST_WAIT and len(self._waiting) < MOST_WAITING
                 if isinstance(problem, FrameIsLateError) and may_wait:

@@ -18,6 +18,8 @@ _LIVELINESS = {
 }
 # Motions, whose planner asserts its liveliness while it monitors them; any subscriber matches.
 COMMANDED = QoSProfile(**_FOR_LATE, **_LIVELINESS)
+# Motions that each are safe by themselves: nobody has to supervise their planner.
+COMMITTED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE)
 # For subscribers that supervise the planner: liveliness needs a reliable reader.
 SUPERVISED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE, **_LIVELINESS)
 

@@ -32,6 +32,7 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.ros.monitor.commitments import Commitments
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 from rrth_planner.timing.fast_stop import fast_stop
 
@@ -104,6 +105,7 @@ class ExecutionMonitor:
         # All calls come from the node's own thread, but `close` may come from another one.
         self._lock, self._is_closed = RLock(), False
         self._tracker = ExecutionTracker(inputs.joints)
+        self._commitments = Commitments(reporter, publishers)
         self._goal: PointingGoal | None = None
         self._state = MonitorState.IDLE
         # A motion planned before a stop must not follow it, nor a replanned motion another one.
@@ -135,17 +137,26 @@ class ExecutionMonitor:
         Publish a motion, and monitor it with the parameters of its plan.
 
         It is checked with the next body: called in the node's own thread right after revalidation.
+        With separation the controller is given the first commitment of it; raise RequestError
+        where it cannot begin.
         """
         with self._lock:
             if self._is_closed:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
             before = copy(self._tracker), self._parameters, self._goal, self._state
-            self._tracker.begin(running, self._now())
+            commitments = copy(self._commitments)
+            commanded = self._commitments.begin(running, parameters)
+            self._tracker.begin(commanded, self._now())
             self._parameters, self._goal, self._state = parameters, goal, MonitorState.MONITORING
             try:
                 publish()
+                if commanded is not running:
+                    self._publishers.publish_motion(
+                        commanded.trajectory, parameters, commanded.start_time
+                    )
             except Exception:
                 self._tracker, self._parameters, self._goal, self._state = before
+                self._commitments = commitments
                 raise
             self.n_motions += 1
             # From here on the arm moves: an error must stop it.
@@ -160,6 +171,7 @@ class ExecutionMonitor:
                 if self._state is MonitorState.STOPPING:
                     self._publishers.flush()
             self._tracker.forget()
+            self._commitments.end()
             self._state = MonitorState.IDLE
 
     def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
@@ -171,7 +183,22 @@ class ExecutionMonitor:
 
     def on_body(self, body: WearerBody, arrived: int) -> None:
         """Check the remaining motion against a body that arrived at a time [ns]."""
-        self._run_fail_safe(lambda: self._check_remaining_motion(body, arrived))
+
+        def check() -> None:
+            self._commitments.observe(body, self._reporter.parameters.separation)
+            self._check_remaining_motion(body, arrived)
+
+        self._run_fail_safe(check)
+
+    def hold(self, until: float) -> ExecutingMotion | None:
+        """
+        Return the running motion, which is not extended until a time [s].
+
+        A handover is planned from it. Without separation it is the whole motion anyway.
+        """
+        with self._lock:
+            self._commitments.hold(until)
+            return self.running
 
     def take_stops(self) -> list[Stop]:
         """Return the stops published since the last call."""
@@ -192,6 +219,7 @@ class ExecutionMonitor:
         """
         with self._lock:
             if self.running is not None and self._state is MonitorState.MONITORING:
+                self._commitments.fail(why, is_fault=not is_replanned)
                 self.pending_stop, self._is_replanned = why, is_replanned
                 self._pending_since = time.perf_counter()
                 self._stop_for_failure()
@@ -217,16 +245,33 @@ class ExecutionMonitor:
             return
         self._reporter.body_used(self._inputs.body.age(now))
         scene = scene_of(body.at(now))
-        if self._holds(is_remaining_free, self.running, phase, scene):
+        if self._holds(is_remaining_free, *self._remaining(phase, now), scene):
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
+            self._extend(now)
         else:
             self._stop(phase, now, scene, arrived)
         waited = self._elapsed(arrived)
-        if waited > LONGEST_WAIT:
+        # The ages of parts count where motions are proven separate.
+        if waited > LONGEST_WAIT and not self._commitments.is_active:
             self.fail(
                 f'a body was checked {waited:.3f} s after its arrival, expected at most '
                 f'{LONGEST_WAIT:g} s'
             )
+
+    def _remaining(self, phase: float, now: float) -> tuple[ExecutingMotion, float]:
+        """Return the motion that the arm is to execute, and the time within it [s]."""
+        assert self.running is not None
+        planned = self._commitments.planned
+        return (
+            (self.running, phase) if planned is None else (planned, self._commitments.phase(now))
+        )
+
+    def _extend(self, now: float) -> None:
+        """Have the commitment of the running motion replaced by one that leads further."""
+        if self._commitments.is_active:
+            motion = self._commitments.extend(now)
+            if motion is not None:
+                self._tracker.replace(motion)
 
     def _holds(
         self, check: Callable[..., bool], running: ExecutingMotion, phase: float, scene: Scene
@@ -299,7 +344,10 @@ class ExecutionMonitor:
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
         if self._tracker.is_over(now):
+            if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
+                self._give_up_motion()
             self._tracker.forget()
+            self._commitments.end()
             self.pending_stop = ''
             if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
                 self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
@@ -324,13 +372,14 @@ class ExecutionMonitor:
             return
         stopped = self._stop_of(running, phase, now)
         is_safe = self._holds(is_remaining_free, stopped, 0.0, scene)
-        if not is_safe and self._holds(escapes_by_continuing, running, phase, scene):
+        if not is_safe and self._holds(escapes_by_continuing, *self._remaining(phase, now), scene):
+            self._extend(now)
             sentence = f'{why}, but it escapes and a stop would not: motion continues'
             if self._reporter.monitor_state[1] != sentence:
                 self._node.get_logger().error(sentence)
             self._set_state(MonitorState.MONITORING, sentence)
             return
-        self._publish_stop(stopped, why)
+        stopped = self._publish_stop(stopped, why)
         took = self._elapsed(arrived)
         warning = '' if is_safe else self._clearance_warning(stopped.trajectory, scene)
         self._reporter.stop_published(took)
@@ -352,8 +401,7 @@ class ExecutionMonitor:
                 # The motion has ended.
                 self.pending_stop = ''
                 return
-            stopped = self._stop_of(running, phase, now)
-            self._publish_stop(stopped, self.pending_stop)
+            stopped = self._publish_stop(self._stop_of(running, phase, now), self.pending_stop)
         except Exception:
             # It is tried again at the next check; until then liveliness is not asserted.
             with suppress(Exception):
@@ -382,18 +430,47 @@ class ExecutionMonitor:
             # The joint states may be what is wrong: then the commanded state counts.
             return now - running.start_time
 
-    def _publish_stop(self, stop: ExecutingMotion, why: str) -> None:
-        """Publish a stop, and track the arm on it."""
-        before = copy(self._tracker)
-        self._tracker.stop(stop)
-        try:
-            self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
-        except Exception:
-            self._tracker = before
-            raise
+    def _publish_stop(self, stop: ExecutingMotion, why: str) -> ExecutingMotion:
+        """
+        Publish a stop, and track the arm on it; return what leads the arm to rest.
+
+        With separation a stop that is not proven separate is not published: the commitment that
+        the arm executes is, and comes to rest.
+        """
+        if self._commitments.is_active and not self._is_separate(stop):
+            assert self.running is not None
+            stop = self.running
+        else:
+            before = copy(self._tracker)
+            self._tracker.stop(stop)
+            try:
+                self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+            except Exception:
+                self._tracker = before
+                raise
         # From here on nothing may raise: the same stop would be published again.
         self._state, self.stop_reason, self.pending_stop = MonitorState.STOPPING, why, ''
         self.n_stops += 1
+        return stop
+
+    def _is_separate(self, stop: ExecutingMotion) -> bool:
+        """Return whether a stop is proven separate from the wearer; not after an error."""
+        try:
+            return self._commitments.is_separate(stop)
+        except Exception:
+            with suppress(Exception):
+                self._node.get_logger().error(traceback.format_exc())
+            return False
+
+    def _give_up_motion(self) -> None:
+        """Have a motion planned again that came to rest on its way, and could not go on."""
+        running = self.running
+        assert running is not None
+        self._state = MonitorState.STOPPING
+        self.stop_reason = 'the wearer is too near for the motion to go on'
+        self.n_stops += 1
+        self._report_stop(running.trajectory)
+        self._record_stop(running.trajectory, None)
 
     def _report_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
         """Report in log and diagnostics why the arm stops."""
@@ -412,7 +489,12 @@ class ExecutionMonitor:
         clearance = least_clearance(stop, world)
         return f'; the stop is not proven free either, least clearance {clearance:.4f} m'
 
-    def hold(self, why: str) -> None:
+    def reset(self) -> str:
+        """Allow motions again after a fault, with separation; return what it was."""
+        with self._lock:
+            return self._commitments.reset()
+
+    def report_hold(self, why: str) -> None:
         """Report that the arm stays where it came to rest."""
         with self._lock:
             if self._state is MonitorState.MONITORING:

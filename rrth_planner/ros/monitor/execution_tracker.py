@@ -101,6 +101,10 @@ class ExecutionTracker:
         self.motion, self._stopped = motion, None
         self.is_latest, self._last_on_motion = True, now
 
+    def replace(self, motion: ExecutingMotion) -> None:
+        """Track a motion that continues the present one."""
+        self.motion, self._previous, self._stopped = motion, None, None
+
     def stop(self, stop: ExecutingMotion) -> None:
         """Track a stop along the path of the present motion."""
         self.motion, self._stopped = stop, self.motion

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 import secrets
 
 import numpy as np
@@ -18,7 +19,7 @@ from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
-from rrth_planner.ros.requests.handover import Handover, LEADS
+from rrth_planner.ros.requests.handover import Handover, LATE, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
 from rrth_planner.ros.requests.revalidation import Revalidation, START_TOLERANCE
 
@@ -78,7 +79,7 @@ def plan_request(
     should_stop: Callable[[], bool],
     publish: Callable[[PlanOutcome, Revalidation], bool],
     goal: PointingGoal | None = None,
-    running: ExecutingMotion | None = None,
+    hold: Callable[[float], ExecutingMotion | None] = lambda until: None,
 ) -> PlanOutcome:
     """
     Return the outcome of a request that begins now, once its motion is published.
@@ -99,8 +100,8 @@ def plan_request(
         False where it is too late. May raise RequestError.
     goal : PointingGoal, optional
         Of the request; without, the last target.
-    running : ExecutingMotion, optional
-        The last commanded motion.
+    hold : callable, optional
+        Returns the last commanded motion, which does not change until a time [s].
 
     Raises
     ------
@@ -115,11 +116,14 @@ def plan_request(
             question = plan = None
             require_not_cancelled(should_stop, 'the request was cancelled before its turn')
             now = clock()
+            running = hold(now + lead + LATE)
             snapshot = inputs.at(now, parameters, goal)
             handover = None
             if snapshot.is_moving(now) or snapshot.is_about_to_move(running, now, lead):
                 ahead = snapshot.start_state_at(running, now + lead, parameters.arm)
                 handover = Handover(now + lead, lead, ahead, running)
+            else:
+                hold(math.inf)
             question = _question(snapshot, parameters, handover)
             plan = planner.plan(question, should_stop)
             code = CODE_OF_STATUS[plan.status]
@@ -166,6 +170,8 @@ def plan_request(
         if question is None:
             raise
         raise PlanError(question, None if plan is None else plan.trajectory) from problem
+    finally:
+        hold(-math.inf)
 
 
 def require_not_cancelled(

@@ -251,7 +251,7 @@ class PlanQueue:
         monitor, end = self._monitor, time.monotonic() + longest
         self._await_clear_ray(parameters, ticket)
         while True:
-            n_stops, running = monitor.n_stops, monitor.running
+            n_stops = monitor.n_stops
 
             def publish(
                 outcome: PlanOutcome, revalidation: Revalidation, n_stops: int = n_stops
@@ -285,7 +285,7 @@ class PlanQueue:
                 lambda: ticket.is_cancelled,
                 publish,
                 goal,
-                running,
+                monitor.hold,
             )
             may_change = outcome.is_outdated or (
                 outcome.is_in_the_way and self._inputs.is_wearer_moving()
@@ -448,7 +448,7 @@ class PlanQueue:
         if response.is_solved or resumption.is_first:
             response.conclude()
         if not response.is_solved and resumption.is_first:
-            self._monitor.hold(response.text)
+            self._monitor.report_hold(response.text)
         if is_blocked and present < resumption.end:
             self._resumption = replace(
                 resumption,

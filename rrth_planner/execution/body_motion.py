@@ -1,0 +1,144 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The wearer from one sight to the next: how old each part is, and whether it kept its speed."""
+
+from dataclasses import dataclass
+import functools
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from rrth_planner.kernels.layout import ROTATION, SIZE
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, speed_bound
+
+# A part that was faster than assumed is taken to be so fast, and a share more, for so long [s].
+SHARE, RAISED = 1.2, 2.0
+# Two sights of a part less than this apart do not tell its speed [s].
+SHORTEST = 2e-3
+# The corners of a box, in halves of its size.
+_CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BodyMotion:
+    """
+    The wearer as last seen, and what is assumed of the speeds of his parts.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (m,)
+        When each box of the scene was measured [s].
+    speeds, until : ndarray, shape (m,)
+        Greatest speeds of parts that have been faster than assumed [m/s], and until when these
+        count [s].
+    n_seen, n_faster : int
+        Sights of all parts so far, and those of parts that had been faster than assumed.
+    faster : tuple of (str, float)
+        The parts that were it at the last sight: their names and speeds [m/s].
+
+    """
+
+    scene: Scene
+    measured: Array
+    speeds: Array
+    until: Array
+    n_seen: int = 0
+    n_faster: int = 0
+    faster: tuple[tuple[str, float], ...] = ()
+
+
+def first_sight(scene: Scene, measured: Array) -> BodyMotion:
+    """Return a wearer who was never seen before, measured (m,) [s]."""
+    nothing = np.zeros(len(scene.boxes))
+    return BodyMotion(scene=scene, measured=measured, speeds=nothing, until=nothing)
+
+
+def seen_again(
+    before: BodyMotion, scene: Scene, measured: Array, rules: SeparationRules
+) -> BodyMotion:
+    """
+    Return the wearer at his next sight; measured (m,): when each box of the scene was [s].
+
+    A part moved faster than assumed where a corner of its box went further than its greatest speed
+    and two errors explain. Its bound is raised for a while then. Parts are known by their names.
+    """
+    old, names = _places(before.scene, scene), _names(scene)
+    known = old >= 0
+    then, n = old[known], len(names)
+    speeds, until = np.zeros(n), np.zeros(n)
+    speeds[known], until[known] = before.speeds[then], before.until[then]
+    elapsed, moved = np.zeros(n), np.zeros(n)
+    elapsed[known] = measured[known] - before.measured[then]
+    moved[known] = _displacements(before.scene.numbers[then], scene.numbers[known])
+    # A sight that is no newer tells nothing.
+    is_new = known & (elapsed > SHORTEST)
+    assumed = np.where(measured <= until, speeds, 0.0)
+    assumed = np.maximum(assumed, stated_speeds(scene, rules))
+    is_faster = is_new & (moved > assumed * elapsed + 2.0 * rules.body_error)
+    found = (moved - 2.0 * rules.body_error) / np.maximum(elapsed, SHORTEST)
+    speeds[is_faster] = np.minimum(SHARE * found[is_faster], FASTEST)
+    until[is_faster] = measured[is_faster] + RAISED
+    return BodyMotion(
+        scene=scene,
+        measured=measured,
+        speeds=speeds,
+        until=until,
+        n_seen=before.n_seen + int(is_new.sum()),
+        n_faster=before.n_faster + int(is_faster.sum()),
+        faster=tuple((names[i], float(found[i])) for i in np.flatnonzero(is_faster)),
+    )
+
+
+def body_at(body: BodyMotion, time: float, rules: SeparationRules) -> SeenBody:
+    """Return the wearer at a time, as he was last seen [s]."""
+    raised = np.where(time <= body.until, body.speeds, 0.0)
+    speeds = np.maximum(stated_speeds(body.scene, rules), raised)
+    return SeenBody(body.scene, np.maximum(time - body.measured, 0.0), speeds)
+
+
+def stated_speeds(scene: Scene, rules: SeparationRules) -> Array:
+    """Return the greatest speeds that are assumed of the boxes of a scene, (m,) [m/s]."""
+    return _speeds(_names(scene), rules)
+
+
+def _names(scene: Scene) -> tuple[str, ...]:
+    return tuple(box.name for box in scene.boxes)
+
+
+@functools.lru_cache(maxsize=16)
+def _speeds(names: tuple[str, ...], rules: SeparationRules) -> Array:
+    speeds = np.array([speed_bound(rules, name) for name in names])
+    speeds.setflags(write=False)
+    return speeds
+
+
+def _places(before: Scene, after: Scene) -> NDArray[np.intp]:
+    """Return which box of a scene is which one of the scene before, -1: none, (m,)."""
+    return _matches(_names(before), _names(after))
+
+
+@functools.lru_cache(maxsize=64)
+def _matches(before: tuple[str, ...], after: tuple[str, ...]) -> NDArray[np.intp]:
+    if before == after:
+        return np.arange(len(after))
+    # Of several parts with one name the first is the first, and so on.
+    places: dict[str, list[int]] = {}
+    for i, name in enumerate(before):
+        places.setdefault(name, []).append(i)
+    return np.array([places[n].pop(0) if places.get(n) else -1 for n in after], dtype=np.intp)
+
+
+def _displacements(before: Array, after: Array) -> Array:
+    """Return how far the corners of boxes moved at most, (n, 15) twice -> (n,) [m]."""
+    if len(before) == 0:
+        return np.zeros(0)
+    moved = _corners(after) - _corners(before)
+    return np.asarray(np.sqrt((moved * moved).sum(axis=2)).max(axis=1))
+
+
+def _corners(boxes: Array) -> Array:
+    size, rotation = boxes[:, SIZE:ROTATION], boxes[:, ROTATION:].reshape(-1, 3, 3)
+    corners: Array = boxes[:, None, :SIZE] + (_CORNERS * size[:, None]) @ rotation.swapaxes(1, 2)
+    return corners

@@ -1,0 +1,220 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The commitments of the running motion: what its controller is given of it, body by body."""
+
+from dataclasses import replace
+import time
+
+import numpy as np
+from rrth_planner.collision.separation import Blocked, first_unproven
+from rrth_planner.execution.body_motion import body_at, BodyMotion, first_sight, seen_again
+from rrth_planner.execution.commitment import (
+    Commitment,
+    extended,
+    first_commitment,
+    JUMP_WAY,
+    path_state,
+)
+from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.model.separation import Separation
+from rrth_planner.ros.interface.inputs import RequestError
+from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
+from rrth_planner.ros.interface.publishers import PlanPublishers
+from rrth_planner.ros.interface.reporter import Reporter
+from rrth_planner.ros.interface.separation_status import SeparationState, SeparationStatus
+from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.error_codes import ErrorCode
+
+# At a lower rate the arm is slowed down for the wearer.
+FULL_RATE = 0.995
+# At rest on its way the arm goes on once nothing has kept it from that for so long [s].
+RESUME_AFTER = 0.2
+# The end of a motion counts as reached so near to it [s].
+ARRIVED = 1e-4
+
+
+class Commitments:
+    """
+    Gives the controller only what is proven separate from the wearer, up to its end at rest.
+
+    Without separation it does nothing. All calls come from the thread that has the monitor's lock.
+    """
+
+    def __init__(self, reporter: Reporter, publishers: PlanPublishers) -> None:
+        """Begin with no motion, and a wearer who was never seen."""
+        self._reporter, self._publishers = reporter, publishers
+        self.planned: ExecutingMotion | None = None
+        self.present: Commitment | None = None
+        self._parameters: PlannerParameters | None = None
+        self._body: BodyMotion | None = None
+        self._last: WearerBody | None = None
+        # Why no motion may begin until `reset`; and whether the one that stopped may go on.
+        self.fault, self._is_reset = '', False
+        # When it was last not proven that the motion may go on [s].
+        self._blocked = -np.inf
+        # Until then the present commitment is not extended: a handover was planned from it [s].
+        self._held_until = -np.inf
+
+    @property
+    def is_active(self) -> bool:
+        """Whether the running motion is executed by commitments."""
+        return self.present is not None
+
+    def observe(self, body: WearerBody, separation: Separation | None) -> None:
+        """Take note of a body."""
+        if separation is None:
+            self._body = self._last = None
+            return
+        if body is self._last:
+            return
+        parts = (*body.parts, *body.lost)
+        scene = scene_of(body)
+        measured = np.array([part.measured for _, part in parts for _ in part.boxes])
+        if self._body is None:
+            self._body = first_sight(scene, measured)
+        else:
+            self._body = seen_again(self._body, scene, measured, separation.rules)
+        self._last = body
+        self._reporter.body_observed(self._body)
+
+    def begin(self, planned: ExecutingMotion, parameters: PlannerParameters) -> ExecutingMotion:
+        """
+        Return the first commitment of a motion, to be published; the motion itself without any.
+
+        Raise RequestError where it cannot begin.
+        """
+        separation = parameters.separation
+        if separation is None:
+            self.end()
+            return planned
+        if self.fault:
+            raise RequestError(
+                ErrorCode.FAILURE,
+                f'the planner has failed, and does not move the arm until ~/reset: {self.fault}',
+            )
+        if self._body is None:
+            raise RequestError(
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet to keep separate from'
+            )
+        seen = body_at(self._body, planned.start_time, separation.rules)
+        found = first_commitment(planned.trajectory, planned.start_time, seen, separation)
+        if isinstance(found, Blocked):
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                f'the motion cannot begin: {found.bar} is not proven separate from {found.box} '
+                f'{found.time:.2f} s after its start, should that move',
+            )
+        self._held_until = self._blocked = -np.inf
+        self._is_reset = False
+        self.planned, self.present, self._parameters = planned, found, parameters
+        return _executing(found, planned)
+
+    def end(self) -> None:
+        """Forget the running motion."""
+        self.planned = self.present = None
+
+    def hold(self, until: float) -> None:
+        """Let the present commitment be the last one until a time [s]."""
+        self._held_until = until
+
+    def phase(self, now: float) -> float:
+        """Return the time within the planned motion at a time [s]."""
+        assert self.present is not None
+        return float(path_state(self.present, now)[0])
+
+    def is_arrived(self, now: float) -> bool:
+        """Return whether the present commitment leads to the end of the planned motion."""
+        present = self.present
+        if present is None or present.is_whole:
+            return True
+        return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
+
+    def extend(self, now: float) -> ExecutingMotion | None:
+        """Publish the commitment that replaces the present one now [s]; None: there is none."""
+        present, planned, parameters = self.present, self.planned, self._parameters
+        assert present is not None and planned is not None and parameters is not None
+        separation = parameters.separation
+        if now < max(present.start_time, self._held_until) or self._body is None:
+            return None
+        assert separation is not None
+        is_at_rest = now > present.end_time
+        if is_at_rest and not present.is_whole and not self._may_resume(now, parameters):
+            return None
+        begin = time.perf_counter()
+        found = extended(present, now, body_at(self._body, now, separation.rules), separation)
+        if found is None:
+            return None
+        if isinstance(found, Blocked):
+            self._blocked = now
+            is_stopping = now - present.start_time > present.stretch
+            self._report(found, float(path_state(present, now)[1]), is_stopping)
+            return None
+        self.present = found
+        self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
+        self._reporter.commitment_published(time.perf_counter() - begin)
+        self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
+        return _executing(found, planned)
+
+    def _may_resume(self, now: float, parameters: PlannerParameters) -> bool:
+        """Return whether a motion that came to rest on its way may go on, if that is proven."""
+        if parameters.resume == MANUAL and not self._is_reset:
+            return False
+        # The first time it is asked it was not known whether it is blocked.
+        return not 0.0 < now - self._blocked < RESUME_AFTER
+
+    def fail(self, why: str, is_fault: bool) -> None:
+        """Report that the arm stops because of a failure; a fault lasts until `reset`."""
+        if self._parameters is None or self._parameters.separation is None:
+            return
+        if is_fault:
+            self.fault = why
+        state = SeparationState.FAULT if is_fault else SeparationState.PROTECTIVE_STOP
+        self._reporter.separation_status(SeparationStatus(state, why, 0.0))
+
+    def reset(self) -> str:
+        """Allow motions again after a fault, and a stopped one to go on; return what was reset."""
+        fault, self.fault, self._is_reset = self.fault, '', True
+        if fault:
+            self._reporter.separation_status(SeparationStatus())
+        return fault
+
+    def is_separate(self, stop: ExecutingMotion) -> bool:
+        """Return whether a stop is proven separate, too; without commitments that is not asked."""
+        parameters = self._parameters
+        if self.present is None or parameters is None or parameters.separation is None:
+            return True
+        if self._body is None:
+            return False
+        separation = parameters.separation
+        seen = body_at(self._body, stop.start_time, separation.rules)
+        margin = separation.margin + JUMP_WAY
+        rules, arm = separation.rules, separation.arm
+        return first_unproven(stop.trajectory, 0.0, arm, seen, rules, margin) is None
+
+    def _report(self, blocked: Blocked | None, rate: float, is_stopping: bool) -> None:
+        if blocked is not None and is_stopping:
+            state = SeparationState.PROTECTIVE_STOP
+        elif rate < FULL_RATE:
+            state = SeparationState.SLOWED
+        else:
+            state = SeparationState.NORMAL
+        cause = '' if blocked is None else f'{blocked.bar} is too near to {blocked.box}'
+        self._reporter.separation_status(
+            SeparationStatus(
+                state,
+                cause,
+                rate,
+                '' if blocked is None else blocked.bar,
+                '' if blocked is None else blocked.box,
+            )
+        )
+
+
+def _executing(commitment: Commitment, planned: ExecutingMotion) -> ExecutingMotion:
+    """Return a commitment as the motion that the arm executes."""
+    return replace(
+        planned,
+        trajectory=commitment.trajectory,
+        start_time=commitment.start_time,
+        escape_time=0.0,
+    )
