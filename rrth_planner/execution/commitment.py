@@ -30,6 +30,8 @@ AHEAD, PLACES = 0.6, 20
 GENTLE, RAMP = 0.5, 0.5
 # Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
 OF_PRESENT, OF_PERMITTED = (1.0, 0.7), (0.5, 0.25)
+# The least rate that is tried where the permitted one is lower [-].
+LEAST = 0.03
 # Shares of the permitted rate that a motion from rest may begin with.
 BEGINNINGS = (1.0, 0.5, 0.2)
 # A slower joint is at rest [rad/s].
@@ -211,6 +213,8 @@ def _committed(
     target = permitted(motion, float(state[0]), body, settings)
     lower = [min(target, share * float(state[1])) for share in OF_PRESENT]
     lower += [share * target for share in OF_PERMITTED]
+    if target < LEAST:
+        lower.append(LEAST)
     for n, rate in enumerate((target, *lower)):
         profile = steered(motion, state, rate, settings.limits)
         if profile is None and n == 0:

@@ -40,7 +40,7 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
-        self.ages = []
+        self.ages, self.statuses = [], []
         # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
@@ -49,6 +49,9 @@ class Monitored:
             publish_soon=lambda: None,
             body_used=self.ages.append,
             remaining_motion_checked=lambda took: self.said.append('free'),
+            body_observed=lambda body: None,
+            commitment_published=lambda took: self.said.append('committed'),
+            separation_status=self.statuses.append,
             stop_published=lambda took: self.said.append('stopped') or self.took.append(took),
         )
         self.inputs = Inputs('body', 'target', 'joints')

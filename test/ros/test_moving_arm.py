@@ -104,7 +104,14 @@ def _ask(monkeypatch):
         inputs.joints = Following(motion, clock, pace)
         running = ExecutingMotion(trajectory=motion, start_time=BEGIN) if is_known else None
         outcome = plan_request(
-            inputs, parameters, clock, planner, lambda: False, publish, TARGET, lambda until: running
+            inputs,
+            parameters,
+            clock,
+            planner,
+            lambda: False,
+            publish,
+            TARGET,
+            lambda until: running,
         )
         return outcome, clock.now
 

@@ -129,6 +129,12 @@ class Commitments:
             return True
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
+    def waits_for_reset(self, now: float) -> bool:
+        """Return whether the motion is on its way, and a stop there lasts until `reset`."""
+        parameters = self._parameters
+        is_manual = parameters is not None and parameters.resume == MANUAL
+        return is_manual and self.is_active and not self.is_arrived(now)
+
     def extend(self, now: float) -> ExecutingMotion | None:
         """Publish the commitment that replaces the present one now [s]; None: there is none."""
         present, planned, parameters = self.present, self.planned, self._parameters
@@ -139,6 +145,9 @@ class Commitments:
         assert separation is not None
         is_at_rest = now > present.end_time
         if is_at_rest and not present.is_whole and not self._may_resume(now, parameters):
+            if parameters.resume == MANUAL:
+                waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, 'waits for ~/reset', 0.0)
+                self._reporter.separation_status(waits)
             return None
         begin = time.perf_counter()
         found = extended(present, now, body_at(self._body, now, separation.rules), separation)
@@ -159,7 +168,6 @@ class Commitments:
         """Return whether a motion that came to rest on its way may go on, if that is proven."""
         if parameters.resume == MANUAL and not self._is_reset:
             return False
-        # The first time it is asked it was not known whether it is blocked.
         return not 0.0 < now - self._blocked < RESUME_AFTER
 
     def fail(self, why: str, is_fault: bool) -> None:

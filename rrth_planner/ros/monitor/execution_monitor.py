@@ -343,7 +343,7 @@ class ExecutionMonitor:
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
-        if self._tracker.is_over(now):
+        if self._tracker.is_over(now) and not self._commitments.waits_for_reset(now):
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion()
             self._tracker.forget()

@@ -1,0 +1,151 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The wearer from sight to sight: ages, and parts that are faster than assumed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rrth_planner.execution.body_motion import body_at, first_sight, RAISED, seen_again, SHARE
+from rrth_planner.model.errors import OptionsError, SceneError
+from rrth_planner.model.rotation import rotation_matrix
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import growth_at, seen_body, SeparationRules, speed_bound
+import worlds
+
+RULES = SeparationRules(body_error=0.01)
+
+
+def moved(scene, **shifts):
+    """Return a scene some of whose parts are shifted [m]."""
+    boxes = [
+        replace(b, center=b.center + np.array(shifts[b.name])) if b.name in shifts else b
+        for b in scene.boxes
+    ]
+    return Scene(tuple(boxes))
+
+
+def at(scene, time):
+    return np.full(len(scene.boxes), time)
+
+
+@pytest.mark.parametrize(
+    'name, speed',
+    [
+        ('torso', 0.0),
+        ('right upper arm', 1.6),
+        ('LEFT_UPPER_ARM', 1.6),
+        ('skeleton/left-forearm', 2.0),
+        ('head', 1.0),
+        ('rucksack', 2.0),
+    ],
+)
+def test_a_speed_belongs_to_words_of_a_name(name, speed):
+    assert speed_bound(RULES, name) == speed
+
+
+def test_the_first_words_that_fit_count():
+    rules = SeparationRules(body_speeds=(('left', 0.5), ('hand', 3.0), ('', 1.0)))
+    assert [speed_bound(rules, n) for n in ('left hand', 'right hand', 'hat')] == [0.5, 3.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    'changes, sentence',
+    [
+        ({'contact_speed': -0.1}, 'contact_speed: -0.1, expected 0 to 100'),
+        ({'body_error': float('nan')}, 'body_error: nan'),
+        ({'body_speeds': (('hand', -1.0), ('', 2.0))}, 'body_speeds: "hand: -1.0"'),
+        ({'body_speeds': (('hand', 1.0),)}, 'none for any other part'),
+    ],
+)
+def test_bad_rules_are_rejected_in_a_sentence(changes, sentence):
+    with pytest.raises(OptionsError, match=sentence):
+        SeparationRules(**changes)
+
+
+def test_a_body_has_an_age_and_a_speed_for_each_box():
+    with pytest.raises(SceneError, match='speeds'):
+        body = seen_body(worlds.wearer(), 0.1, RULES)
+        replace(body, speeds=body.speeds - 1.0)
+
+
+def test_boxes_grow_by_margin_error_and_speed():
+    scene = worlds.wearer()
+    body = seen_body(scene, 0.03, RULES)
+    found = dict(
+        zip((b.name for b in scene.boxes), growth_at(body, RULES, 0.02, 0.1), strict=True)
+    )
+    assert found['torso'] == pytest.approx(0.03)
+    assert found['forearm_left'] == pytest.approx(0.03 + 2.0 * (0.1 + 0.01 + 0.03))
+
+
+def test_each_part_has_the_age_of_its_own_measurement():
+    scene = worlds.wearer()
+    measured = at(scene, 1.0)
+    measured[3] = 0.5
+    ages = body_at(first_sight(scene, measured), 1.2, RULES).ages
+    assert ages[3] == pytest.approx(0.7)
+    assert np.delete(ages, 3) == pytest.approx(0.2)
+
+
+def test_a_part_within_its_speed_is_not_counted():
+    scene = worlds.wearer()
+    body = first_sight(scene, at(scene, 0.0))
+    # 2 m/s for 10 ms and twice the error.
+    body = seen_again(body, moved(scene, forearm_left=[0.0399, 0, 0]), at(scene, 0.01), RULES)
+    assert (body.n_seen, body.n_faster, body.faster) == (8, 0, ())
+
+
+@pytest.mark.parametrize('turned', [False, True])
+def test_a_part_that_is_faster_is_noticed_and_its_bound_is_raised_for_a_while(turned):
+    scene = worlds.wearer()
+    body = first_sight(scene, at(scene, 0.0))
+    if turned:
+        # Turned about its centre: only its corners move.
+        boxes = list(scene.boxes)
+        turn = rotation_matrix(np.array([0.0, 0.0, np.sin(0.2), np.cos(0.2)]))
+        boxes[4] = replace(boxes[4], rotation=turn @ boxes[4].rotation)
+        after, name = Scene(tuple(boxes)), boxes[4].name
+    else:
+        after, name = moved(scene, forearm_left=[0.0, 0.0401, 0.0]), 'forearm_left'
+    body = seen_again(body, after, at(scene, 0.01), RULES)
+    assert body.n_faster == 1
+    ((found, speed),) = body.faster
+    assert found == name
+    assert speed > 2.0
+    i = [b.name for b in scene.boxes].index(name)
+    assert body_at(body, 0.02, RULES).speeds[i] == pytest.approx(SHARE * speed)
+    assert body_at(body, 0.02 + RAISED, RULES).speeds[i] == 2.0
+    # Once assumed to be so fast, it may be.
+    again = moved(after, forearm_left=[0.0, 0.0401, 0.0])
+    assert turned or seen_again(body, again, at(scene, 0.02), RULES).n_faster == 1
+
+
+def test_a_sight_that_is_no_newer_tells_nothing_of_speeds():
+    scene = worlds.wearer()
+    body = first_sight(scene, at(scene, 1.0))
+    after = moved(scene, head=[0.5, 0.0, 0.0])
+    assert seen_again(body, after, at(scene, 1.0), RULES).n_faster == 0
+    assert seen_again(body, after, at(scene, 0.9), RULES).n_faster == 0
+
+
+def test_parts_may_come_go_and_change_places():
+    scene = worlds.wearer()
+    body = first_sight(scene, at(scene, 0.0))
+    hat = Box('hat', [0.0, 0.0, 1.0], [0.1, 0.1, 0.1], np.eye(3))
+    others = Scene((hat, *reversed(scene.boxes[2:])))
+    body = seen_again(body, others, at(others, 0.01), RULES)
+    assert (body.n_seen, body.n_faster) == (6, 0)
+    nobody = Scene(())
+    body = seen_again(body, nobody, at(nobody, 0.02), RULES)
+    assert body_at(body, 0.03, RULES).ages.shape == (0,)
+    # What was never seen before has no speed.
+    assert seen_again(body, scene, at(scene, 0.03), RULES).n_seen == 6
+
+
+def test_of_parts_with_one_name_the_first_is_the_first():
+    first = Box('hand', [0.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    other = Box('hand', [1.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    body = first_sight(Scene((first, other)), np.zeros(2))
+    assert seen_again(body, Scene((first, other)), np.full(2, 0.01), RULES).n_faster == 0
+    assert seen_again(body, Scene((other, first)), np.full(2, 0.01), RULES).n_faster == 2

@@ -1,0 +1,292 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The monitor with separation: what it gives the controller, and what it leaves as it is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from monitored import ARM, FAR, Monitored  # noqa: E402
+from rclpy.node import Node  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
+from rrth_planner.collision import reference_checker, separation  # noqa: E402
+from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
+from rrth_planner.execution.body_motion import body_at  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
+from rrth_planner.model.scene import Box  # noqa: E402
+from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
+from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
+from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
+from rrth_planner.ros.interface.separation_status import SeparationState  # noqa: E402
+from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
+from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
+from rrth_planner.ros.monitor import commitments  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import MonitorState  # noqa: E402
+import worlds  # noqa: E402
+
+pytestmark = pytest.mark.usefixtures('ros_context')
+FRAME = 1.0 / 120.0
+# The whole arm turns.
+SWING = Trajectory(
+    times=[0.0, 1.2],
+    positions=[worlds.FOLDED, worlds.FOLDED + [0.9, 0.0, 0.0, 0.0]],
+    velocities=np.zeros((2, 4)),
+    accelerations=np.zeros((2, 4)),
+)
+
+
+class Separated(Monitored):
+    """A monitor with separation, of a motion that begins now, and an arm that follows exactly."""
+
+    def __init__(self, node, parameters):
+        """Let the motion begin, with a wearer far away."""
+        self.seen = (FAR,)
+        super().__init__(node, parameters)
+
+    def begin(self):
+        """Let the motion begin now, from its first point."""
+        self.now += 1.0
+        self.motion = SWING
+        self.published.clear()
+        self.read(*self.on_time(0.0))
+        self.see(*self.seen)
+        self.command(ExecutingMotion(trajectory=self.motion, start_time=self.now))
+
+    def commanded(self, time):
+        """Return state (3, dof) that the controller commands at a time [s]."""
+        trajectory, begin = [m for m in self.published if m[1] <= time][-1]
+        return np.array(sample(trajectory, [time - begin]))[:, 0]
+
+    def frames(self, n, *boxes, sees=True):
+        """Let n frames of the tracker come, 1/120 s apart."""
+        for _ in range(n):
+            self.now += FRAME
+            self.read(*self.commanded(self.now)[:2])
+            if sees:
+                self.see(*(boxes or (FAR,)))
+            self.monitor._on_timer()
+
+    def see(self, *boxes, expires=float('inf')):
+        """Let a body come that was measured 20 ms ago."""
+        self.seen = boxes
+        measured = self.now - 0.02
+        parts = tuple(((b.name, 0), BodyPart((b,), expires, measured)) for b in boxes)
+        self.inputs.body.value, self.inputs.body.measured = WearerBody(parts), measured
+        self.monitor.on_body(self.inputs.body.value, 0)
+
+    @property
+    def is_over(self):
+        """Whether the arm is at rest for good."""
+        trajectory, begin = self.published[-1]
+        return self.now > begin + trajectory.duration
+
+
+@pytest.fixture(name='separated')
+def _separated():
+    nodes = []
+
+    def make(**values):
+        given = [Parameter('separation', value=True)]
+        given += [Parameter(name, value=value) for name, value in values.items()]
+        nodes.append(Node('rrth_planner', parameter_overrides=given))
+        return Separated(nodes[-1], declare_parameters(nodes[-1]))
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+
+
+def near(clearance):
+    """Return a hand that far beside the longest bar of the arm and the way that it takes [m]."""
+    bars = reference_checker.bars(ARM, SWING.positions, 0.0)
+    longest = int(np.linalg.norm(np.diff(bars[0], axis=1)[:, 0], axis=1).argmax())
+    begin, end = bars[0, longest], bars[1, longest]
+    aside = np.cross(begin[1] - begin[0], end[1] - begin[1])
+    aside /= np.linalg.norm(aside)
+    return Box('hand', begin.mean(axis=0) + (clearance + 0.05) * aside, [0.1] * 3, np.eye(3))
+
+
+def test_without_a_wearer_near_the_whole_rest_is_given(separated):
+    arm = separated()
+    assert len(arm.published) == 1
+    trajectory, begin = arm.published[0]
+    assert begin == arm.now
+    assert np.abs(trajectory.positions[-1] - arm.motion.positions[-1]).max() < 1e-9
+    arm.frames(40)
+    assert len(arm.published) == 1
+
+
+@pytest.mark.parametrize('clearance', [0.15, 0.3, 0.5])
+def test_beside_a_wearer_each_commitment_continues_the_last_one_and_is_separate(
+    separated, clearance
+):
+    arm = separated()
+    hand = near(clearance)
+    arm.see(hand)
+    arm.begin()
+    judged = 0
+    for _ in range(900):
+        before = len(arm.published)
+        arm.frames(1, hand)
+        if len(arm.published) > before:
+            trajectory, begin = arm.published[-1]
+            old, start = arm.published[-2]
+            for now, then, same in zip(
+                sample(trajectory, [0.0]),
+                sample(old, [begin - start]),
+                (2e-4, 0.02, 4.1),
+                strict=True,
+            ):
+                assert np.abs(now - then).max() <= same
+            settings = arm.reporter.parameters.separation
+            body = body_at(arm.monitor._commitments._body, begin, settings.rules)
+            found = separation_violations(
+                ARM, body, trajectory, settings.rules, settings.margin, period=5e-3
+            )
+            assert not found
+            judged += 1
+        if arm.is_over:
+            break
+    assert judged > 20
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+    assert SeparationState.SLOWED in [status.state for status in arm.statuses]
+
+
+def test_where_no_body_comes_any_more_the_arm_stops_and_goes_on_with_the_next_ones(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    n = len(arm.published)
+    # Shorter than `body_timeout`.
+    arm.frames(15, sees=False)
+    assert len(arm.published) == n
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
+def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    arm.frames(40, sees=False)
+    assert arm.statuses[-1].state is SeparationState.PROTECTIVE_STOP
+    assert 'expected at most 0.2 s (body_timeout)' in arm.statuses[-1].cause
+    assert arm.is_over
+
+
+@pytest.mark.parametrize('broken', ['extended', 'body_at'])
+def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
+    separated, monkeypatch, broken
+):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+
+    def fail(*_):
+        raise ZeroDivisionError('of the test')
+
+    monkeypatch.setattr(commitments, broken, fail)
+    arm.frames(80, hand)
+    monkeypatch.undo()
+    assert arm.is_over
+    assert arm.statuses[-1].state is SeparationState.FAULT
+    assert 'ZeroDivisionError: of the test' in arm.statuses[-1].cause
+    with pytest.raises(RequestError, match='does not move the arm until ~/reset') as problem:
+        arm.begin()
+    assert problem.value.code is ErrorCode.FAILURE
+    assert 'ZeroDivisionError' in arm.monitor.reset()
+    arm.see(hand)
+    arm.begin()
+    assert arm.monitor.running is not None
+
+
+def test_a_stop_that_is_not_proven_separate_is_not_published(separated, monkeypatch):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    monkeypatch.setattr(commitments, 'first_unproven', lambda *_: separation.Blocked(0, 'a', 'b'))
+    n = len(arm.published)
+    arm.monitor.fail('of the test')
+    assert len(arm.published) == n
+    assert arm.monitor._state is MonitorState.STOPPING
+    arm.frames(60, hand)
+    assert len(arm.published) == n
+    assert arm.is_over
+
+
+def test_a_stop_that_is_proven_separate_comes_at_once(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    n = len(arm.published)
+    arm.monitor.fail('of the test')
+    assert len(arm.published) == n + 1
+    assert arm.statuses[-1].cause == 'of the test'
+
+
+def test_a_motion_that_cannot_begin_is_rejected_and_nothing_is_published(separated):
+    arm = separated(contact_speed=0.0)
+    arm.see(near(0.03))
+    with pytest.raises(RequestError, match='the motion cannot begin: link 3 is not proven'):
+        arm.begin()
+    assert not arm.published
+
+
+def test_a_held_commitment_is_not_extended_until_then(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    n = len(arm.published)
+    assert arm.monitor.hold(arm.now + 3.5 * FRAME) is arm.monitor.running
+    arm.frames(3, hand)
+    assert len(arm.published) == n
+    arm.frames(2, hand)
+    assert len(arm.published) > n
+
+
+@pytest.mark.parametrize('resume', ['auto', 'manual'])
+def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separated, resume):
+    arm = separated(resume=resume, replan=False)
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    arm.monitor.hold(arm.now + 0.6)
+    arm.frames(75, hand)
+    arm.frames(10, hand)
+    end = arm.motion.positions[-1]
+    if resume == 'manual':
+        assert np.abs(arm.commanded(arm.now)[0] - end).max() > 0.1
+        assert arm.is_over
+        arm.monitor.reset()
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - end).max() < 1e-6
+
+
+def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
+    arm = separated()
+    hand = near(0.5)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(5, hand)
+    jumps = [hand, replace(hand, center=hand.center + 0.08)]
+    for k in range(20):
+        arm.frames(1, jumps[k % 2])
+    assert arm.monitor._commitments._body.n_faster == 1
+    assert arm.statuses[-1].state is not SeparationState.NORMAL
