@@ -153,6 +153,14 @@ def escapes_by_continuing(
     )
 
 
+def is_ray_clear(
+    q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
+) -> bool:
+    """Return whether the pointing ray of an arm at q, (dof,), is clear by a margin [m]."""
+    world = arm_world(arm, scene, margin, ray_guard_length)
+    return bool(world.clearances(q)[-1].min(initial=np.inf) > 0.0)
+
+
 def is_place_free(
     q: Array, arm: ArmModel, scene: Scene, margin: float, ray_guard_length: float
 ) -> bool:

@@ -40,7 +40,7 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
-        self.ages, self.statuses = [], []
+        self.ages, self.statuses, self.ray_clear = [], [], []
         # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
@@ -58,6 +58,7 @@ class Monitored:
         publishers = SimpleNamespace(
             publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin)),
             assert_liveliness=lambda: self.alive.append(self.now),
+            publish_ray_clear=self.ray_clear.append,
             flush=lambda: None,
         )
         self.monitor = ExecutionMonitor(node, self.inputs, self.reporter, publishers)

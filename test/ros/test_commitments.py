@@ -290,3 +290,18 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
         arm.frames(1, jumps[k % 2])
     assert arm.monitor._commitments._body.n_faster == 1
     assert arm.statuses[-1].state is not SeparationState.NORMAL
+
+
+def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
+    arm = separated()
+    arm.begin()
+    arm.frames(2)
+    assert arm.ray_clear[-1]
+    T = reference_checker.frames(ARM, arm.commanded(arm.now)[:1])[0, -1]
+    arm.frames(1, Box('hand', T[:3, 3] + 0.6 * T[:3, 2], [0.1] * 3, np.eye(3)))
+    assert not arm.ray_clear[-1]
+    arm.frames(2)
+    assert arm.ray_clear[-1]
+    # Older than `body_timeout`.
+    arm.frames(30, sees=False)
+    assert not arm.ray_clear[-1]

@@ -65,8 +65,11 @@ def policy():
 
 @pytest.mark.parametrize('path', NODES)
 def test_a_node_may_do_what_it_does_and_nothing_else(path, policy, wait_until):
-    simulated = Parameter('use_sim_time', value=True)
-    node = NODES[path](parameter_overrides=[simulated])
+    overrides = [Parameter('use_sim_time', value=True)]
+    if path == '/rrth_planner':
+        # With all that it may publish.
+        overrides.append(Parameter('separation', value=True))
+    node = NODES[path](parameter_overrides=overrides)
     watcher = Node('watcher')
 
     def done():

@@ -10,6 +10,7 @@ import warnings
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
@@ -77,9 +78,16 @@ class PlannerClient(Node):
             for kind, topic in ((MarkerArray, 'body_boxes'), (PointStamped, 'target'))
         }
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
-        self.create_subscription(
-            JointTrajectory, 'joint_trajectory', lambda msg: self.commanded.append(msg), LATCHED
-        )
+        # Whole motions: with separation `joint_trajectory` has only stretches of them, not latched.
+        quietly = SubscriptionEventCallbacks(use_default_callbacks=False)
+        for topic in ('joint_trajectory', f'{NODE}/planned_trajectory'):
+            self.create_subscription(
+                JointTrajectory,
+                topic,
+                lambda msg: self.commanded.append(msg),
+                LATCHED,
+                event_callbacks=quietly,
+            )
         self._plan = self.create_client(Trigger, f'{NODE}/plan')
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)

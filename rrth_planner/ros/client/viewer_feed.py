@@ -9,6 +9,7 @@ from threading import Lock, Thread
 import time
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
@@ -27,6 +28,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
+from rrth_planner.ros.interface.separation_status import RATE_KEY
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -34,7 +36,8 @@ from rrth_planner.ros.middleware.qos import LATCHED
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-NAME, SERVICE = 'rrth_viewer', 'rrth_planner/plan'
+NAME, PLANNER = 'rrth_viewer', 'rrth_planner'
+SERVICE = f'{PLANNER}/plan'
 # Longest wait for the acknowledgement of a target [s].
 LONGEST_WAY = 1.0
 # From an answer to the next request: by then the arm is in motion; period of the timer [s].
@@ -60,9 +63,18 @@ class ViewerFeed(Node):
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
         self._scene_monitor = SceneMonitor(self, parameters, self._inputs)
-        self._motions = OpenSubscription(
-            self, JointTrajectory, 'joint_trajectory', self._on_motion, self._reject
+        self._motions = [
+            OpenSubscription(self, JointTrajectory, topic, take, self._reject)
+            for topic, take in (
+                ('joint_trajectory', self._on_motion),
+                (f'{PLANNER}/planned_trajectory', self._on_planned_motion),
+            )
+        ]
+        self._states = self.create_subscription(
+            DiagnosticStatus, f'{PLANNER}/state', self._on_state, LATCHED
         )
+        # Whether motions come as stretches, and how they are executed then.
+        self._is_separated, self._state = False, ''
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
         # The last motion that was published.
@@ -106,7 +118,8 @@ class ViewerFeed(Node):
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
-        return '; '.join(filter(None, (self._answer, waiting))) or 'drag the target, or press Plan'
+        said = '; '.join(filter(None, (self._state, self._answer, waiting)))
+        return said or 'drag the target, or press Plan'
 
     def ask(self, target: Array | None = None) -> None:
         """Publish a target, (3,) in the base frame [m], and ask for a plan; the newest counts."""
@@ -153,7 +166,19 @@ class ViewerFeed(Node):
         with self._lock:
             self._is_asking = False
 
+    def _on_state(self, msg: DiagnosticStatus) -> None:
+        rate = next((pair.value for pair in msg.values if pair.key == RATE_KEY), '')
+        self._state = f'{one_line(msg.message)}, at {float(rate):.0%} of its speed' if rate else ''
+
+    def _on_planned_motion(self, msg: JointTrajectory, arrival: Arrival) -> None:
+        self._is_separated = False
+        self._on_motion(msg, arrival)
+        self._is_separated = True
+
     def _on_motion(self, msg: JointTrajectory, _: Arrival) -> None:
+        if self._is_separated:
+            # A stretch of the planned motion, which is shown.
+            return
         try:
             self.trajectory = joint_trajectory_from_msg(msg, self.arm.joint_names)
         except MessageError as problem:

@@ -11,7 +11,8 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
-from rrth_planner.ros.middleware.qos import COMMANDED, COMMITTED, LATCHED
+from rrth_planner.ros.middleware.qos import COMMANDED, COMMITTED, LATCHED, RAY_CLEAR
+from std_msgs.msg import Bool
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
@@ -27,10 +28,11 @@ class PlanPublishers:
         # An old commitment must not be executed by a controller that comes late.
         motions = COMMITTED if is_separated else COMMANDED
         self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', motions)
-        self._planned = None
+        self._planned = self._ray_clear = None
         if is_separated:
             name = '~/planned_trajectory'
             self._planned = node.create_publisher(JointTrajectory, name, LATCHED)
+            self._ray_clear = node.create_publisher(Bool, '~/ray_clear', RAY_CLEAR)
         self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
 
@@ -56,6 +58,11 @@ class PlanPublishers:
         """Assert that the running motion is monitored."""
         if self._planned is None:
             self._trajectory.assert_liveliness()
+
+    def publish_ray_clear(self, is_clear: bool) -> None:
+        """Publish whether the pointing ray meets nobody, with separation."""
+        if self._ray_clear is not None:
+            self._ray_clear.publish(Bool(data=is_clear))
 
     def flush(self) -> None:
         """Wait briefly until all subscribers have the last motion."""

@@ -29,6 +29,8 @@ from rrth_planner.ros.middleware.qos import LATCHED
 PERIOD = 1.0
 # Warnings of fast parts are logged at most this often [s].
 WARNING_PERIOD = 5.0
+# A rate is published again once it has changed by so much [-].
+RATE_STEP = 0.05
 # Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
@@ -86,6 +88,7 @@ class Reporter:
         self._separation, self._commitments = SeparationStatus(), Figures()
         self._body: BodyMotion | None = None
         self._state: Publisher | None = None
+        self._published_state = self._separation
         if parameters.separation is not None:
             self._state = node.create_publisher(DiagnosticStatus, '~/state', LATCHED)
             self._publish_state()
@@ -134,12 +137,15 @@ class Reporter:
 
     def separation_status(self, status: SeparationStatus) -> None:
         """Publish how the running motion is executed, where that has changed."""
-        before, self._separation = self._separation, status
-        if status.state is not before.state or status.cause != before.cause:
-            self._publish_state()
+        self._separation, before = status, self._published_state
+        if (status.state, status.cause) != (before.state, before.cause):
             self.publish_soon()
+        elif abs(status.rate - before.rate) < RATE_STEP:
+            return
+        self._publish_state()
 
     def _publish_state(self) -> None:
+        self._published_state = self._separation
         if self._state is not None:
             name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
             self._state.publish(separation_to_msg(name, self._separation))

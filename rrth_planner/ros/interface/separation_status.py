@@ -39,6 +39,7 @@ class SeparationStatus:
     box: str = ''
 
 
+RATE_KEY = 'rate [-]'
 LEVELS = {
     SeparationState.NORMAL: DiagnosticStatus.OK,
     SeparationState.SLOWED: DiagnosticStatus.OK,
@@ -51,5 +52,5 @@ def separation_to_msg(name: str, status: SeparationStatus) -> DiagnosticStatus:
     """Return the message of `~/state`; its message begins with the name of the state."""
     state = status.state
     text = f'{state.name}: {status.cause}' if status.cause else state.name
-    values = {'rate [-]': f'{status.rate:.3f}', 'part of the arm': status.bar, 'box': status.box}
+    values = {RATE_KEY: f'{status.rate:.3f}', 'part of the arm': status.bar, 'box': status.box}
     return status_to_msg(name, LEVELS[state], text, values)

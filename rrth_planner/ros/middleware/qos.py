@@ -23,5 +23,9 @@ COMMITTED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE)
 # For subscribers that supervise the planner: liveliness needs a reliable reader.
 SUPERVISED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE, **_LIVELINESS)
 
+# Whether the pointing ray is clear: who needs it is told where it does not come any more [s].
+DEADLINE = 0.1
+RAY_CLEAR = QoSProfile(**_LAST, **_LIVELINESS, deadline=Duration(seconds=DEADLINE))
+
 # Requests may queue, and their responses: the default drops those beyond ten.
 SERVICE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)

@@ -21,7 +21,11 @@ from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
-from rrth_planner.execution.remaining_motion import escapes_by_continuing, is_remaining_free
+from rrth_planner.execution.remaining_motion import (
+    escapes_by_continuing,
+    is_ray_clear,
+    is_remaining_free,
+)
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
@@ -298,6 +302,19 @@ class ExecutionMonitor:
             self._stop_for_failure()
         if not self.pending_stop:
             self._publishers.assert_liveliness()
+        if self._reporter.parameters.separation is not None:
+            self._publishers.publish_ray_clear(self._is_ray_clear())
+
+    def _is_ray_clear(self) -> bool:
+        """Return whether the pointing ray is known to be clear of the wearer."""
+        parameters, now = self._reporter.parameters, self._now()
+        try:
+            body = self._inputs.require_fresh(now, parameters)
+            q = self._inputs.joints_at(now, parameters.joint_timeout).positions
+        except RequestError:
+            return False
+        length = parameters.ray_guard_length
+        return is_ray_clear(q, parameters.arm, scene_of(body), parameters.margin, length)
 
     def _check_inputs(self) -> None:
         """Stop the arm where an input is stale or the last stop is not executed."""
