@@ -78,7 +78,7 @@ class PlannerClient(Node):
             for kind, topic in ((MarkerArray, 'body_boxes'), (PointStamped, 'target'))
         }
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
-        # Whole motions: with separation `joint_trajectory` has only stretches of them, not latched.
+        # Whole motions: with separation `joint_trajectory` has stretches of them, not latched.
         quietly = SubscriptionEventCallbacks(use_default_callbacks=False)
         for topic in ('joint_trajectory', f'{NODE}/planned_trajectory'):
             self.create_subscription(
