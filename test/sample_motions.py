@@ -56,6 +56,15 @@ def any_motion(rng):
     return planned_motion(rng) if rng.random() < 0.6 else foreign_motion(rng)
 
 
+def motion_of(rng, arm):
+    """Return a motion of an arm that has any number of joints."""
+    motion = any_motion(rng)
+    mix = rng.standard_normal((4, arm.dof)) * (rng.random((4, arm.dof)) < 0.6)
+    middle = arm.bounds.mean(axis=0)
+    q, v, a = (row @ mix for row in motion.states)
+    return Trajectory(motion.times, middle + q, v, a)
+
+
 def path_distance(points, trajectory, begin, end):
     """Return how far points, (n, dof), are from a stretch of a motion, joint by joint [rad]."""
     path = sample(trajectory, np.linspace(begin, end, 3001))[0]

@@ -11,7 +11,7 @@ from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, S
 from rrth_planner.kernels.collision.separation import permitted_rates
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import growth_at, SeenBody, Separation
-from rrth_planner.model.trajectory import piece_coefficients, sample, Trajectory
+from rrth_planner.model.trajectory import part_of, piece_coefficients, sample, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.rate_profile import (
     continued,
@@ -226,7 +226,9 @@ def _committed(
         if len(intended.times) == 1:
             # It would never move.
             continue
-        if rate >= WHOLE and is_proven(intended):
+        # What was intended before may lead to another rate than the one that is wanted.
+        kept = float(rate_state(profile, profile.change_time)[1])
+        if kept >= WHOLE and is_proven(intended):
             return Commitment(
                 motion=motion,
                 trajectory=intended,
@@ -243,4 +245,7 @@ def _committed(
                 profile=profile,
                 stretch=min(STRETCH, curve.duration),
             )
+    if blocked is None:
+        # No rate could be tried: the motion itself says what is in its way.
+        is_proven(part_of(motion, float(state[0]), motion.duration))
     return blocked or Blocked(0.0, 'the arm', 'its limits')

@@ -23,7 +23,7 @@ from rrth_planner.model.arm import ArmModel, bars_of, Capsule
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import growth_at, seen_body, SeparationRules
 from rrth_planner.model.trajectory import sample, Trajectory
-from sample_motions import any_motion
+from sample_motions import any_motion, motion_of
 from worlds import capsule_arm, random_boxes, random_chain, table_1_arm
 
 RULES = SeparationRules()
@@ -46,15 +46,6 @@ def random_arm(rng, kind):
     if kind == 0:
         return table_1_arm(0.03)
     return capsule_arm(rng) if kind == 1 else random_chain(rng, True)
-
-
-def motion_of(rng, arm):
-    """Return a motion of an arm that has any number of joints."""
-    motion = any_motion(rng)
-    mix = rng.standard_normal((4, arm.dof)) * (rng.random((4, arm.dof)) < 0.6)
-    middle = arm.bounds.mean(axis=0)
-    q, v, a = (row @ mix for row in motion.states)
-    return Trajectory(motion.times, middle + q, v, a)
 
 
 def test_velocities_are_differences_of_positions():
