@@ -21,9 +21,6 @@ from rrth_planner.timing.rate_profile import (
     steered,
 )
 
-# How long a commitment goes on before its stop begins: the next one is there by then, or the one
-# after that [s].
-STRETCH = 0.027
 # How far ahead the permitted rate is asked for [s], at so many places of the motion.
 AHEAD, PLACES = 0.6, 20
 # Share of its limits that a motion slows down with; how much of a ramp that takes from the way.
@@ -39,7 +36,7 @@ REST = 1e-6
 # A rate at which the rest of the motion is tried as a whole.
 WHOLE = 0.999
 # A motion is at its end so shortly before it [s].
-END = 1e-6
+END = 1e-4
 # How far an arm may be from a new commitment when that begins, late or after a stop, and what that
 # is at the tip of an arm of some metres [rad, m].
 JUMP, JUMP_WAY = 2e-4, 5e-4
@@ -136,7 +133,7 @@ def permitted_ahead(
         body.scene.numbers,
         box_classes(arm, body.scene),
         mount_inverse(arm),
-        growth_at(body, rules, settings.margin + SLACK + JUMP_WAY, STRETCH),
+        growth_at(body, rules, settings.margin + SLACK + JUMP_WAY, settings.stretch),
         body.speeds,
         found,
     )
@@ -236,14 +233,14 @@ def _committed(
                 profile=profile,
                 stretch=math.inf,
             )
-        curve = fast_stop(intended, 0.0, settings.stop_limits, STRETCH)
+        curve = fast_stop(intended, 0.0, settings.stop_limits, settings.stretch)
         if len(curve.times) > 1 and is_proven(curve):
             return Commitment(
                 motion=motion,
                 trajectory=curve,
                 start_time=time,
                 profile=profile,
-                stretch=min(STRETCH, curve.duration),
+                stretch=min(settings.stretch, curve.duration),
             )
     if blocked is None:
         # No rate could be tried: the motion itself says what is in its way.

@@ -28,6 +28,8 @@ BODY_SPEEDS = (
     ('foot', 2.0),
     ('', 2.0),
 )
+# Of bodies 120 times a second the next one, or the one after it, is there by then [s].
+SHORTEST_STRETCH = 0.027
 # Faster than any part of a body [m/s].
 FASTEST = 100.0
 
@@ -94,6 +96,8 @@ class Separation:
         [m].
     limits, stop_limits : MotionLimits
         Of the motion, and of the stop that ends a commitment.
+    stretch : float
+        How long a commitment goes on before its stop begins: by then the next one is there [s].
 
     """
 
@@ -102,6 +106,7 @@ class Separation:
     margin: float
     limits: MotionLimits
     stop_limits: MotionLimits
+    stretch: float = SHORTEST_STRETCH
 
 
 def speed_bound(rules: SeparationRules, name: str) -> float:

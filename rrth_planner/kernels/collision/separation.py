@@ -32,7 +32,7 @@ FIRST, HALVINGS = 0.0128, 8
 # Rounding of a speed [m/s].
 AT_REST = 1e-9
 # Steps of the search for the permitted rate; the time between two places of a difference [s].
-STEPS, STEP = 5, 1e-4
+STEPS, STEP = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
 TINY, SLOW = 1e-6, 1e-3
 

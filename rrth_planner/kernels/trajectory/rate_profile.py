@@ -9,7 +9,12 @@ import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.trajectory.lookahead import derivatives_on
 from rrth_planner.kernels.trajectory.quintics import fit
-from rrth_planner.kernels.trajectory.stop_trajectory import CLOSEST, is_within, TICK
+from rrth_planner.kernels.trajectory.stop_trajectory import (
+    CLOSEST,
+    CLOSEST_FIRST,
+    is_within,
+    TICK,
+)
 
 # A rate profile: three phases of constant second derivative of the rate, then a constant rate.
 # `profile` (3, 5), a row for each phase: its duration [s]; at its begin the time within the motion
@@ -142,7 +147,12 @@ def scaled_times(times, profile, points):
         mark = marks[i] if i < m else after
         if mark > after:
             continue
-        if i < m and (mark - kept < CLOSEST or after - mark < CLOSEST):
+        is_close = mark - kept < CLOSEST or after - mark < CLOSEST
+        if mark == end and after - mark >= CLOSEST and kept > 0.0 and is_close:
+            # From here on the rate is constant: the point before it, not this one, is left out.
+            n -= 1
+            kept = points[n - 1]
+        elif i < m and is_close and not (mark == end and mark - kept >= CLOSEST_FIRST):
             continue
         if mark <= kept:
             continue
@@ -177,6 +187,9 @@ def keeps_limits(curves, times, profile, limits, until):
     end = profile[0, LASTS] + profile[1, LASTS] + profile[2, LASTS]
     points = np.empty(times.shape[0] + 8 + int(end / SPACING))
     n = scaled_times(times, profile, points)
+    if n == 1:
+        # It stays at rest.
+        return True
     m = 1
     while m < n - 1 and points[m] < until:
         m += 1

@@ -29,6 +29,11 @@ from rrth_planner.ros.messages.error_codes import ErrorCode
 FULL_RATE = 0.995
 # At rest on its way the arm goes on once nothing has kept it from that for so long [s].
 RESUME_AFTER = 0.2
+# What comes less often is no stream of bodies [s]; how fast a long pause between two is forgotten.
+LONGEST_PERIOD, FADING = 0.25, 0.98
+# A commitment lasts until the next body is there and processed: its period times so much, and that
+# long [s].
+PERIODS, PROCESSING = 1.3, 0.012
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
 
@@ -52,6 +57,8 @@ class Commitments:
         self.fault, self._is_reset = '', False
         # When it was last not proven that the motion may go on [s].
         self._blocked = -np.inf
+        # How long after each other bodies come, at most lately [s], and when the last one came.
+        self._period, self._came = 0.0, -np.inf
         # Until then the present commitment is not extended: a handover was planned from it [s].
         self._held_until = -np.inf
 
@@ -60,13 +67,18 @@ class Commitments:
         """Whether the running motion is executed by commitments."""
         return self.present is not None
 
-    def observe(self, body: WearerBody, separation: Separation | None) -> None:
-        """Take note of a body."""
+    def observe(self, body: WearerBody, separation: Separation | None, now: float) -> None:
+        """Take note of a body that came now [s]."""
         if separation is None:
             self._body = self._last = None
             return
         if body is self._last:
             return
+        elapsed = now - self._came
+        if 0.0 < elapsed < LONGEST_PERIOD:
+            # Soon longer, slowly shorter again: a body that is late now and then needs time, too.
+            self._period = max(elapsed, FADING * self._period)
+        self._came = now
         parts = (*body.parts, *body.lost)
         scene = scene_of(body)
         measured = np.array([part.measured for _, part in parts for _ in part.boxes])
@@ -97,7 +109,8 @@ class Commitments:
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet to keep separate from'
             )
         seen = body_at(self._body, planned.start_time, separation.rules)
-        found = first_commitment(planned.trajectory, planned.start_time, seen, separation)
+        settings = self._stretched(separation)
+        found = first_commitment(planned.trajectory, planned.start_time, seen, settings)
         if isinstance(found, Blocked):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -150,7 +163,8 @@ class Commitments:
                 self._reporter.separation_status(waits)
             return None
         begin = time.perf_counter()
-        found = extended(present, now, body_at(self._body, now, separation.rules), separation)
+        seen = body_at(self._body, now, separation.rules)
+        found = extended(present, now, seen, self._stretched(separation))
         if found is None:
             return None
         if isinstance(found, Blocked):
@@ -163,6 +177,11 @@ class Commitments:
         self._reporter.commitment_published(time.perf_counter() - begin)
         self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
         return _executing(found, planned)
+
+    def _stretched(self, separation: Separation) -> Separation:
+        """Return the settings for commitments that last until the next body."""
+        stretch = max(separation.stretch, PERIODS * self._period + PROCESSING)
+        return replace(separation, stretch=stretch)
 
     def _may_resume(self, now: float, parameters: PlannerParameters) -> bool:
         """Return whether a motion that came to rest on its way may go on, if that is proven."""

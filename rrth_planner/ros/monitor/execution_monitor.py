@@ -189,7 +189,8 @@ class ExecutionMonitor:
         """Check the remaining motion against a body that arrived at a time [ns]."""
 
         def check() -> None:
-            self._commitments.observe(body, self._reporter.parameters.separation)
+            separation = self._reporter.parameters.separation
+            self._commitments.observe(body, separation, self._now())
             self._check_remaining_motion(body, arrived)
 
         self._run_fail_safe(check)
