@@ -1,0 +1,24 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Independent runs, one after the other or in processes beside each other, with a bar for them."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+import functools
+import multiprocessing
+import sys
+from typing import TypeVar
+
+from tqdm import tqdm
+
+T = TypeVar('T')
+
+
+def each(run: Callable[..., T], seeds: Sequence[int], jobs: int, what: str, *given: object) -> list[T]:
+    """Return run(*given, seed) of each seed, in their order, by so many processes."""
+    one = functools.partial(run, *given)
+    bar = functools.partial(tqdm, total=len(seeds), desc=what, file=sys.stderr, leave=False)
+    if jobs == 1:
+        return list(bar(map(one, seeds)))
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn')) as pool:
+        return list(bar(pool.map(one, seeds)))
