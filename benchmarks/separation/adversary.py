@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from rrth_planner.collision.reference_checker import bar_ends_at
 from rrth_planner.execution.commitment import path_state
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.monitored_arm import arm_at_rest, monitored, MonitoredArm, started
 from rrth_planner.execution.remaining_motion import is_remaining_free
-from rrth_planner.kernels.layout import SIZE
 from rrth_planner.io.wearer_file import load_body
+from rrth_planner.kernels.layout import SIZE
+from rrth_planner.model.arm import bars_of
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
@@ -60,8 +62,6 @@ from benchmarks.separation.setting import (
     the_arm,
     the_settings,
 )
-from rrth_planner.collision.reference_checker import bar_ends_at
-from rrth_planner.model.arm import bars_of
 
 # A further hand is such a cube, at a distance from the way of the arm from the first to the second
 # [m]; so many places are tried.
@@ -165,7 +165,7 @@ class Chain:
     n_blocked: int
 
 
-def chain_of_hands(trial: Trial, seed: int, n: int = CHAIN) -> Chain:
+def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
     """Return what becomes of some hands, each reaching for another motion of the arm."""
     rng = np.random.default_rng(seed)
     q, hands, n_blocked = FOLDED, [], 0
@@ -430,8 +430,8 @@ def _path_state(planner: Planner, time: float) -> tuple[float, float, float]:
 
 HEADER = (
     '| what | v_c [m/s] | stop | parts that left | arm in motion then | contacts, arm faster than '
-    'v_c | slower | at rest | faster within the margin | fastest contact [m/s] | least distance of '
-    'a fast place [mm] | motions that could not begin |'
+    'v_c | slower | at rest | faster within the margin | fastest contact [m/s] | least distance '
+    'of a fast place [mm] | motions that could not begin |'
 )
 
 

@@ -139,6 +139,7 @@ HEADER = (
 def line_of(dead: float, case: Case, found: Sequence[Timed]) -> str:
     """Return a line of the table."""
     ratios = np.array([one.took / one.planned for one in found if np.isfinite(one.took)])
+    most = max((one.excess for one in found), default=0.0)
     n_out = sum(not np.isfinite(one.took) for one in found)
     shares = (
         [f'{ratios.mean():.2f}', f'{np.median(ratios):.2f}', f'{np.percentile(ratios, 90):.2f}']
@@ -153,7 +154,7 @@ def line_of(dead: float, case: Case, found: Sequence[Timed]) -> str:
         *shares,
         f'{n_out} ({100.0 * n_out / max(1, len(found)):.0f} %)',
         sum(one.n_stops for one in found),
-        f'{100.0 * (max((one.excess for one in found), default=0.0) - 1.0):.2f}',
+        f'{100.0 * (most - 1.0):.2f}' if most > 0.0 else '–',
         f'{max((one.jump for one in found), default=0.0):.1e}',
         f'{max((one.speed_jump for one in found), default=0.0):.1e}',
     )

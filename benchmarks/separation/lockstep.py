@@ -23,7 +23,7 @@ from rrth_planner.execution.commitment import (
 )
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import SeenBody, seen_body, SeparationRules
+from rrth_planner.model.separation import seen_body, SeenBody, SeparationRules
 from rrth_planner.model.trajectory import sample, Trajectory
 
 # A motion that has not arrived after so long, or that cannot begin for so long, is not reachable
@@ -188,7 +188,7 @@ class Planner:
             self.controller.give(found.trajectory, at, came)
 
     def is_at_rest(self, time: float) -> bool:
-        """Return whether the arm is at rest at a time [s], and stays there if nothing more comes."""
+        """Return whether the arm is at rest from a time on if nothing more comes [s]."""
         if not self.is_under_way:
             return True
         end = self.commitments[-1].end_time

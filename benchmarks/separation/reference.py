@@ -145,4 +145,3 @@ def lines_of(chains: Sequence[Judged]) -> list[str]:
         cells = [*head, *sums, f'{1e3 * max(one.depth for one in some):.3f}']
         lines.append(f'| {" | ".join(map(str, cells))} |')
     return lines
-

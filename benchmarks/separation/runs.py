@@ -14,11 +14,15 @@ from tqdm import tqdm
 T = TypeVar('T')
 
 
-def each(run: Callable[..., T], seeds: Sequence[int], jobs: int, what: str, *given: object) -> list[T]:
-    """Return run(*given, seed) of each seed, in their order, by so many processes."""
+def each(
+    run: Callable[..., T], items: Sequence[object], jobs: int, what: str, *given: object
+) -> list[T]:
+    """Return run(*given, item) of each item, in their order, by so many processes."""
     one = functools.partial(run, *given)
-    bar = functools.partial(tqdm, total=len(seeds), desc=what, file=sys.stderr, leave=False)
+    bar = functools.partial(
+        tqdm, total=len(items), desc=what, file=sys.stderr, leave=False, disable=None
+    )
     if jobs == 1:
-        return list(bar(map(one, seeds)))
+        return list(bar(map(one, items)))
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn')) as pool:
-        return list(bar(pool.map(one, seeds)))
+        return list(bar(pool.map(one, items)))
