@@ -85,7 +85,7 @@ def print_trials(
         print(adversary.line_of(what, trial, found), flush=True)
         for chain in found:
             for hand in chain.hands:
-                if hand.word == adversary.FAST and trial.speed <= 1.0 and trial.is_separate:
+                if hand.word == adversary.FAST and trial.is_honest:
                     print(f'{what}: {hand}', file=sys.stderr)
 
 

@@ -123,6 +123,11 @@ class Trial:
     is_separate: bool = True
     faults: Faults = Faults()
 
+    @property
+    def is_honest(self) -> bool:
+        """Whether all that is assumed is so: then nothing faster than v_c may be met."""
+        return self.is_separate and self.speed <= 1.0 and self.faults.understated == 0.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hand:

@@ -7,14 +7,15 @@ It uses the kinematics of the reference checker, and nothing of the proof.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.reference_checker import (
     bar_ends_at,
-    bar_velocities,
     fast_parts,
     ROUNDING,
+    TINY,
 )
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel, bars_of, is_called
@@ -66,7 +67,7 @@ def distances_to(
     as the place and its radius times the sum of the speeds of the joints that turn the bar.
     """
     bars, n, m = bars_of(arm)[:-1], len(q), rows.shape[1]
-    ends, velocities = bar_ends_at(arm, q, 0.0), bar_velocities(arm, q, v)
+    ends, velocities = moving_bars(arm, q, v)
     whole, fast = np.full((n, len(bars), m), np.inf), np.full((n, len(bars), m), np.inf)
     speeds = np.zeros((n, len(bars), m))
     for b, bar in enumerate(bars):
@@ -97,6 +98,17 @@ def distances_to(
                 speeds[some, b, k] = np.where(is_nearer, pace, speeds[some, b, k])
                 fast[some, b, k] = np.where(is_nearer, least, fast[some, b, k])
     return Distances(whole, fast, speeds, (np.abs(v) < REST).all(axis=1))
+
+
+def moving_bars(arm: ArmModel, q: Array, v: Array) -> tuple[Array, Array]:
+    """
+    Return the ends of the bars but the pointing ray, and their velocities [m, m/s].
+
+    q, v (n, dof) -> (n, n_bars - 1, 2, 3) each, both from one chain of complex positions, as
+    `reference_checker.bar_velocities` has them.
+    """
+    found: Any = bar_ends_at(arm, np.asarray(q + 1j * TINY * v), 0.0)[:, : len(bars_of(arm)) - 1]
+    return found.real, found.imag / TINY
 
 
 def box_distances(points: Array, rows: Array) -> Array:

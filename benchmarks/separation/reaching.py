@@ -5,12 +5,13 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from rrth_planner.collision.reference_checker import bar_ends_at, bar_velocities
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Scene
+
+from benchmarks.separation.contacts import moving_bars
 
 # The arm is looked at so far ahead, so often, at so many places of each bar.
 HORIZON, STEP, PLACES = 1.0, 5e-3, 9
@@ -100,8 +101,7 @@ def interception(
     which the box can be there and the place is faster than the contact speed; then the place that
     `aim` says. Where none can be intercepted, the one that is missed by least.
     """
-    n_bars = len(bars_of(arm)) - 1
-    ends, moved = bar_ends_at(arm, q, 0.0)[:, :n_bars], bar_velocities(arm, q, v)[:, :n_bars]
+    ends, moved = moving_bars(arm, q, v)
     s = np.linspace(0.0, 1.0, PLACES)[None, None, :, None]
     points = (ends[:, :, :1] + s * (ends[:, :, 1:] - ends[:, :, :1])).reshape(len(q), -1, 3)
     pace = np.linalg.norm(moved[:, :, :1] + s * (moved[:, :, 1:] - moved[:, :, :1]), axis=-1)
