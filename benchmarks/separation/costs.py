@@ -8,7 +8,7 @@ import time as clock
 
 import numpy as np
 from rrth_planner.collision.separation import first_unproven
-from rrth_planner.execution.commitment import extended, STRETCH
+from rrth_planner.execution.commitment import extended
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.rate_profile import scaled
@@ -59,7 +59,7 @@ def costs(case: Case, n: int, seed: int) -> dict[str, list[float]]:
             intended = scaled(one.motion, one.profile)
             if not one.is_whole:
                 begin = clock.perf_counter()
-                fast_stop(intended, 0.0, settings.stop_limits, STRETCH)
+                fast_stop(intended, 0.0, settings.stop_limits, settings.stretch)
                 found[STOP].append(clock.perf_counter() - begin)
             begin = clock.perf_counter()
             first_unproven(one.trajectory, 0.0, settings.arm, body, settings.rules, MARGIN)
