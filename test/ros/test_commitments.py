@@ -305,3 +305,27 @@ def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
     # Older than `body_timeout`.
     arm.frames(30, sees=False)
     assert not arm.ray_clear[-1]
+
+
+def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_continued(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(25, hand)
+    # From here on nothing reaches the controller for a while.
+    kept, begin = arm.published[-1]
+    for _ in range(12):
+        arm.now += FRAME
+        arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
+        arm.see(hand)
+        arm.monitor._on_timer()
+    n = len(arm.published)
+    last = arm.published[-1]
+    arm.published[:] = [m for m in arm.published if m[1] <= begin] + [last]
+    # The last one begins where the arm is, and it arrives.
+    q = sample(kept, [last[1] - begin])[0][0]
+    assert np.abs(last[0].positions[0] - q).max() < 0.02
+    assert n > 30
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6

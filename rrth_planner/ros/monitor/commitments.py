@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The commitments of the running motion: what its controller is given of it, body by body."""
 
+from collections import deque
 from dataclasses import replace
 import time
 
@@ -17,6 +18,7 @@ from rrth_planner.execution.commitment import (
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.separation import Separation
+from rrth_planner.model.trajectory import positions_at
 from rrth_planner.ros.interface.inputs import RequestError
 from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
@@ -24,6 +26,7 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.separation_status import SeparationState, SeparationStatus
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.ros.messages.joint_state import JointReading
 
 # At a lower rate the arm is slowed down for the wearer.
 FULL_RATE = 0.995
@@ -34,6 +37,9 @@ LONGEST_PERIOD, FADING = 0.25, 0.98
 # A commitment lasts until the next body is there and processed: its period times so much, and that
 # long [s].
 PERIODS, PROCESSING = 1.3, 0.012
+# So many commitments are remembered. An arm that is further from the present one than this [rad]
+# executes another one where the distance to that is less than this share.
+REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
 
@@ -50,6 +56,8 @@ class Commitments:
         self._reporter, self._publishers = reporter, publishers
         self.planned: ExecutingMotion | None = None
         self.present: Commitment | None = None
+        # The last ones, in their order: a controller may have rejected one.
+        self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
@@ -120,6 +128,8 @@ class Commitments:
         self._held_until = self._blocked = -np.inf
         self._is_reset = False
         self.planned, self.present, self._parameters = planned, found, parameters
+        self._recent.clear()
+        self._recent.append(found)
         return _executing(found, planned)
 
     def end(self) -> None:
@@ -148,8 +158,13 @@ class Commitments:
         is_manual = parameters is not None and parameters.resume == MANUAL
         return is_manual and self.is_active and not self.is_arrived(now)
 
-    def extend(self, now: float) -> ExecutingMotion | None:
-        """Publish the commitment that replaces the present one now [s]; None: there is none."""
+    def extend(self, now: float, reading: JointReading | None) -> ExecutingMotion | None:
+        """
+        Publish the commitment that replaces the present one now [s]; None: there is none.
+
+        reading: where the arm was last, to see which commitment it executes.
+        """
+        self._find_present(reading)
         present, planned, parameters = self.present, self.planned, self._parameters
         assert present is not None and planned is not None and parameters is not None
         separation = parameters.separation
@@ -173,6 +188,7 @@ class Commitments:
             self._report(found, float(path_state(present, now)[1]), is_stopping)
             return None
         self.present = found
+        self._recent.append(found)
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
         self._reporter.commitment_published(time.perf_counter() - begin)
         self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
@@ -205,6 +221,20 @@ class Commitments:
             self._reporter.separation_status(SeparationStatus())
         return fault
 
+    def _find_present(self, reading: JointReading | None) -> None:
+        """Continue an earlier commitment where the arm executes that: later ones were rejected."""
+        begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
+        if reading is None or not begun:
+            return
+        gaps = [_gap(c, reading) for c in begun]
+        if gaps[-1] <= ASIDE:
+            return
+        k = int(np.argmin(gaps))
+        if gaps[k] < NEARER * gaps[-1]:
+            self.present = begun[k]
+            self._recent.clear()
+            self._recent.append(begun[k])
+
     def is_separate(self, stop: ExecutingMotion) -> bool:
         """Return whether a stop is proven separate, too; without commitments that is not asked."""
         parameters = self._parameters
@@ -235,6 +265,13 @@ class Commitments:
                 '' if blocked is None else blocked.box,
             )
         )
+
+
+def _gap(commitment: Commitment, reading: JointReading) -> float:
+    """Return how far an arm is from where a commitment is at the time of a reading [rad]."""
+    curve = commitment.trajectory
+    time = min(reading.taken - commitment.start_time, curve.duration)
+    return float(np.abs(positions_at(curve, [time])[0] - reading.positions).max())
 
 
 def _executing(commitment: Commitment, planned: ExecutingMotion) -> ExecutingMotion:

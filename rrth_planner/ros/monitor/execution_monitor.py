@@ -274,7 +274,7 @@ class ExecutionMonitor:
     def _extend(self, now: float) -> None:
         """Have the commitment of the running motion replaced by one that leads further."""
         if self._commitments.is_active:
-            motion = self._commitments.extend(now)
+            motion = self._commitments.extend(now, self._inputs.joints.value)
             if motion is not None:
                 self._tracker.replace(motion)
 
