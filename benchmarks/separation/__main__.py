@@ -31,6 +31,9 @@ class Extent:
         Parts of the wearer that leave, each trial, in `adversary` and in `perception`.
     timed : int
         Motions of each case in `durations` and `costs`.
+    reaches, ended : int
+        Hands that reach for the arm of real nodes, each trial, and planners that are killed or
+        stand still.
     seconds : float
         Beside each recorded person [s].
 
@@ -40,10 +43,12 @@ class Extent:
     hands: int = 1000
     faulty: int = 300
     timed: int = 200
+    reaches: int = 300
+    ended: int = 100
     seconds: float = 120.0
 
 
-QUICK = Extent(motions=8, hands=3, faulty=2, timed=1, seconds=2.0)
+QUICK = Extent(motions=8, hands=3, faulty=2, timed=1, reaches=2, ended=1, seconds=2.0)
 COST_CASES = (Case(), Case(stop='10/400'), Case(contact_speed=0.0, stop='10/400'))
 
 
@@ -135,6 +140,17 @@ def print_costs(options: argparse.Namespace, extent: Extent) -> None:
         print('\n'.join(costs.lines_of(case, each(costs.costs, seeds, 1, 'costs', case, n))))
 
 
+def print_nodes(options: argparse.Namespace, extent: Extent) -> None:
+    """Print what becomes of hands that reach for an arm of real nodes."""
+    # Only this section needs ROS.
+    from benchmarks.separation import nodes
+
+    print_head('nodes: planner and playback over DDS, a body 120 times a second', nodes.HEADER)
+    for trial, ends_planners in nodes.trials().values():
+        n = extent.ended if ends_planners else extent.reaches
+        print(nodes.line_of(trial, nodes.run(trial, n, options.seed)), flush=True)
+
+
 SECTIONS: dict[str, Callable[[argparse.Namespace, Extent], None]] = {
     'reference': print_reference,
     'adversary': print_adversary,
@@ -142,6 +158,7 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Extent], None]] = {
     'people': print_people,
     'perception': print_perception,
     'costs': print_costs,
+    'nodes': print_nodes,
 }
 
 
@@ -179,6 +196,8 @@ def _parser() -> argparse.ArgumentParser:
         ('hands', _count, 'parts of the wearer that leave, each trial'),
         ('faulty', _count, 'the same in `perception`'),
         ('timed', _count, 'motions of each case in `durations` and `costs`'),
+        ('reaches', _count, 'hands that reach for the arm of real nodes, each trial'),
+        ('ended', _count, 'planners that are killed, or stand still, in mid-motion'),
         ('seconds', float, 'beside each recorded person [s]'),
     ):
         default = getattr(full, name)

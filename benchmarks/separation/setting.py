@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from rrth_planner.execution.commitment import Separation
+
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.separation import SeparationRules
+from rrth_planner.model.separation import Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_motion import plan_motion
