@@ -114,15 +114,18 @@ def print_durations(options: argparse.Namespace, extent: Extent) -> None:
 
 def print_people(options: argparse.Namespace, extent: Extent) -> None:
     """Print what was seen beside recorded people."""
-    items = people.items(options.recordings)
-    found = each(people.beside_person, items, options.jobs, 'people', extent.seconds)
     print_head('people: beside recorded people', people.HEADER)
-    for record in found:
-        print(people.line_of(record))
-        for sentence in record.sentences if record.is_separate else ():
-            print(f'{record.take.name}, {record.take.rate:g}: {sentence}', file=sys.stderr)
+    records: list[people.Beside] = []
+    for take in people.takes(options.recordings):
+        items = people.items(take)
+        found = each(people.beside_person, items, options.jobs, take.name, extent.seconds)
+        records += found
+        for record in found:
+            print(people.line_of(record), flush=True)
+            for sentence in record.sentences if record.is_separate else ():
+                print(f'{take.name}, {take.rate:g}: {sentence}', file=sys.stderr)
     print('\nFrames since which a part was faster than assumed of it:\n')
-    print('\n'.join(people.speed_lines(found)))
+    print('\n'.join(people.speed_lines(records)))
 
 
 def print_perception(options: argparse.Namespace, extent: Extent) -> None:

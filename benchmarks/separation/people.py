@@ -190,6 +190,8 @@ class Session:
     def __init__(self, record: Beside, timing: Timing, seed: int) -> None:
         """Begin folded, without a target."""
         self.record, self.timing = record, timing
+        # Of its own, so that with separation and without they are the same targets.
+        self.targets = np.random.default_rng((seed, 1))
         self.rng = np.random.default_rng(seed)
         self.settings = separation_of(record.case)
         self.names = parts_of(record.take)
@@ -253,7 +255,7 @@ class Session:
     def _planned(self, time: float, q: Array, scene: Scene) -> None:
         """Plan for the target, or another one where there is none, if it is time for that."""
         if self.target is None:
-            self.target = self.rng.uniform(*LOW_IN_FRONT)
+            self.target = self.targets.uniform(*LOW_IN_FRONT)
             self.asked = self.tried = self.ready = time
         if self.plan is None and time >= self.ready:
             plan = planned(scene, q, self.target, int(self.rng.integers(2**31)))
@@ -400,11 +402,14 @@ HEADER = (
 )
 
 
-def items(recordings: Sequence[Path]) -> list[tuple[Take, Case, bool]]:
-    """Return what is measured: each recording, each rate, with separation and without."""
-    takes = [Take(file, rate) for file in ('', *map(str, recordings)) for rate in RATES]
-    ways = [(CASES[0], False), *((case, True) for case in CASES)]
-    return [(take, case, is_separate) for take in takes for case, is_separate in ways]
+def takes(recordings: Sequence[Path]) -> list[Take]:
+    """Return the person of the package and recorded ones, at each rate."""
+    return [Take(file, rate) for file in ('', *map(str, recordings)) for rate in RATES]
+
+
+def items(take: Take) -> list[tuple[Take, Case, bool]]:
+    """Return what is measured beside a person: without separation, and with it."""
+    return [(take, CASES[0], False), *((take, case, True) for case in CASES)]
 
 
 def line_of(record: Beside) -> str:

@@ -6,12 +6,15 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 import functools
 import multiprocessing
+import os
 import sys
 from typing import TypeVar
 
 from tqdm import tqdm
 
 T = TypeVar('T')
+# A process each is enough: threads of products of small matrices only wait for each other.
+ONE_THREAD = {'OPENBLAS_NUM_THREADS': '1', 'OMP_NUM_THREADS': '1', 'MKL_NUM_THREADS': '1'}
 
 
 def each(
@@ -24,5 +27,7 @@ def each(
     )
     if jobs == 1:
         return list(bar(map(one, items)))
+    # They read it where they begin.
+    os.environ.update(ONE_THREAD)
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context('spawn')) as pool:
         return list(bar(pool.map(one, items)))

@@ -9,6 +9,7 @@ pytest.importorskip('tqdm')
 from benchmarks.separation.adversary import chain_of_hands, FAST, Trial, trials
 from benchmarks.separation.contacts import AT_REST, classes_of, distances_to, SLOW
 from benchmarks.separation.lockstep import Controller
+from benchmarks.separation.people import beside_person, items, speed_lines, Take
 from benchmarks.separation.reaching import EARLIEST, interception, Reaching
 from benchmarks.separation.reference import chain_of_motions
 import numpy as np
@@ -47,6 +48,15 @@ def test_commitments_pass_the_reference_checker():
     assert judged.n_judged == 2
     assert judged.n_instants > 100
     assert judged.n_violations == 0
+
+
+@pytest.mark.parametrize('item', items(Take('', 1.0))[:2])
+def test_a_recorded_person_is_never_met_by_a_fast_place_while_he_keeps_his_speed(item):
+    record = beside_person(0.5, item)
+    assert record.n_plans
+    assert record.n_steps['right hand'] == 59
+    assert not record.contacts[FAST, True]
+    assert len(speed_lines([record])) == 3
 
 
 def test_contacts_are_classified_by_the_speed_of_the_arm_there():
