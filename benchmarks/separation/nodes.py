@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Separation of real nodes: hands that reach for the arm, and a planner that dies or stands still."""
+"""Separation of real nodes: hands that reach for the arm, planners that die or stand still."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -376,9 +376,9 @@ def _place_near(q: Array, rng: np.random.Generator) -> Array:
 
 
 HEADER = (
-    '| what | v_c [m/s] | stop | hands | contacts, arm faster than v_c | slower | at rest | fastest '
-    'contact [m/s] | at rest on its way after: median [s] | most [s] | played to its end: motions | '
-    'most [s] |'
+    '| what | v_c [m/s] | stop | hands | contacts, arm faster than v_c | slower | at rest '
+    '| fastest contact [m/s] | at rest on its way after: median [s] | most [s] '
+    '| played to its end: motions | most [s] |'
 )
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.model.arm import ArmModel

@@ -21,8 +21,9 @@ from rrth_planner.timing.rate_profile import (
     steered,
 )
 
-# How far ahead the permitted rate is asked for [s], at so many places of the motion.
-AHEAD, PLACES = 0.6, 20
+# The permitted rate is asked for at so many places ahead, so far from each other; to stop from the
+# last ones takes the arm up to so far [s].
+N_RATES, SPACING_AHEAD, BEYOND = 21, 0.03, 0.9
 # Share of its limits that a motion slows down with; how much of a ramp that takes from the way.
 GENTLE, RAMP = 0.5, 0.5
 # Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
@@ -108,7 +109,7 @@ def path_state(commitment: Commitment, time: float) -> Array:
 
 
 def permitted_ahead(
-    motion: Trajectory, places: Array, body: SeenBody, settings: Separation
+    motion: Trajectory, places: Array, n_rates: int, body: SeenBody, settings: Separation
 ) -> Array:
     """
     Return the rates that are permitted at places of a motion, (n,) [s] -> (n, 3).
@@ -119,11 +120,12 @@ def permitted_ahead(
     """
     arm, rules = settings.arm, settings.rules
     robot, chain = arm_rows(arm, 0.0)
-    found = np.empty((len(places), 3))
+    found = np.empty((n_rates, 3))
     permitted_rates(
         piece_coefficients(motion),
         motion.times,
         places,
+        n_rates,
         *settings.limits.rows[1:],
         *settings.stop_limits.rows[1:],
         rules.contact_speed,
@@ -142,8 +144,12 @@ def permitted_ahead(
 
 def permitted(motion: Trajectory, time: float, body: SeenBody, settings: Separation) -> float:
     """Return the rate at a time from which a motion can slow down to what is permitted ahead."""
-    places = np.linspace(time, min(time + AHEAD, motion.duration), PLACES)
-    rates, slows, fades = permitted_ahead(motion, places, body, settings).T
+    ahead = min(BEYOND, motion.duration - time)
+    n = max(2, math.ceil(ahead / SPACING_AHEAD) + 1)
+    places = np.linspace(time, time + ahead, n)
+    n_rates = min(n, N_RATES)
+    rates, slows, fades = permitted_ahead(motion, places, n_rates, body, settings).T
+    places = places[:n_rates]
     # The square of the rate falls by 2 s_ddot along the way, less what the ramps take of that.
     way = np.maximum(places - time - RAMP * slows / fades, 0.0)
     return float(np.sqrt(rates**2 + 2.0 * GENTLE * slows * way).min(initial=1.0))

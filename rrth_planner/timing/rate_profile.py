@@ -17,8 +17,9 @@ from rrth_planner.kernels.trajectory.rate_profile import (
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
-# Rates [-] and their derivatives [1/s] that differ by rounding.
-SAME_RATE = 1e-9
+# Rates that differ by less [-], and derivatives below that [1/s], are not worth a change: it would
+# end within microseconds, in which rounding is a jerk.
+SAME_RATE, NO_SLOPE = 1e-3, 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,8 +75,8 @@ def steered(
     state (3,): as from `rate_state`. The rate changes as fast as the joints allow, or a little
     slower; the motion at the changing rate exceeds no limit by more than 0.3 %.
     """
-    if abs(target - state[1]) < SAME_RATE and abs(state[2]) < SAME_RATE:
-        return steady(float(state[0]), target)
+    if abs(target - state[1]) < SAME_RATE and abs(state[2]) < NO_SLOPE:
+        return steady(float(state[0]), float(state[1]))
     phases = np.empty((3, 5))
     curves = piece_coefficients(motion)
     if not steer(curves, motion.times, state, target, *limits.rows, phases):

@@ -31,6 +31,9 @@ from rrth_planner.kernels.trajectory.quintics import bound, fit
 FIRST, HALVINGS = 0.0128, 8
 # Rounding of a speed [m/s].
 AT_REST = 1e-9
+# Sections that a bar is cut into for the permitted rate, instants of a stop that are looked at; up
+# to when that matters [s].
+SECTIONS, INSTANTS, LATEST = 8, 8, 10.0
 # Steps of the search for the permitted rate; the time between two places of a difference [s].
 STEPS, STEP = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
@@ -62,13 +65,13 @@ def cut(curve, begin, end, part):
             scale *= end - begin
 
 
-@kernel(boolean(OUT_VEC, int64, float64, float64, float64, MAT, int64))
-def is_apart(points, at, low, high, distance, rows, box):
+@kernel(float64(OUT_VEC, int64, float64, float64, float64, MAT, int64))
+def within_distance(points, at, low, high, distance, rows, box):
     """
-    Return whether a part of a line is further away from a box than a distance [m].
+    Return how far a part of a line is from a box; where that is more than a distance, more [m].
 
     The line from points[at] to points[at + 4], of it the part between two shares; rows (16, m) as
-    from `boxes.rows_of`.
+    from `boxes.rows_of`. Signed: < 0 inside.
     """
     start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
     gap = -math.inf
@@ -81,8 +84,8 @@ def is_apart(points, at, low, high, distance, rows, box):
         begin, end = first + low * (last - first), first + high * (last - first)
         start[r], step[r], half[r] = begin, end - begin, rows[BOX_HALF + r, box]
         gap = max(gap, min(begin, end) - half[r], -max(begin, end) - half[r])
-    # Mostly a face of the box shows it. Not for NaN, which must never count as apart.
-    return gap > distance or bar_box_distance(start, step, half) > distance
+    # Mostly a face of the box shows that it is further away.
+    return gap if gap > distance else bar_box_distance(start, step, half)
 
 
 @kernel(boolean(float64, float64, float64, OUT_VEC))
@@ -164,7 +167,8 @@ def blocking_box(
             if (classes >> int64(rows[BOX_CLASS, box])) & 1:
                 continue
             needed = radius + strays + growths[box] + speeds[box] * end
-            if not is_apart(middle, at, share[0], share[1], needed, rows, box):
+            # Also for NaN, which must never count as apart.
+            if not (within_distance(middle, at, share[0], share[1], needed, rows, box) > needed):
                 return bar * m + box
     return -1
 
@@ -245,63 +249,114 @@ def first_blocked(
     return -1
 
 
+@kernel(void(float64, float64, float64, float64, OUT_VEC))
+def stop_state(v, a, j, t, state):
+    """
+    Write how far a joint gets, and its velocity, (2,), at a time of a stop.
+
+    v: its velocity when the stop begins; a, j: limits of the stop; t: since then [s].
+    """
+    peak = min(a, math.sqrt(v * j))
+    ramp = peak / j
+    hold = max(0.0, v / peak - ramp) if peak > 0.0 else 0.0
+    first = min(t, ramp)
+    x, w = first * (v - j * first * first / 6.0), v - 0.5 * j * first * first
+    if t > ramp:
+        second = min(t - ramp, hold)
+        x, w = x + second * (w - 0.5 * peak * second), w - peak * second
+    if t > ramp + hold:
+        third = min(t - ramp - hold, ramp)
+        x += third * (w + third * (j * third / 6.0 - 0.5 * peak))
+        w += third * (0.5 * j * third - peak)
+    state[0], state[1] = x, max(w, 0.0)
+
+
 @kernel(float64(float64, float64, float64))
 def stop_time(v, a, j):
     """Return how long a joint takes from a velocity to rest, within limits of the stop [s]."""
     return v / a + a / j if v * j >= a * a else 2.0 * math.sqrt(v / j)
 
 
-@kernel(float64(float64, float64, float64))
-def last_of_stop(v, a, j):
-    """Return how long before the end of a stop a joint has slowed down to a velocity [s]."""
-    at_ramp = 0.5 * a * a / j
-    return math.sqrt(2.0 * v / j) if v <= at_ramp else a / j + (v - at_ramp) / a
+@kernel(
+    void(OUT_VEC, READ_INTS, int64, MAT, MAT, VEC, VEC, OUT_VEC),
+)
+def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
+    """
+    Write until when each section of the bars is out of reach of the boxes, (n_bars * SECTIONS,).
+
+    points: the bars at a place; growths, speeds (m,): of the boxes at time 0 [s]. Below 0: it is
+    within a box then already.
+    """
+    m = rows.shape[1]
+    for bar in range(bodies.shape[0]):
+        classes = int64(robot[dof + 2 + bar, ALLOWED])
+        at, radius = BAR_SIZE * bar, points[BAR_SIZE * bar + 7]
+        for section in range(SECTIONS):
+            low, high = section / SECTIONS, (section + 1) / SECTIONS
+            best = LATEST
+            for box in range(m):
+                if (classes >> int64(rows[BOX_CLASS, box])) & 1:
+                    continue
+                # Nearer than this it matters.
+                within = radius + growths[box] + speeds[box] * best
+                near = within_distance(points, at, low, high, within, rows, box)
+                room = near - radius - growths[box]
+                if room < speeds[box] * best:
+                    best = room / speeds[box] if speeds[box] > 0.0 and room >= 0.0 else -1.0
+            latest[SECTIONS * bar + section] = best
 
 
 @kernel(
     boolean(
-        *(float64, float64, float64, float64, float64, OUT_VEC, OUT_VEC),
-        *(float64, READ_INTS, int64, MAT, MAT, VEC, VEC),
+        *(float64, int64, float64, float64, float64, float64, float64, MAT, MAT),
+        *(float64, int64),
     )
 )
-def is_rate_safe(
-    rate, v, gains, a, j, points, ends, contact, bodies, dof, robot, rows, growths, speeds
-):
+def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bars):
     """
     Return whether a stop that begins at a place, at a rate, would keep clear of a moving wearer.
 
     v, gains, a, j: of the joint that takes longest to stop, velocity and acceleration at rate 1,
-    the latter 0 where it slows down, and the limits of the stop; points: the bars there; ends (2
-    n_bars,): the speeds of their ends at rate 1 [m/s]; growths, speeds (m,): of the boxes when the
-    stop begins. Of a bar the part that is faster than `contact` counts, for as long as it is. An
-    estimate: it takes the bar to move straight on.
+    the latter 0 where it slows down, and the limits of the stop; step: between two places [s];
+    latest (n, n_bars * SECTIONS): as from `latest_times`, of the places; ends (n, 2 n_bars): the
+    speeds of the bars' ends there at rate 1 [m/s]. Of a bar the sections whose middles are faster
+    than `contact` count. An estimate: it knows the motion at these places only.
     """
-    share, m = scratch.floats(2), rows.shape[1]
+    state, begin_v = np.empty(2), rate * v
     # What accelerates goes on for a while.
     fades = rate * rate * gains / j
-    top = rate * v + 0.5 * fades * fades * j
-    lasts = fades + stop_time(top, a, j)
-    for bar in range(bodies.shape[0]):
-        at, first, last = BAR_SIZE * bar, rate * ends[2 * bar], rate * ends[2 * bar + 1]
-        if not fast_part(first, last, contact, share):
-            continue
-        fastest = max(first, last)
-        slow = last_of_stop(rate * v * contact / fastest, a, j)
-        moves = max(lasts - slow, 0.0)
-        way = (0.5 * (lasts - fades) + fades) * fastest * top / max(rate * v, TINY)
-        classes = int64(robot[dof + 2 + bar, ALLOWED])
-        for box in range(m):
-            if (classes >> int64(rows[BOX_CLASS, box])) & 1:
-                continue
-            needed = points[at + 7] + way + growths[box] + speeds[box] * moves
-            if not is_apart(points, at, share[0], share[1], needed, rows, box):
-                return False
+    top = begin_v + 0.5 * fades * fades * j
+    lasts = stop_time(top, a, j)
+    ahead = fades * 0.5 * (begin_v + top)
+    n = latest.shape[0]
+    for i in range(INSTANTS + 1):
+        t = lasts * i / INSTANTS
+        stop_state(top, a, j, t, state)
+        # How far along the motion, and how fast of what it is.
+        where = place + (ahead + state[0]) / max(v, TINY) / step
+        share = state[1] / max(v, TINY)
+        k = int64(where)
+        if k >= n - 1:
+            return True
+        part = where - k
+        for bar in range(n_bars):
+            begin, end = ends[k, 2 * bar], ends[k, 2 * bar + 1]
+            begin += part * (ends[k + 1, 2 * bar] - begin)
+            end += part * (ends[k + 1, 2 * bar + 1] - end)
+            for section in range(SECTIONS):
+                middle = (section + 0.5) / SECTIONS
+                if share * (begin + middle * (end - begin)) <= contact:
+                    continue
+                until = latest[k, SECTIONS * bar + section]
+                after = latest[k + 1, SECTIONS * bar + section]
+                if until + part * (after - until) < fades + t:
+                    return False
     return True
 
 
 @kernel(
     void(
-        *(CUBE, VEC, VEC, VEC, VEC, VEC, VEC, float64),
+        *(CUBE, VEC, VEC, int64, VEC, VEC, VEC, VEC, float64),
         *(READ_INTS, CHAIN, MAT, *BODY, OUT_MAT),
     ),
     is_short=True,
@@ -310,6 +365,7 @@ def permitted_rates(
     curves,
     times,
     places,
+    n_rates,
     acceleration,
     jerk,
     stop_acceleration,
@@ -328,33 +384,38 @@ def permitted_rates(
     """
     Write the greatest rates at some places of a motion from which a stop would keep clear.
 
-    curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, increasing [s];
-    acceleration, jerk, stop_acceleration, stop_jerk (dof,): limits of the motion and of a stop;
-    growths (m,): of the boxes when a stop begins. The rest as for `BODY` and `first_blocked`.
-    found (m, 3): the rate, up to 1, and how fast the rate may change there: its first and its
-    second derivative that the limits of the motion allow [1/s, 1/s^2]. It makes a motion smooth,
-    and proves nothing.
+    curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, evenly spread
+    [s], of which the first n_rates are asked for; acceleration, jerk, stop_acceleration, stop_jerk
+    (dof,): limits of the motion and of a stop; growths (m,): of the boxes when a stop begins. The
+    rest as for `BODY` and `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the
+    rate may change there: its first and its second derivative that the limits of the motion allow
+    [1/s, 1/s^2]. It makes a motion smooth, and proves nothing.
     """
-    dof, n_bars = curves.shape[2], bodies.shape[0]
-    q, v, nearby, state = np.empty(dof), np.empty(dof), np.empty(dof), np.empty((4, dof))
+    dof, n_bars, m = curves.shape[2], bodies.shape[0], places.shape[0]
+    q, nearby, state = np.empty(dof), np.empty(dof), np.empty((4, dof))
     points, other = scratch.floats(ENDS_ROOM), scratch.floats(ENDS_ROOM)
-    ends, rows = scratch.floats(BARS_ROOM), np.empty((BOX_ROWS, boxes.shape[0]))
+    rows, latest = np.empty((BOX_ROWS, boxes.shape[0])), np.empty((m, n_bars * SECTIONS))
+    ends, stops = np.empty((m, 2 * n_bars)), np.empty((m, 4))
     seen_rows(boxes, classes, T_arm_base, rows)
-    piece = 0
-    for i in range(places.shape[0]):
+    piece, step = 0, places[1] - places[0]
+    for i in range(m):
         while piece < curves.shape[0] - 1 and times[piece + 1] <= places[i]:
             piece += 1
         derivatives_on(curves, times, piece, places[i], state)
         slowest, joint, slows, fades = 0.0, 0, math.inf, math.inf
         for k in range(dof):
-            q[k], v[k] = state[0, k], abs(state[1, k])
-            nearby[k] = q[k] + STEP * state[1, k]
-            takes = stop_time(v[k], stop_acceleration[k], stop_jerk[k])
+            v = abs(state[1, k])
+            q[k], nearby[k] = state[0, k], state[0, k] + STEP * state[1, k]
+            takes = stop_time(v, stop_acceleration[k], stop_jerk[k])
             if takes > slowest:
                 slowest, joint = takes, k
-            slows = min(slows, acceleration[k] / max(v[k], SLOW))
-            fades = min(fades, jerk[k] / max(v[k], SLOW))
-        found[i, 1], found[i, 2] = slows, fades
+            slows = min(slows, acceleration[k] / max(v, SLOW))
+            fades = min(fades, jerk[k] / max(v, SLOW))
+        if i < n_rates:
+            found[i, 1], found[i, 2] = slows, fades
+        stops[i, 0] = abs(state[1, joint])
+        stops[i, 1] = max(0.0, math.copysign(state[2, joint], state[2, joint] * state[1, joint]))
+        stops[i, 2], stops[i, 3] = stop_acceleration[joint], stop_jerk[joint]
         chain(q, 0.0, points, 0)
         chain(nearby, 0.0, other, 0)
         for bar in range(n_bars):
@@ -363,17 +424,17 @@ def permitted_rates(
                 for c in range(3):
                     p = BAR_SIZE * bar + 4 * end + c
                     square += (other[p] - points[p]) ** 2
-                ends[2 * bar + end] = math.sqrt(square) / STEP
-        gains = max(0.0, math.copysign(state[2, joint], state[2, joint] * state[1, joint]))
-        limit = (v[joint], gains, stop_acceleration[joint], stop_jerk[joint])
-        place = (points, ends, contact, bodies, dof, robot, rows, growths, speeds)
+                ends[i, 2 * bar + end] = math.sqrt(square) / STEP
+        latest_times(points, bodies, dof, robot, rows, growths, speeds, latest[i])
+    for i in range(n_rates):
+        v, gains, a, j = stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3]
         low, high = 0.0, 1.0
-        if is_rate_safe(1.0, *limit, *place):
+        if is_rate_safe(1.0, i, v, gains, a, j, step, latest, ends, contact, n_bars):
             low = 1.0
         else:
             for _ in range(STEPS):
                 middle = 0.5 * (low + high)
-                if is_rate_safe(middle, *limit, *place):
+                if is_rate_safe(middle, i, v, gains, a, j, step, latest, ends, contact, n_bars):
                     low = middle
                 else:
                     high = middle
