@@ -3,7 +3,8 @@
 """
 Measure separation from a wearer who moves in lock-step, without ROS, and print tables.
 
-Latencies are true, and time is no more than a number: the machine may be as slow as it likes.
+Latencies are true, and time is no more than a number: the machine may be as slow as it likes. Only
+the last section, `nodes`, needs ROS and an idle machine.
 """
 
 import argparse
