@@ -17,6 +17,8 @@ from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, sp
 SHARE, RAISED = 1.2, 2.0
 # Two sights of a part less than this apart do not tell its speed [s].
 SHORTEST = 2e-3
+# Clocks may differ by so much; the age of what was measured later than that [s].
+CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
 # The corners of a box, in halves of its size.
 _CORNERS = 0.5 * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -95,7 +97,10 @@ def body_at(body: BodyMotion, time: float, rules: SeparationRules) -> SeenBody:
     """Return the wearer at a time, as he was last seen [s]."""
     raised = np.where(time <= body.until, body.speeds, 0.0)
     speeds = np.maximum(stated_speeds(body.scene, rules), raised)
-    return SeenBody(body.scene, np.maximum(time - body.measured, 0.0), speeds)
+    ages = time - body.measured
+    # Measured later than now: the clock was set back, and nobody knows how old that is.
+    ages = np.where(ages < -CLOCK_STEP, UNKNOWN_AGE, np.maximum(ages, 0.0))
+    return SeenBody(body.scene, ages, speeds)
 
 
 def stated_speeds(scene: Scene, rules: SeparationRules) -> Array:

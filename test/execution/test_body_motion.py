@@ -88,6 +88,13 @@ def test_each_part_has_the_age_of_its_own_measurement():
     assert np.delete(ages, 3) == pytest.approx(0.2)
 
 
+def test_what_was_measured_later_than_now_has_an_age_that_blocks_everything():
+    scene = worlds.wearer()
+    body = first_sight(scene, at(scene, 1.0))
+    assert body_at(body, 0.95, RULES).ages == pytest.approx(0.0)
+    assert (body_at(body, 0.8, RULES).ages > 100.0).all()
+
+
 def test_a_part_within_its_speed_is_not_counted():
     scene = worlds.wearer()
     body = first_sight(scene, at(scene, 0.0))
