@@ -198,7 +198,7 @@ class Client(SoakClient):
         return max(map(abs, self.states[-1][2])) if self.states else 0.0
 
     def ahead(self, times: Array) -> tuple[Array, Array]:
-        """Return states at times from now on as far as the controller is told, (n, dof) twice."""
+        """Return states at times from now on, by the last commitment, (n, dof) twice."""
         now = self.get_clock().now().nanoseconds * 1e-9
         assert self.last is not None
         stamp = self.last.header.stamp.sec + 1e-9 * self.last.header.stamp.nanosec

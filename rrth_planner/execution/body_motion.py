@@ -15,7 +15,7 @@ from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, sp
 
 # A part that was faster than assumed is taken to be so fast, and a share more, for so long [s].
 SHARE, RAISED = 1.2, 2.0
-# Two sights of a part less than this apart do not tell its speed [s].
+# Two sights of a part less than this apart do not give its speed [s].
 SHORTEST = 2e-3
 # Clocks may differ by so much; the age of what was measured later than that [s].
 CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
@@ -74,7 +74,7 @@ def seen_again(
     elapsed, moved = np.zeros(n), np.zeros(n)
     elapsed[known] = measured[known] - before.measured[then]
     moved[known] = _displacements(before.scene.numbers[then], scene.numbers[known])
-    # A sight that is no newer tells nothing.
+    # A sight that is no newer says nothing.
     is_new = known & (elapsed > SHORTEST)
     assumed = np.where(measured <= until, speeds, 0.0)
     assumed = np.maximum(assumed, stated_speeds(scene, rules))

@@ -56,7 +56,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     second = 'library behind the second check of every motion'
     separate = 'publish only motions that are proven clear of a wearer who moves'
-    touching = 'no faster part of the arm may meet the wearer'
+    meeting = 'no faster part of the arm may meet the wearer'
     moving = 'greatest speeds of parts of the body by words of their names; the first that fits'
     late = 'the controller executes a motion at most so late'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
@@ -100,7 +100,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
             *given_timeout,
         ),
         Setting('separation', False, '-', separate, is_read_only=True),
-        Setting('contact_speed', RULES.contact_speed, 'm/s', touching, 0.0, 10.0),
+        Setting('contact_speed', RULES.contact_speed, 'm/s', meeting, 0.0, 10.0),
         Setting('body_speeds', SPEEDS, 'words: m/s', moving),
         Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
         Setting('controller_delay', RULES.controller_delay, 's', late, 0.0, 1.0),

@@ -23,7 +23,7 @@ COMMITTED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE)
 # For subscribers that supervise the planner: liveliness needs a reliable reader.
 SUPERVISED = QoSProfile(**_LAST, durability=DurabilityPolicy.VOLATILE, **_LIVELINESS)
 
-# Whether the pointing ray is clear: who needs it is told where it does not come any more [s].
+# Whether the pointing ray is clear: where that does not come any more, its reader notices [s].
 DEADLINE = 0.1
 RAY_CLEAR = QoSProfile(**_LAST, **_LIVELINESS, deadline=Duration(seconds=DEADLINE))
 
