@@ -238,6 +238,26 @@ def test_a_stop_that_is_proven_separate_comes_at_once(separated):
     assert arm.statuses[-1].cause == 'of the test'
 
 
+def test_a_stop_begins_where_the_arm_is_commanded_though_joint_states_are_late(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(30, hand)
+    # The last reading is older than the present commitment.
+    arm.now += 0.001
+    arm.read(*arm.commanded(arm.now - 0.015)[:2])
+    reading = arm.inputs.joints.value
+    arm.inputs.joints.value = replace(reading, taken=arm.now - 0.015)
+    arm.monitor.fail('of the test')
+    (stop, begin), (before, start) = arm.published[-1], arm.published[-2]
+    assert start < begin
+    for now, then, same in zip(
+        sample(stop, [0.0]), sample(before, [begin - start]), (1e-6, 1e-4, 0.1), strict=True
+    ):
+        assert np.abs(now - then).max() <= same
+
+
 def test_a_motion_that_cannot_begin_is_rejected_and_nothing_is_published(separated):
     arm = separated(contact_speed=0.0)
     arm.see(near(0.03))

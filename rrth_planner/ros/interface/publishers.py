@@ -4,6 +4,7 @@
 
 from nav_msgs.msg import Path
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
@@ -27,7 +28,11 @@ class PlanPublishers:
         """Advertise them; is_separated: each motion on `joint_trajectory` is safe by itself."""
         # An old commitment must not be executed by a controller that comes late.
         motions = COMMITTED if is_separated else COMMANDED
-        self._trajectory = node.create_publisher(JointTrajectory, 'joint_trajectory', motions)
+        # Who asks for latched motions, or for liveliness, then takes `~/planned_trajectory`.
+        quietly = PublisherEventCallbacks(use_default_callbacks=not is_separated)
+        self._trajectory = node.create_publisher(
+            JointTrajectory, 'joint_trajectory', motions, event_callbacks=quietly
+        )
         self._planned = self._ray_clear = None
         if is_separated:
             name = '~/planned_trajectory'

@@ -180,6 +180,10 @@ class ExecutionMonitor:
 
     def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
         """Return the fail-safe stop from where the arm is."""
+        if self._commitments.is_active:
+            # A commitment that has just begun is ahead of the last joint state: what is commanded
+            # counts, as when it is extended.
+            phase = now - running.start_time
         # Before a handover the stop begins with the new motion.
         start = running.start_time if phase < 0.0 else now
         stop = fast_stop(running.trajectory, phase, self._parameters.stop_limits)
