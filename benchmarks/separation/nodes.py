@@ -59,6 +59,8 @@ STANDSTILL = 1.2
 NOTHING, KILLED, STOPPED = 'nothing', 'SIGKILL', f'SIGSTOP of {STANDSTILL:g} s'
 # Longest waits: for an arm that sets off, and that comes to rest [s].
 PATIENCE, LONGEST = 3.0, 20.0
+# What joint states 10 ms apart say of a speed is uncertain by so much [m/s].
+UNCERTAIN = 5e-3
 # An arm this near to the end of the planned motion has played out all of it [rad].
 AT_END = 1e-3
 
@@ -271,7 +273,11 @@ def _one_hand(
         if answer is None or not answer.success:
             if found.n_requests > 50 * (1 + len(found.words)):
                 raise RuntimeError(f'no motion any more: {answer and answer.message}')
+            # It may be the hand that is in the way.
+            wearer.remove_hand()
             client.hear(0.1)
+            wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
+            client.hear(0.3)
             continue
         if client.hear(PATIENCE, lambda: client.speed > SET_OFF):
             break
@@ -339,9 +345,8 @@ def _judge(
     times = np.arange(begin - stamps[0], motion.duration, 1e-3)
     q_fine, v_fine, _ = sample(motion, times)
     rows = reaching.rows(times + stamps[0])
-    distances = distances_to(
-        the_arm(), q_fine, v_fine, reaching.names, rows, trial.case.contact_speed, 0.05
-    )
+    contact = trial.case.contact_speed + UNCERTAIN
+    distances = distances_to(the_arm(), q_fine, v_fine, reaching.names, rows, contact, 0.05)
     classes = classes_of(distances)
     found.words.append(worst_class(classes))
     found.fastest = max(
