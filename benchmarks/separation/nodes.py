@@ -170,7 +170,7 @@ class Wearer:
             markers.append(marker)
         for marker in markers:
             marker.header.frame_id, marker.header.stamp = FRAME, now.to_msg()
-        self._client.stream.publish(MarkerArray(markers=markers))
+        self._client.bodies.publish(MarkerArray(markers=markers))
 
 
 class Client(SoakClient):
@@ -180,6 +180,8 @@ class Client(SoakClient):
         """Subscribe to the motions as a controller does."""
         super().__init__(folder)
         self.last: JointTrajectory | None = None
+        # Not latched: a planner that starts must not get a hand that is gone.
+        self.bodies = self.create_publisher(MarkerArray, 'body_boxes', 10)
         # Where the planned motion ends, with separation [rad].
         self.planned_end: Array | None = None
         self.create_subscription(
