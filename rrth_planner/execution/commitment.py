@@ -38,9 +38,9 @@ REST = 1e-6
 WHOLE = 0.999
 # A motion is at its end so shortly before it [s].
 END = 1e-4
-# How far an arm may be from a new commitment when that begins, late or after a stop, and what that
-# is at the tip of an arm of some metres [rad, m].
-JUMP, JUMP_WAY = 2e-4, 5e-4
+# How far the points of an arm may be from a new commitment when that begins, late or after a stop:
+# 2e-4 rad at the tip of an arm of some metres [m].
+JUMP_WAY = 5e-4
 # Spacing of the samples by which a stop is localized on its motion [s].
 SPACING = 2e-3
 
