@@ -79,7 +79,7 @@ def seen_again(
     assumed = np.where(measured <= until, speeds, 0.0)
     assumed = np.maximum(assumed, stated_speeds(scene, rules))
     is_faster = is_new & (moved > assumed * elapsed + 2.0 * rules.body_error)
-    found = (moved - 2.0 * rules.body_error) / np.maximum(elapsed, SHORTEST)
+    found = moved / np.maximum(elapsed, SHORTEST)
     speeds[is_faster] = np.minimum(SHARE * found[is_faster], FASTEST)
     until[is_faster] = measured[is_faster] + RAISED
     return BodyMotion(

@@ -18,6 +18,7 @@ from rrth_planner.timing.rate_profile import (
     rate_state,
     RateProfile,
     scaled,
+    steady,
     steered,
 )
 
@@ -164,6 +165,16 @@ def first_commitment(
     body: the wearer at that time. Else where the motion is not proven separate from him: it can
     not even begin.
     """
+    if len(motion.times) == 1:
+        # It is there.
+        profile = steady(0.0, 1.0)
+        return Commitment(
+            motion=motion,
+            trajectory=motion,
+            start_time=time,
+            profile=profile,
+            stretch=math.inf,
+        )
     is_at_rest = bool((np.abs(motion.velocities[0]) < REST).all())
     # At rest the motion may begin at any rate.
     rate = permitted(motion, 0.0, body, settings) if is_at_rest else 1.0

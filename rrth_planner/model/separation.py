@@ -12,8 +12,7 @@ from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
 
-# Greatest speeds of parts of the body by words of their names, the first that fits [m/s]; the base
-# frame is the torso's.
+# Greatest speeds of parts of the body by words of their names [m/s], in the frame of the torso.
 BODY_SPEEDS = (
     ('torso', 0.0),
     ('chest', 0.0),
@@ -44,8 +43,9 @@ class SeparationRules:
     contact_speed : float
         No faster point of the arm may meet the wearer; 0: none that moves at all [m/s].
     body_speeds : sequence of (str, float)
-        Greatest speed [m/s] of the parts of the body whose names have some words; the first that
-        fits counts. Underscores and hyphens count as spaces, capitals as small letters.
+        Greatest speed [m/s] of the parts of the body whose names have some words; of several that
+        fit the greatest counts, no words fit where no others do. Underscores and hyphens count as
+        spaces, capitals as small letters.
     body_error : float
         Greatest error of a box [m].
     controller_delay : float
@@ -112,7 +112,8 @@ class Separation:
 def speed_bound(rules: SeparationRules, name: str) -> float:
     """Return the greatest speed that is assumed of a part of the body, by its name [m/s]."""
     given = _plain(name)
-    return next(speed for words, speed in rules.body_speeds if _plain(words) in given)
+    found = [speed for words, speed in rules.body_speeds if words and _plain(words) in given]
+    return max(found or [speed for words, speed in rules.body_speeds if not words])
 
 
 def _plain(name: str) -> str:

@@ -44,9 +44,9 @@ def test_a_speed_belongs_to_words_of_a_name(name, speed):
     assert speed_bound(RULES, name) == speed
 
 
-def test_the_first_words_that_fit_count():
+def test_of_words_that_fit_the_greatest_speed_counts():
     rules = SeparationRules(body_speeds=(('left', 0.5), ('hand', 3.0), ('', 1.0)))
-    assert [speed_bound(rules, n) for n in ('left hand', 'right hand', 'hat')] == [0.5, 3.0, 1.0]
+    assert [speed_bound(rules, n) for n in ('left hand', 'left foot', 'hat')] == [3.0, 0.5, 1.0]
 
 
 @pytest.mark.parametrize(

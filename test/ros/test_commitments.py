@@ -210,19 +210,49 @@ def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
     assert arm.monitor.running is not None
 
 
-def test_a_stop_that_is_not_proven_separate_is_not_published(separated, monkeypatch):
+@pytest.mark.parametrize('is_kept', [True, False])
+def test_a_stop_that_is_not_proven_leaves_the_arm_on_its_commitment_while_that_is(
+    separated, monkeypatch, is_kept
+):
     arm = separated()
     hand = near(0.2)
     arm.see(hand)
     arm.begin()
     arm.frames(20, hand)
-    monkeypatch.setattr(commitments, 'first_unproven', lambda *_: separation.Blocked(0, 'a', 'b'))
+    # Of the stop, of the commitment, and of what is left of it with the next bodies.
+    unproven, proven = separation.Blocked(0.0, 'bar', 'box'), None
+    answers = [unproven, proven if is_kept else unproven]
+    monkeypatch.setattr(
+        commitments, 'first_unproven', lambda *_: answers.pop(0) if answers else proven
+    )
     n = len(arm.published)
     arm.monitor.fail('of the test')
-    assert len(arm.published) == n
+    assert len(arm.published) == n + (not is_kept)
     assert arm.monitor._state is MonitorState.STOPPING
     arm.frames(60, hand)
+    assert len(arm.published) == n + (not is_kept)
+    assert arm.is_over
+
+
+def test_a_stop_comes_after_all_where_the_commitment_is_not_proven_any_more(
+    separated, monkeypatch
+):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    unproven = separation.Blocked(0.0, 'bar', 'box')
+    answers = [unproven, None, None, unproven]
+    monkeypatch.setattr(commitments, 'first_unproven', lambda *_: answers.pop(0))
+    n = len(arm.published)
+    arm.monitor.fail('of the test')
+    arm.frames(1, hand)
     assert len(arm.published) == n
+    arm.frames(1, hand)
+    assert len(arm.published) == n + 1
+    monkeypatch.undo()
+    arm.frames(60, hand)
     assert arm.is_over
 
 

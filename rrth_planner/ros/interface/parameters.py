@@ -57,7 +57,9 @@ def declared(dof: int) -> tuple[Setting, ...]:
     second = 'library behind the second check of every motion'
     separate = 'publish only motions that are proven clear of a wearer who moves'
     meeting = 'no faster part of the arm may meet the wearer'
-    moving = 'greatest speeds of parts of the body by words of their names; the first that fits'
+    moving = (
+        'greatest speeds of parts of the body by words of their names; of several the greatest'
+    )
     late = 'the controller executes a motion at most so late'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'

@@ -3,6 +3,7 @@
 """The commitments of the running motion: what its controller is given of it, body by body."""
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
 import time
 
@@ -18,7 +19,7 @@ from rrth_planner.execution.commitment import (
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.separation import Separation
-from rrth_planner.model.trajectory import positions_at
+from rrth_planner.model.trajectory import part_of, positions_at
 from rrth_planner.ros.interface.inputs import RequestError
 from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
@@ -40,6 +41,10 @@ PERIODS, PROCESSING = 1.3, 0.012
 # So many commitments are remembered. An arm that is further from the present one than this [rad]
 # executes another one where the distance to that is less than this share.
 REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
+# An arm may lag behind what is commanded by so much, in steps of that [s].
+LONGEST_LAG, LAG_STEP = 0.06, 0.004
+# A commitment that takes longer to find is not published [s]: the arm has gone on meanwhile.
+LATEST = 0.02
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
 
@@ -80,6 +85,9 @@ class Commitments:
         if separation is None:
             self._body = self._last = None
             return
+        if self.is_active and self._parameters is not None and self._parameters.separation:
+            # The running motion is proven with these.
+            separation = self._parameters.separation
         if body is self._last:
             return
         elapsed = now - self._came
@@ -89,13 +97,15 @@ class Commitments:
         self._came = now
         parts = (*body.parts, *body.lost)
         scene = scene_of(body)
-        measured = np.array([part.measured for _, part in parts for _ in part.boxes])
+        # A stamp of the future is no younger than its reception.
+        measured = np.array([min(part.measured, now) for _, part in parts for _ in part.boxes])
         if self._body is None:
             self._body = first_sight(scene, measured)
         else:
             self._body = seen_again(self._body, scene, measured, separation.rules)
         self._last = body
-        self._reporter.body_observed(self._body)
+        with suppress(Exception):
+            self._reporter.body_observed(self._body)
 
     def begin(self, planned: ExecutingMotion, parameters: PlannerParameters) -> ExecutingMotion:
         """
@@ -128,8 +138,9 @@ class Commitments:
         self._held_until = self._blocked = -np.inf
         self._is_reset = False
         self.planned, self.present, self._parameters = planned, found, parameters
-        self._recent.clear()
-        self._recent.append(found)
+        self._recent = deque([found], maxlen=REMEMBERED)
+        with suppress(Exception):
+            self._report(None, float(path_state(found, found.start_time)[1]), False)
         return _executing(found, planned)
 
     def end(self) -> None:
@@ -158,15 +169,27 @@ class Commitments:
         is_manual = parameters is not None and parameters.resume == MANUAL
         return is_manual and self.is_active and not self.is_arrived(now)
 
-    def extend(self, now: float, reading: JointReading | None) -> ExecutingMotion | None:
+    def extend(
+        self, now: float, begin: float, reading: JointReading | None
+    ) -> ExecutingMotion | None:
         """
-        Publish the commitment that replaces the present one now [s]; None: there is none.
+        Publish the commitment that replaces the present one now [s]; return it if it changed.
 
-        reading: where the arm was last, to see which commitment it executes.
+        begin: now by `time.perf_counter`; reading: where the arm was last, to see which commitment
+        it executes.
         """
-        self._find_present(reading)
+        is_other = self._find_present(reading)
         present, planned, parameters = self.present, self.planned, self._parameters
         assert present is not None and planned is not None and parameters is not None
+        found = None if self.fault else self._extended(now, begin, present, parameters)
+        if found is None:
+            return _executing(present, planned) if is_other else None
+        return _executing(found, planned)
+
+    def _extended(
+        self, now: float, begin: float, present: Commitment, parameters: PlannerParameters
+    ) -> Commitment | None:
+        """Return the commitment that was published in place of the present one; None: none was."""
         separation = parameters.separation
         if now < max(present.start_time, self._held_until) or self._body is None:
             return None
@@ -177,7 +200,6 @@ class Commitments:
                 waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, 'waits for ~/reset', 0.0)
                 self._reporter.separation_status(waits)
             return None
-        begin = time.perf_counter()
         seen = body_at(self._body, now, separation.rules)
         found = extended(present, now, seen, self._stretched(separation))
         if found is None:
@@ -187,12 +209,19 @@ class Commitments:
             is_stopping = now - present.start_time > present.stretch
             self._report(found, float(path_state(present, now)[1]), is_stopping)
             return None
+        if time.perf_counter() - begin > LATEST:
+            # The arm is on its way to rest by now: from there the next one goes on.
+            return None
+        self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
         self.present = found
         self._recent.append(found)
-        self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
-        self._reporter.commitment_published(time.perf_counter() - begin)
-        self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
-        return _executing(found, planned)
+        if is_at_rest:
+            self._is_reset = False
+        # An error in the report must not hide what was published.
+        with suppress(Exception):
+            self._reporter.commitment_published(time.perf_counter() - begin)
+            self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
+        return found
 
     def _stretched(self, separation: Separation) -> Separation:
         """Return the settings for commitments that last until the next body."""
@@ -221,32 +250,46 @@ class Commitments:
             self._reporter.separation_status(SeparationStatus())
         return fault
 
-    def _find_present(self, reading: JointReading | None) -> None:
-        """Continue an earlier commitment where the arm executes that: later ones were rejected."""
-        begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
-        if reading is None or not begun:
-            return
-        gaps = [_gap(c, reading) for c in begun]
-        if gaps[-1] <= ASIDE:
-            return
-        k = int(np.argmin(gaps))
-        if gaps[k] < NEARER * gaps[-1]:
-            self.present = begun[k]
-            self._recent.clear()
-            self._recent.append(begun[k])
+    def _find_present(self, reading: JointReading | None) -> bool:
+        """
+        Continue an earlier commitment where the arm executes that: later ones were rejected.
 
-    def is_separate(self, stop: ExecutingMotion) -> bool:
-        """Return whether a stop is proven separate, too; without commitments that is not asked."""
+        Return whether it does. An arm that lags behind what is commanded executes it.
+        """
+        begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
+        if reading is None or len(begun) < 2:
+            return False
+        # What was commanded until then, by all of them in turn.
+        lagging = []
+        for time_ago in np.arange(0.0, LONGEST_LAG, LAG_STEP):
+            then = reading.taken - time_ago
+            last = next((c for c in reversed(begun) if c.start_time <= then), begun[0])
+            lagging.append(_gap(last, reading, time_ago))
+        gap = min(lagging)
+        gaps = [_gap(c, reading, 0.0) for c in begun[:-1]]
+        k = int(np.argmin(gaps))
+        if gap <= ASIDE or gaps[k] >= NEARER * gap:
+            return False
+        self.present = begun[k]
+        self._recent = deque([begun[k]], maxlen=REMEMBERED)
+        return True
+
+    def is_separate(self, motion: ExecutingMotion, now: float) -> bool:
+        """Return whether what is left of a motion now [s] is proven separate from the wearer."""
         parameters = self._parameters
-        if self.present is None or parameters is None or parameters.separation is None:
-            return True
-        if self._body is None:
+        if parameters is None or parameters.separation is None or self._body is None:
             return False
         separation = parameters.separation
-        seen = body_at(self._body, stop.start_time, separation.rules)
+        # Before its start the arm does something that was proven before.
+        begin = max(now - motion.start_time, 0.0)
+        curve = motion.trajectory
+        if begin >= curve.duration:
+            return True
+        rest = part_of(curve, begin, curve.duration) if begin > 0.0 else curve
+        seen = body_at(self._body, max(now, motion.start_time), separation.rules)
         margin = separation.margin + JUMP_WAY
         rules, arm = separation.rules, separation.arm
-        return first_unproven(stop.trajectory, 0.0, arm, seen, rules, margin) is None
+        return first_unproven(rest, 0.0, arm, seen, rules, margin) is None
 
     def _report(self, blocked: Blocked | None, rate: float, is_stopping: bool) -> None:
         if blocked is not None and is_stopping:
@@ -267,10 +310,11 @@ class Commitments:
         )
 
 
-def _gap(commitment: Commitment, reading: JointReading) -> float:
-    """Return how far an arm is from where a commitment is at the time of a reading [rad]."""
+def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> float:
+    """Return how far a reading is from where a commitment was some time before it [s] [rad]."""
     curve = commitment.trajectory
-    time = min(reading.taken - commitment.start_time, curve.duration)
+    time = reading.taken - time_ago - commitment.start_time
+    time = min(max(time, 0.0), curve.duration)
     return float(np.abs(positions_at(curve, [time])[0] - reading.positions).max())
 
 

@@ -29,9 +29,9 @@ from rrth_planner.execution.remaining_motion import (
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.trajectory import part_of, Trajectory
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -120,6 +120,9 @@ class ExecutionMonitor:
         self._pending_since, self._is_replanned = 0.0, True
         # Of the plan: a margin that is changed later does not apply to its motion.
         self._parameters = reporter.parameters
+        # A stop that was not published, since the commitment that comes to rest by itself is
+        # proven and the stop is not: the motion that it ends.
+        self._refused_stop: ExecutingMotion | None = None
         self._stops: deque[Stop] = deque(maxlen=10)
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -149,10 +152,11 @@ class ExecutionMonitor:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
             before = copy(self._tracker), self._parameters, self._goal, self._state
             commitments = copy(self._commitments)
-            commanded = self._commitments.begin(running, parameters)
-            self._tracker.begin(commanded, self._now())
-            self._parameters, self._goal, self._state = parameters, goal, MonitorState.MONITORING
             try:
+                commanded = self._commitments.begin(running, parameters)
+                self._tracker.begin(commanded, self._now())
+                self._parameters, self._goal = parameters, goal
+                self._state, self._refused_stop = MonitorState.MONITORING, None
                 publish()
                 if commanded is not running:
                     self._publishers.publish_motion(
@@ -249,6 +253,7 @@ class ExecutionMonitor:
         if self.running is None:
             return
         now = self._now()
+        self._check_refused_stop(now)
         phase = self._monitored_phase(now)
         if phase is None:
             return
@@ -256,7 +261,7 @@ class ExecutionMonitor:
         scene = scene_of(body.at(now))
         if self._holds(is_remaining_free, *self._remaining(phase, now), scene):
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
-            self._extend(now)
+            self._extend(now, begin)
         else:
             self._stop(phase, now, scene, arrived)
         waited = self._elapsed(arrived)
@@ -275,10 +280,14 @@ class ExecutionMonitor:
             (self.running, phase) if planned is None else (planned, self._commitments.phase(now))
         )
 
-    def _extend(self, now: float) -> None:
-        """Have the commitment of the running motion replaced by one that leads further."""
-        if self._commitments.is_active:
-            motion = self._commitments.extend(now, self._inputs.joints.value)
+    def _extend(self, now: float, begin: float) -> None:
+        """
+        Have the commitment of the running motion replaced by one that leads further.
+
+        begin: now [s] by `time.perf_counter`.
+        """
+        if self._commitments.is_active and not self.pending_stop:
+            motion = self._commitments.extend(now, begin, self._inputs.joints.value)
             if motion is not None:
                 self._tracker.replace(motion)
 
@@ -347,6 +356,9 @@ class ExecutionMonitor:
             return
         before, phase = found
         stop = replace(self._stop_of(before, phase, now), start_time=now)
+        if self._commitments.is_active and not self._is_separate(stop, now):
+            # The motion that it executes comes to rest by itself.
+            return
         self._tracker.motion = stop
         self._publishers.publish_motion(stop.trajectory, self._parameters, now)
         self._node.get_logger().error(
@@ -357,6 +369,7 @@ class ExecutionMonitor:
         """Monitor the previous motion where the arm follows that: its controller rejected one."""
         if (
             self._state in (MonitorState.MONITORING, MonitorState.STOPPING)
+            and not self._commitments.is_active
             and self._tracker.follow_previous()
         ):
             self._node.get_logger().error(SWITCHED[self._tracker.is_latest])
@@ -365,7 +378,10 @@ class ExecutionMonitor:
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
-        if self._tracker.is_over(now) and not self._commitments.waits_for_reset(now):
+        is_waiting = self._state is MonitorState.MONITORING and (
+            self._commitments.waits_for_reset(now)
+        )
+        if self._tracker.is_over(now) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion()
             self._tracker.forget()
@@ -395,7 +411,7 @@ class ExecutionMonitor:
         stopped = self._stop_of(running, phase, now)
         is_safe = self._holds(is_remaining_free, stopped, 0.0, scene)
         if not is_safe and self._holds(escapes_by_continuing, *self._remaining(phase, now), scene):
-            self._extend(now)
+            self._extend(now, time.perf_counter())
             sentence = f'{why}, but it escapes and a stop would not: motion continues'
             if self._reporter.monitor_state[1] != sentence:
                 self._node.get_logger().error(sentence)
@@ -441,6 +457,9 @@ class ExecutionMonitor:
     ) -> None:
         """Keep a stop for `take_stops`, with the wearer that it is proven free of."""
         is_replanned = is_replanned and self._reporter.parameters.replan
+        if self._commitments.is_active and self._parameters.resume == MANUAL:
+            # It goes on after `~/reset`, or a request.
+            is_replanned = False
         goal, n_motions = self._goal, self.n_motions
         self._stops.append(Stop(stop, goal, self._parameters, scene, is_replanned, n_motions))
 
@@ -456,12 +475,16 @@ class ExecutionMonitor:
         """
         Publish a stop, and track the arm on it; return what leads the arm to rest.
 
-        With separation a stop that is not proven separate is not published: the commitment that
-        the arm executes is, and comes to rest.
+        With separation a stop that is not proven separate is not published, as long as the
+        commitment that the arm executes is, and comes to rest.
         """
-        if self._commitments.is_active and not self._is_separate(stop):
-            assert self.running is not None
-            stop = self.running
+        now, running = self._now(), self.running
+        if running is not None and self._is_refused(stop, running, now):
+            self._refused_stop = running
+            rest = max(0.0, now - running.start_time)
+            if rest < running.trajectory.duration:
+                left = part_of(running.trajectory, rest, running.trajectory.duration)
+                stop = replace(running, trajectory=left, start_time=now)
         else:
             before = copy(self._tracker)
             self._tracker.stop(stop)
@@ -475,10 +498,31 @@ class ExecutionMonitor:
         self.n_stops += 1
         return stop
 
-    def _is_separate(self, stop: ExecutingMotion) -> bool:
-        """Return whether a stop is proven separate from the wearer; not after an error."""
+    def _is_refused(self, stop: ExecutingMotion, running: ExecutingMotion, now: float) -> bool:
+        """Return whether to leave the arm on its commitment, which is proven and a stop is not."""
+        return (
+            self._commitments.is_active
+            and not self._is_separate(stop, now)
+            and self._is_separate(running, now)
+        )
+
+    def _check_refused_stop(self, now: float) -> None:
+        """Publish a stop after all where the commitment is not proven any more."""
+        motion = self._refused_stop
+        if motion is None or self._state is not MonitorState.STOPPING:
+            return
+        if now >= motion.start_time + motion.trajectory.duration:
+            self._refused_stop = None
+        elif not self._is_separate(motion, now):
+            self._refused_stop = None
+            stop = self._stop_of(motion, 0.0, now)
+            self._tracker.stop(stop)
+            self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+
+    def _is_separate(self, motion: ExecutingMotion, now: float) -> bool:
+        """Return whether the rest of a motion is proven separate; not after an error."""
         try:
-            return self._commitments.is_separate(stop)
+            return self._commitments.is_separate(motion, now)
         except Exception:
             with suppress(Exception):
                 self._node.get_logger().error(traceback.format_exc())
