@@ -122,7 +122,7 @@ class ExecutionMonitor:
         self._parameters = reporter.parameters
         # A stop that was not published, since the commitment that comes to rest by itself is
         # proven and the stop is not: the motion that it ends.
-        self._refused_stop: ExecutingMotion | None = None
+        self._withheld_stop: ExecutingMotion | None = None
         self._stops: deque[Stop] = deque(maxlen=10)
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -156,7 +156,7 @@ class ExecutionMonitor:
                 commanded = self._commitments.begin(running, parameters)
                 self._tracker.begin(commanded, self._now())
                 self._parameters, self._goal = parameters, goal
-                self._state, self._refused_stop = MonitorState.MONITORING, None
+                self._state, self._withheld_stop = MonitorState.MONITORING, None
                 publish()
                 if commanded is not running:
                     self._publishers.publish_motion(
@@ -253,7 +253,7 @@ class ExecutionMonitor:
         if self.running is None:
             return
         now = self._now()
-        self._check_refused_stop(now)
+        self._check_withheld_stop(now)
         phase = self._monitored_phase(now)
         if phase is None:
             return
@@ -479,8 +479,8 @@ class ExecutionMonitor:
         commitment that the arm executes is, and comes to rest.
         """
         now, running = self._now(), self.running
-        if running is not None and self._is_refused(stop, running, now):
-            self._refused_stop = running
+        if running is not None and self._is_withheld(stop, running, now):
+            self._withheld_stop = running
             rest = max(0.0, now - running.start_time)
             if rest < running.trajectory.duration:
                 left = part_of(running.trajectory, rest, running.trajectory.duration)
@@ -498,7 +498,7 @@ class ExecutionMonitor:
         self.n_stops += 1
         return stop
 
-    def _is_refused(self, stop: ExecutingMotion, running: ExecutingMotion, now: float) -> bool:
+    def _is_withheld(self, stop: ExecutingMotion, running: ExecutingMotion, now: float) -> bool:
         """Return whether to leave the arm on its commitment, which is proven and a stop is not."""
         return (
             self._commitments.is_active
@@ -506,15 +506,15 @@ class ExecutionMonitor:
             and self._is_separate(running, now)
         )
 
-    def _check_refused_stop(self, now: float) -> None:
+    def _check_withheld_stop(self, now: float) -> None:
         """Publish a stop after all where the commitment is not proven any more."""
-        motion = self._refused_stop
+        motion = self._withheld_stop
         if motion is None or self._state is not MonitorState.STOPPING:
             return
         if now >= motion.start_time + motion.trajectory.duration:
-            self._refused_stop = None
+            self._withheld_stop = None
         elif not self._is_separate(motion, now):
-            self._refused_stop = None
+            self._withheld_stop = None
             stop = self._stop_of(motion, 0.0, now)
             self._tracker.stop(stop)
             self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
