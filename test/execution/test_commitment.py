@@ -278,7 +278,7 @@ def test_a_wearer_who_is_not_seen_for_seconds_blocks_and_is_named(contact_speed)
             assert not separation_violations(ARM, body, found.trajectory, rules, MARGIN)
         else:
             assert (found.bar in names, found.box in boxes) == (True, True)
-    assert sum(isinstance(found, Blocked) for found in answers) > 0.4 * len(answers)
+    assert sum(isinstance(found, Blocked) for found in answers) > 0.2 * len(answers)
 
 
 def test_a_motion_goes_on_and_arrives_when_the_wearer_is_seen_again():

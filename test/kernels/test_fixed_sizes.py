@@ -113,6 +113,18 @@ NUMBERS = {
     'stop_trajectory': {'3': 'derivatives', '4': 'derivatives'},
     'stop_search': {'3': 'phases', '5': 'columns'},
     'shortcut': {'2': 'sides of a corner'},
+    'rate_profile': {
+        '3': 'phases; derivatives',
+        '4': 'derivatives',
+        '6': 'coefficients of a quintic',
+    },
+    'separation': {
+        '1': 'pieces',
+        '2': 'ends of a bar; columns',
+        '3': 'coordinates',
+        '4': 'derivatives; columns',
+        '6': 'coefficients of a quintic',
+    },
     'lookahead': {'3': 'derivatives', '4': 'derivatives'},
 }
 MADE = {

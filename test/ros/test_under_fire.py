@@ -140,7 +140,7 @@ class Complaints:
         if 'Traceback' in line:
             self.errors.append(line)
 
-    def warning(self, line):
+    def warning(self, line, **_):
         if not line.isprintable() or len(line) > LONGEST_SENTENCE + 200:
             self.errors.append(line)
 
