@@ -12,7 +12,7 @@ from rrth_planner.collision.reference_checker import fast_distances, separation_
 from rrth_planner.collision.separation import first_unproven
 from rrth_planner.collision.separation_checker import first_separation_violation
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.kernels.collision.separation import fast_part, is_apart
+from rrth_planner.kernels.collision.separation import fast_part, within_distance
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import growth_at, seen_body, SeparationRules
@@ -369,12 +369,12 @@ def test_what_is_not_a_number_is_never_proven():
     rows[[0, 4, 8]], rows[12:15] = 1.0, 0.1
     for places in ([0, 1, 2], [4, 5, 6], [0, 1, 2, 4, 5, 6]):
         points = np.full(8, 5.0)
-        assert is_apart(points, 0, 0.0, 1.0, 0.1, rows, 0)
+        assert within_distance(points, 0, 0.0, 1.0, 0.1, rows, 0) > 0.1
         points[places] = np.nan
-        assert not is_apart(points, 0, 0.0, 1.0, 0.1, rows, 0)
+        assert not within_distance(points, 0, 0.0, 1.0, 0.1, rows, 0) > 0.1
     points = np.full(8, 5.0)
-    assert not is_apart(points, 0, 0.0, 1.0, np.nan, rows, 0)
-    assert not is_apart(points, 0, np.nan, 1.0, 0.1, rows, 0)
+    assert not within_distance(points, 0, 0.0, 1.0, np.nan, rows, 0) > np.nan
+    assert not within_distance(points, 0, np.nan, 1.0, 0.1, rows, 0) > 0.1
     share = np.empty(2)
     for speeds in ((np.nan, 0.0), (0.0, np.nan), (np.nan, np.nan)):
         assert fast_part(*speeds, 0.1, share)
