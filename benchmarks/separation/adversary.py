@@ -176,7 +176,7 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
     q, hands, n_blocked = FOLDED, [], 0
     while len(hands) < n:
         scene, part, is_turning = _draw_part(rng)
-        plan = next(random_plans(rng, scene, q), None)
+        plan = next(random_plans(rng, scene, q, trial.case if trial.is_separate else None), None)
         if plan is None:
             q = FOLDED
             continue

@@ -27,7 +27,7 @@ def costs(case: Case, n: int, seed: int) -> dict[str, list[float]]:
     settings, timing = separation_of(case), Timing()
     found: dict[str, list[float]] = {what: [] for what in (EXTENDED, BLOCKED, STOP, PROOF, WHOLE)}
     for _ in range(n):
-        plan = next(random_plans(rng, scene, q), None)
+        plan = next(random_plans(rng, scene, q, case), None)
         if plan is None:
             break
         assert plan.trajectory is not None

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.execution.commitment import Commitment
 from rrth_planner.io.wearer_file import load_body
+from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory
+from rrth_planner.model.trajectory import MotionLimits, sample
+from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.timing.parameterization import excess
 
 from benchmarks.separation.lockstep import Controller, Eyes, PATIENCE, Planner, Timing
 from benchmarks.separation.setting import (
     Case,
     FOLDED,
+    planned,
     random_plans,
     separation_of,
 )
@@ -80,14 +83,19 @@ def chain_of_timed(dead: float, case: Case, n: int, seed: int) -> list[Timed]:
             q = FOLDED
             continue
         assert plan.trajectory is not None
-        found.append(timed(dead, case, plan.trajectory, rng))
+        found.append(timed(dead, case, plan, rng))
         q = plan.trajectory.positions[-1]
     return found
 
 
-def timed(dead: float, case: Case, motion: Trajectory, rng: np.random.Generator) -> Timed:
-    """Return what becomes of a motion."""
+def timed(dead: float, case: Case, plan: MotionPlan, rng: np.random.Generator) -> Timed:
+    """Return what becomes of a motion to the target of a plan without separation."""
     settings, scene = separation_of(case), load_body()
+    assert plan.path is not None and plan.trajectory is not None
+    T = tool_pose(settings.arm, plan.path.waypoints[-1])
+    target = T[:3, 3] + plan.target_distance * T[:3, 2]
+    motion = planned(scene, plan.path.waypoints[0], target, plan.seed, case).trajectory
+    assert motion is not None
     timing = Timing(age=dead - DELAY, thinking=0.0, lag=0.0)
     planner = Planner(settings, timing, rng, Controller(motion.positions[0]))
     eyes = Eyes(tuple(box.name for box in scene.boxes), scene.numbers, np.zeros(0))
@@ -108,7 +116,7 @@ def timed(dead: float, case: Case, motion: Trajectory, rng: np.random.Generator)
     jumps = np.array([jump_of(*pair) for pair in zip(given[:-1], given[1:], strict=True)])
     jumps = jumps.reshape(-1, 2).max(axis=0, initial=0.0)
     return Timed(
-        planned=motion.duration,
+        planned=plan.trajectory.duration,
         took=given[-1].end_time - begun if has_arrived else np.inf,
         n_stops=sum(
             one.end_time + ENDED < other.start_time

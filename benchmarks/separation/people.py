@@ -258,7 +258,8 @@ class Session:
             self.target = self.targets.uniform(*LOW_IN_FRONT)
             self.asked = self.tried = self.ready = time
         if self.plan is None and time >= self.ready:
-            plan = planned(scene, q, self.target, int(self.rng.integers(2**31)))
+            case = self.record.case if self.record.is_separate else None
+            plan = planned(scene, q, self.target, int(self.rng.integers(2**31)), case)
             self.record.n_plans += 1
             if plan.trajectory is None:
                 self.ready = time + AGAIN

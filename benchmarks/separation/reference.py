@@ -73,7 +73,7 @@ def chain_of_motions(n_drawn: int, n: int, seed: int) -> Judged:
     often, shift = rng.uniform(0.2, OFTEN, len(names)), rng.uniform(0.0, 2.0 * np.pi, len(names))
     for _ in range(n):
         timing = Timing(age=float(rng.uniform(0.0, OLDEST)), lag=0.0)
-        plan = next(random_plans(rng, scene, q), None)
+        plan = next(random_plans(rng, scene, q, case), None)
         if plan is None:
             q = FOLDED
             continue

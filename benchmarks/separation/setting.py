@@ -21,6 +21,8 @@ from rrth_planner.pipeline.plan_motion import plan_motion
 from benchmarks.common.random_draws import random_target
 
 MARGIN, RAY = 0.02, 1.0
+# Of what a frame of the tracker shows [s].
+AGE = 0.03
 # Where a chain of motions begins [rad].
 FOLDED = np.array([0.0, -0.35, 0.5 * np.pi, 0.5 * np.pi])
 # Stop limits by name: those of motions, and more [rad/s^2, rad/s^3].
@@ -79,9 +81,12 @@ def separation_of(case: Case) -> Separation:
     )
 
 
-def planned(scene: Scene, q_start: Array, target: Array, seed: int) -> MotionPlan:
-    """Return the plan from a place at rest to a target [m], by a seed."""
+def planned(
+    scene: Scene, q_start: Array, target: Array, seed: int, case: Case | None = None
+) -> MotionPlan:
+    """Return the plan from a place at rest to a target [m]; case: where the arm separates."""
     settings = the_settings()
+    separation = None if case is None else separation_of(case)
     return plan_motion(
         the_arm(),
         scene,
@@ -93,12 +98,17 @@ def planned(scene: Scene, q_start: Array, target: Array, seed: int) -> MotionPla
         ray_guard_length=RAY,
         seed=seed,
         reserve=settings.reserve,
+        rules=None if separation is None else separation.rules,
+        stop_limits=None if separation is None else separation.stop_limits,
+        body_age=AGE,
     )
 
 
-def random_plans(rng: np.random.Generator, scene: Scene, q_start: Array) -> Iterator[MotionPlan]:
+def random_plans(
+    rng: np.random.Generator, scene: Scene, q_start: Array, case: Case | None = None
+) -> Iterator[MotionPlan]:
     """Yield solved plans from a place to random targets in all directions, DRAWS at most."""
     for _ in range(DRAWS):
-        plan = planned(scene, q_start, random_target(rng), int(rng.integers(2**31)))
+        plan = planned(scene, q_start, random_target(rng), int(rng.integers(2**31)), case)
         if plan.trajectory is not None and plan.escape_time == 0.0:
             yield plan

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4
 from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
-from rrth_planner.kernels.collision.separation import first_blocked
+from rrth_planner.kernels.collision.separation import first_blocked, permitted_rates
 from rrth_planner.model.arm import ArmModel, bars_of
-from rrth_planner.model.separation import growth_at, SeenBody, SeparationRules
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.separation import growth_at, SeenBody, Separation, SeparationRules
+from rrth_planner.model.trajectory import piece_coefficients, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,45 @@ def first_unproven(
         return None
     bar, box = divmod(blocking, len(boxes))
     return Blocked(float(found[0]), bars_of(arm)[bar].name, boxes[box].name)
+
+
+def permitted_ahead(
+    motion: Trajectory,
+    places: Array,
+    n_rates: int,
+    body: SeenBody,
+    settings: Separation,
+    margin: float,
+) -> Array:
+    """
+    Return the rates that are permitted at the first places of a motion, (n,) [s] -> (n_rates, 3).
+
+    The greatest rate from which a stop would keep clear of the wearer, up to 1 [-], and how fast
+    the rate may change there: its first and its second derivative [1/s, 1/s^2]. body: the wearer
+    as he will be known when such a stop begins; margin [m]. An estimate: `first_unproven` proves.
+    """
+    arm, rules = settings.arm, settings.rules
+    robot, chain = arm_rows(arm, 0.0)
+    found = np.empty((n_rates, 3))
+    permitted_rates(
+        piece_coefficients(motion),
+        motion.times,
+        places,
+        n_rates,
+        *settings.limits.rows[1:],
+        *settings.stop_limits.rows[1:],
+        rules.contact_speed,
+        moving_joints(arm),
+        chain,
+        robot,
+        body.scene.numbers,
+        box_classes(arm, body.scene),
+        mount_inverse(arm),
+        growth_at(body, rules, margin + SLACK, settings.stretch),
+        body.speeds,
+        found,
+    )
+    return found
 
 
 @functools.lru_cache(maxsize=16)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 import math
 
 import numpy as np
-from rrth_planner.collision.separation import Blocked, first_unproven, moving_joints
-from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
-from rrth_planner.kernels.collision.separation import permitted_rates
+from rrth_planner.collision.separation import Blocked, first_unproven, permitted_ahead
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.separation import growth_at, SeenBody, Separation
-from rrth_planner.model.trajectory import part_of, piece_coefficients, sample, Trajectory
+from rrth_planner.model.separation import SeenBody, Separation
+from rrth_planner.model.trajectory import part_of, sample, Trajectory
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.rate_profile import (
     continued,
@@ -109,47 +107,13 @@ def path_state(commitment: Commitment, time: float) -> Array:
     return np.array([tau, rate, float((a - b * rate**2) @ w) / square])
 
 
-def permitted_ahead(
-    motion: Trajectory, places: Array, n_rates: int, body: SeenBody, settings: Separation
-) -> Array:
-    """
-    Return the rates that are permitted at places of a motion, (n,) [s] -> (n, 3).
-
-    The greatest rate from which a stop would keep clear of the wearer, up to 1 [-], and how fast
-    the rate may change there: its first and its second derivative [1/s, 1/s^2]. body: the wearer
-    as he will be known when such a stop begins. An estimate: `first_unproven` proves.
-    """
-    arm, rules = settings.arm, settings.rules
-    robot, chain = arm_rows(arm, 0.0)
-    found = np.empty((n_rates, 3))
-    permitted_rates(
-        piece_coefficients(motion),
-        motion.times,
-        places,
-        n_rates,
-        *settings.limits.rows[1:],
-        *settings.stop_limits.rows[1:],
-        rules.contact_speed,
-        moving_joints(arm),
-        chain,
-        robot,
-        body.scene.numbers,
-        box_classes(arm, body.scene),
-        mount_inverse(arm),
-        growth_at(body, rules, settings.margin + SLACK + JUMP_WAY, settings.stretch),
-        body.speeds,
-        found,
-    )
-    return found
-
-
 def permitted(motion: Trajectory, time: float, body: SeenBody, settings: Separation) -> float:
     """Return the rate at a time from which a motion can slow down to what is permitted ahead."""
     ahead = min(BEYOND, motion.duration - time)
     n = max(2, math.ceil(ahead / SPACING_AHEAD) + 1)
     places = np.linspace(time, time + ahead, n)
-    n_rates = min(n, N_RATES)
-    rates, slows, fades = permitted_ahead(motion, places, n_rates, body, settings).T
+    n_rates, margin = min(n, N_RATES), settings.margin + JUMP_WAY
+    rates, slows, fades = permitted_ahead(motion, places, n_rates, body, settings, margin).T
     places = places[:n_rates]
     # The square of the rate falls by 2 s_ddot along the way, less what the ramps take of that.
     way = np.maximum(places - time - RAMP * slows / fades, 0.0)

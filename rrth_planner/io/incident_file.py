@@ -23,12 +23,13 @@ from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import one_line, printable, RecordError, shown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
 # Version of the record's layout; others are rejected.
-FORMAT = 4
+FORMAT = 5
 MOST_FILES = 100
 PATTERN = 'incident-*.yaml'
 HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
@@ -157,12 +158,49 @@ def _question(data: Any) -> PlanQuestion:
         scene=_scene(given['scene'], 'scene'),
         q_start=given['q_start'],
         goal=PointingGoal(**_fields_of(given['goal'], PointingGoal, 'goal')),
-        limits=MotionLimits(**_fields_of(given['limits'], MotionLimits, 'limits')),
+        limits=_limits(given['limits'], 'limits'),
         options=_options(given['options']),
         seed=whole(given['seed'], 'seed', RecordError),
         second_checker=text(given['second_checker'], 'second_checker', RecordError),
         moving=None if given['moving'] is None else _start_state(given['moving'], arm.dof),
+        rules=None if given['rules'] is None else _rules(given['rules']),
+        stop_limits=(
+            None if given['stop_limits'] is None else _limits(given['stop_limits'], 'stop_limits')
+        ),
+        body_age=number(given['body_age'], 'body_age', 's', RecordError),
         **lengths,
+    )
+
+
+def _limits(data: Any, name: str) -> MotionLimits:
+    """Return the limits that `plain` wrote, or raise RrthError."""
+    return MotionLimits(**_fields_of(data, MotionLimits, name))
+
+
+def _rules(data: Any) -> SeparationRules:
+    """Return the rules that `plain` wrote, or raise RrthError."""
+    given = _fields_of(data, SeparationRules, 'rules')
+    speeds = sequence(given['body_speeds'], 'rules: body_speeds', RecordError)
+    if not all(isinstance(item, list) and len(item) == 2 for item in speeds):
+        raise RecordError(
+            f'rules: body_speeds {shown(speeds)}, expected pairs of words and a speed [m/s]'
+        )
+    return SeparationRules(
+        body_speeds=tuple(
+            (
+                text(words, 'rules: body_speeds', RecordError),
+                number(speed, 'rules: body_speeds', 'm/s', RecordError),
+            )
+            for words, speed in speeds
+        ),
+        **{
+            name: number(given[name], f'rules: {name}', unit, RecordError)
+            for name, unit in (
+                ('contact_speed', 'm/s'),
+                ('body_error', 'm'),
+                ('controller_delay', 's'),
+            )
+        },
     )
 
 

@@ -18,9 +18,11 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits, StartState, Trajectory
 from rrth_planner.pipeline.collision_escape import Escape, plan_escape
+from rrth_planner.pipeline.goal_ranking import quickest_path
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.plan_path import find_path, SPARES
 from rrth_planner.pipeline.rejection import (
@@ -59,6 +61,9 @@ def plan_motion(
     escape_depth: float = 0.05,
     reserve: float = 0.0,
     second_checker: str = 'fcl',
+    rules: SeparationRules | None = None,
+    stop_limits: MotionLimits | None = None,
+    body_age: float = 0.0,
 ) -> MotionPlan:
     """
     Return a certified motion that ends with the tool pointing at the goal.
@@ -95,6 +100,13 @@ def plan_motion(
         wearer who moves by less invalidates nothing.
     second_checker : str
         Library behind the second collision check, one of `distance_library.LIBRARIES`.
+    rules : SeparationRules, optional
+        For an arm that keeps separate from a wearer who moves: of several goals it aims at the
+        one where these allow it to be soonest.
+    stop_limits : MotionLimits, optional
+        Of stops of such an arm; without, `limits`.
+    body_age : float
+        Of the scene, while such a motion is executed [s].
 
     Raises
     ------
@@ -118,6 +130,9 @@ def plan_motion(
         escape_depth=escape_depth,
         reserve=reserve,
         second_checker=second_checker,
+        rules=rules,
+        stop_limits=stop_limits,
+        body_age=body_age,
     )
     return plan_question(question, should_stop)
 
@@ -161,8 +176,15 @@ def plan_question(
             rejection = found
             break
         assert found.path is not None
-        timed = time_path(question, world, found.path, lead, escape, should_stop)
+        paths = [found.path]
+        if question.rules is not None:
+            paths.insert(0, quickest_path(question, world, q_from, found.path))
+        for path in dict.fromkeys(paths):
+            timed = time_path(question, world, path, lead, escape, should_stop)
+            if not isinstance(timed, Rejection):
+                break
         if isinstance(timed, Trajectory):
+            found = replace(found, path=path)
             return _solved(question, world, found, timed, begin, escape)
         if isinstance(timed, Disagreement):
             disagreement = timed

@@ -10,6 +10,7 @@ from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import OptionsError, shown
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
+from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, StartState
 from rrth_planner.planning.options import TreeOptions
 
@@ -31,6 +32,12 @@ class PlanQuestion:
         From 0 to 1e4 [m].
     second_checker : str
         One of `distance_library.LIBRARIES`.
+    rules : SeparationRules or None
+        Of several goals the arm aims at the one where these allow it to be soonest.
+    stop_limits : MotionLimits or None
+        Of stops of such a motion; None: `limits`.
+    body_age : float
+        Of the scene, while such a motion is executed, from 0 to 1e4 [s].
 
     Raises
     ------
@@ -52,6 +59,9 @@ class PlanQuestion:
     escape_depth: float = 0.05
     reserve: float = 0.0
     second_checker: str = 'fcl'
+    rules: SeparationRules | None = None
+    stop_limits: MotionLimits | None = None
+    body_age: float = 0.0
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -59,6 +69,8 @@ class PlanQuestion:
         q_start = frozen_array(self.q_start, (dof,), 'q_start', 'rad', OptionsError)
         object.__setattr__(self, 'q_start', q_start)
         widths = {'limits': self.limits.velocity.shape[-1]}
+        if self.stop_limits is not None:
+            widths['stop_limits'] = self.stop_limits.velocity.shape[-1]
         if self.moving is not None:
             widths['moving'] = self.moving.state.positions.shape[-1]
             if self.moving.running is not None:
@@ -72,6 +84,10 @@ class PlanQuestion:
                 raise OptionsError(
                     f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]'
                 )
+        if not 0.0 <= self.body_age <= FARTHEST:
+            raise OptionsError(
+                f'body_age: {self.body_age}, expected a time from 0 to {FARTHEST:g} [s]'
+            )
         if self.second_checker not in LIBRARIES:
             raise OptionsError(
                 f'second_checker: {shown(self.second_checker)}, expected {" or ".join(LIBRARIES)}'

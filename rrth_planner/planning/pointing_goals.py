@@ -113,7 +113,7 @@ def check_pointing_arm(arm: ArmModel) -> None:
 
     To reach the targets beside it, the joints must move a point of the ray both ways across it.
     """
-    share = (0.5 + np.arange(64)[:, None] * _spreading_ratios(arm.dof)) % 1.0
+    share = (0.5 + np.arange(64)[:, None] * spreading_ratios(arm.dof)) % 1.0
     T = forward_kinematics(arm, arm.bounds[0] + share * (arm.bounds[1] - arm.bounds[0]))
     point = T[:, -1:, :3, 3] + T[:, -1:, :3, 2]
     z, origin = T[:, :-1, :3, 2], T[:, :-1, :3, 3]
@@ -167,7 +167,7 @@ def goal_configurations(
         world.bounds,
         target_in_mount(arm, goal),
         q_near,
-        _spreading_ratios(dof - kernels.n_solved),
+        spreading_ratios(dof - kernels.n_solved),
         n_draws,
         goals,
         blocked,
@@ -220,7 +220,7 @@ def pointing_problem(
 
 
 @functools.lru_cache(maxsize=32)
-def _spreading_ratios(n: int) -> Array:
+def spreading_ratios(n: int) -> Array:
     """Return the steps 1/phi, 1/phi^2, ... with phi^(n+1) = phi + 1 (Roberts 2018)."""
     phi = 2.0
     for _ in range(64):

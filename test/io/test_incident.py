@@ -23,6 +23,7 @@ from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.model.errors import RecordError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.separation import SeparationRules
 from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import PrintedRRTHOptions, RRTHOptions, RRTStarSmartOptions
@@ -66,6 +67,17 @@ def boxes(draw):
 
 
 @st.composite
+def rules(draw):
+    speed = st.floats(0.0, 100.0)
+    return SeparationRules(
+        contact_speed=draw(speed),
+        body_speeds=(*draw(st.lists(st.tuples(LINES, speed), max_size=3)), ('', draw(speed))),
+        body_error=draw(st.floats(0.0, 10.0)),
+        controller_delay=draw(st.floats(0.0, 10.0)),
+    )
+
+
+@st.composite
 def incidents(draw):
     state = MotionState(
         positions=draw(rows(1))[0], velocities=draw(rows(1))[0], accelerations=draw(rows(1))[0]
@@ -92,6 +104,9 @@ def incidents(draw):
         seed=draw(st.integers(0, 2**63)),
         moving=draw(st.sampled_from([None, moving])),
         escape_depth=draw(st.floats(0.0, 1.0)),
+        rules=draw(st.none() | rules()),
+        stop_limits=draw(st.sampled_from([None, limits()])),
+        body_age=draw(st.floats(0.0, 1e4)),
     )
     is_disagreement = draw(st.booleans())
     touch = Violation(draw(ANY), draw(ANY), draw(NAMES), draw(NAMES))
@@ -142,6 +157,8 @@ def question(**changes):
             margin=MARGIN,
             ray_guard_length=RAY,
             seed=1,
+            rules=SeparationRules(),
+            stop_limits=limits(),
         ),
         **changes,
     )
@@ -220,7 +237,7 @@ del_ = object()
 @pytest.mark.parametrize(
     ('path', 'value', 'sentence'),
     [
-        (('format',), 1, 'format: 1, expected 4'),
+        (('format',), 1, 'format: 1, expected 5'),
         (('kind',), 'storm', "kind: 'storm', expected disagreement or error"),
         (('kind',), [], 'kind: '),
         (('question',), None, 'question: None, expected a mapping'),
@@ -238,6 +255,10 @@ del_ = object()
         (('question', 'limits', 'jerk'), [1.0] * 3, 'max_jerk: shape (3,), expected (4)'),
         (('question', 'scene', 'boxes'), 7, 'scene: boxes: 7, expected a list'),
         (('question', 'scene', 'boxes'), [7], 'scene: box 0: 7, expected a mapping'),
+        (('question', 'body_age'), -1.0, 'body_age: -1.0, expected a time from 0'),
+        (('question', 'rules'), {}, 'rules: no contact_speed, body_speeds, body_error'),
+        (('question', 'rules', 'body_speeds'), [['hand']], 'rules: body_speeds'),
+        (('question', 'rules', 'contact_speed'), -1.0, 'contact_speed: -1.0, expected 0 to 100'),
         (('question', 'moving'), {}, 'moving: no state, running, time, expected'),
         (('trajectory',), None, 'incident: a disagreement without trajectory and violation'),
         (('trajectory', 'times'), [1.0], 'times: expected at least one, from 0'),

@@ -10,10 +10,10 @@ from rrth_planner.model.arm import pointing_error, tool_pose
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.planning.pointing_goals import (
-    _spreading_ratios,
     goal_configurations,
     MOST,
     pointing_kernels,
+    spreading_ratios,
     target_in_mount,
 )
 from worlds import (
@@ -43,7 +43,7 @@ def every_candidate(arm, target, q_near, n_draws):
         world.bounds,
         target_in_mount(arm, PointingGoal(target)),
         q_near,
-        _spreading_ratios(arm.dof - kernels.n_solved),
+        spreading_ratios(arm.dof - kernels.n_solved),
         0,
         n_draws,
         np.inf,

@@ -310,6 +310,44 @@ def test_a_held_commitment_is_not_extended_until_then(separated):
     assert len(arm.published) > n
 
 
+def test_until_a_handover_the_controller_is_given_what_was_proven_before(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    handover = arm.now + 0.025
+    arm.monitor.hold(handover)
+    before, begun = arm.published[-1]
+    state = [row[0] for row in sample(before, [handover - begun])]
+    assert np.abs(state[1]).max() > 0.1
+    end = state[0] + 0.3 * state[1]
+    arm.command(
+        ExecutingMotion(
+            trajectory=Trajectory(
+                times=[0.0, 1.0],
+                positions=[state[0], end],
+                velocities=[state[1], np.zeros(4)],
+                accelerations=[state[2], np.zeros(4)],
+            ),
+            start_time=handover,
+        )
+    )
+    trajectory, start = arm.published[-1]
+    assert trajectory is not before
+    assert start == arm.now
+    until = np.linspace(0.0, handover - start, 26)
+    for new, old, same in zip(
+        sample(trajectory, until),
+        sample(before, start - begun + until),
+        (1e-6, 1e-4, 1e-2),
+        strict=True,
+    ):
+        assert np.abs(new - old).max() < same
+    arm.frames(200, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - end).max() < 1e-3
+
+
 @pytest.mark.parametrize('resume', ['auto', 'manual'])
 def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separated, resume):
     arm = separated(resume=resume, replan=False)

@@ -25,6 +25,7 @@ from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
     is_ray_clear,
     is_remaining_free,
+    with_lead_in,
 )
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
@@ -154,7 +155,12 @@ class ExecutionMonitor:
             commitments = copy(self._commitments)
             try:
                 commanded = self._commitments.begin(running, parameters)
-                self._tracker.begin(commanded, self._now())
+                present, now = self._tracker.motion, self._now()
+                if commanded is not running and present is not None and now < running.start_time:
+                    # Left to itself until a handover, the controller would not move as is proven.
+                    phase = now - present.start_time
+                    commanded = with_lead_in(present, phase, commanded, now)
+                self._tracker.begin(commanded, now)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._withheld_stop = MonitorState.MONITORING, None
                 publish()

@@ -10,6 +10,7 @@ import secrets
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.incident import disagreement_incident, Incident
+from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
@@ -124,7 +125,7 @@ def plan_request(
                 handover = Handover(now + lead, lead, ahead, running)
             else:
                 hold(math.inf)
-            question = _question(snapshot, parameters, handover)
+            question = _question(snapshot, parameters, handover, inputs.body.age(now))
             plan = planner.plan(question, should_stop)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
@@ -183,8 +184,12 @@ def require_not_cancelled(
 
 
 def _question(
-    snapshot: InputSnapshot, parameters: PlannerParameters, handover: Handover | None
+    snapshot: InputSnapshot,
+    parameters: PlannerParameters,
+    handover: Handover | None,
+    body_age: float,
 ) -> PlanQuestion:
+    separation = parameters.separation
     return PlanQuestion(
         arm=parameters.arm,
         scene=snapshot.scene,
@@ -199,4 +204,7 @@ def _question(
         escape_depth=parameters.escape_depth,
         reserve=parameters.reserve,
         second_checker=parameters.second_checker,
+        rules=None if separation is None else separation.rules,
+        stop_limits=parameters.stop_limits,
+        body_age=min(max(body_age, 0.0), FARTHEST),
     )
