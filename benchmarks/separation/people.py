@@ -37,7 +37,6 @@ from benchmarks.separation.lockstep import (
     Eyes,
     INSTANT,
     instants,
-    PATIENCE,
     Planner,
     Timing,
 )
@@ -56,6 +55,8 @@ from benchmarks.separation.setting import (
 LOW_IN_FRONT = np.array([[0.8, -0.6, -0.6], [1.6, 0.6, 0.0]])
 # An arm that aims this near to its target has arrived [m].
 AIMS = 0.02
+# A target that is not reached for so long is not reachable now [s].
+PATIENCE = 10.0
 # A plan takes so long; where there is none it is tried again a while later, for so long [s].
 PLANNING, AGAIN, TRIED = 0.05, 0.1, 2.0
 # Recordings but that of the package begin with a T-pose of so long [s].
@@ -397,7 +398,7 @@ def beside_person(seconds: float, item: tuple[Take, Case, bool]) -> Beside:
 
 HEADER = (
     '| recording | rate | separation | v_c [m/s] | stop | time [s] | targets reached | not '
-    'reachable now | no plan | plans | mean time of those reached [s] | time per target reached '
+    'reachable now | no plan | plans | median time of those reached [s] | time per target reached '
     '[s] | contacts, arm faster than v_c: part kept its speed | part was faster | slower | at '
     'rest |'
 )
@@ -428,7 +429,7 @@ def line_of(record: Beside) -> str:
         record.outcomes[NOT_NOW],
         record.outcomes[NO_PLAN],
         record.n_plans,
-        f'{np.mean(record.times):.2f}' if record.times else '–',
+        f'{np.median(record.times):.2f}' if record.times else '–',
         f'{record.seconds / n:.2f}' if n else '–',
         contacts[FAST, True],
         contacts[FAST, False],
