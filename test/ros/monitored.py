@@ -25,6 +25,12 @@ PHASE = 0.5
 FAR = Box('far', [3.0, 3.0, 3.0], [0.1, 0.1, 0.1], np.eye(3))
 
 
+def without_separation(node):
+    """Return the parameters of a node whose motions are monitored as a whole."""
+    separated = declare_parameters(node)
+    return replace(separated, separation=None, body_timeout=0.0, joint_timeout=0.0)
+
+
 class Monitored:
     """A monitor of a motion that runs, on a clock of its own, and what it publishes."""
 
@@ -44,7 +50,7 @@ class Monitored:
         # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
-            parameters=replace(parameters or declare_parameters(node), replan=False),
+            parameters=replace(parameters or without_separation(node), replan=False),
             monitor_state=('', ''),
             publish_soon=lambda: None,
             body_used=self.ages.append,

@@ -552,7 +552,7 @@ def test_beside_a_recorded_person_the_planner_plans_by_what_a_tracker_sees(
         ChildProcess('rrth_planner.ros.playback_node', [], said.append),
         ChildProcess(
             'rrth_planner.ros.planner_node',
-            ['--ros-args', '-p', 'seed:=3', '-p', 'body_timeout:=5.0', '-p', required],
+            ['--ros-args', '-p', 'separation:=false', '-p', 'body_timeout:=5.0', '-p', required],
             said.append,
         ),
         spinning(client),

@@ -62,7 +62,7 @@ def test_both_nodes_work_with_another_arm(wait_until, send, ask, spinning):
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', f'arm:={file}', '-p']
     with (
-        ChildProcess(planner, [*ros, 'seed:=3'], said.append) as one,
+        ChildProcess(planner, [*ros, 'seed:=3', '-p', 'separation:=false'], said.append) as one,
         ChildProcess(playback, [*ros, f'initial_positions:={[0.0] * 6}'], said.append) as other,
         spinning(client),
     ):

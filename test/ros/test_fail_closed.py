@@ -12,13 +12,12 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from monitored import FAR, Monitored  # noqa: E402
+from monitored import FAR, Monitored, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 import rrth_planner  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.errors import MessageError  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
-from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
@@ -86,7 +85,7 @@ class Injector:
 def monitored():
     """Give what makes a monitor of a motion that has just begun."""
     node = Node('fail_closed')
-    parameters = declare_parameters(node)
+    parameters = without_separation(node)
     yield lambda: Monitored(node, parameters)
     node.destroy_node()
 

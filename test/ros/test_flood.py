@@ -65,7 +65,7 @@ def _udp():
 
 @pytest.fixture(name='planner', scope='module')
 def _planner(ros_context, udp):
-    arguments = ['--ros-args', '-r', '__ns:=/flooded', '-p', 'seed:=7']
+    arguments = ['--ros-args', '-r', '__ns:=/flooded', '-p', 'seed:=7', '-p', 'separation:=false']
     with ChildProcess(NODE, arguments, lambda _: None) as child:
         yield child
 

@@ -88,7 +88,7 @@ def test_markers_act_over_the_wire_as_in_rviz(start):
 
 
 def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_until):
-    words = ['--ros-args', '-r', 'body_boxes:=/wearer', '-r', '__ns:=']
+    words = ['--ros-args', '-p', 'separation:=false', '-r', 'body_boxes:=/wearer', '-r', '__ns:=']
     planners = [
         PlannerNode(InProcessPlanner(), cli_args=[*words[:-1], f'{words[-1]}{ns}'])
         for ns in ('/a', '/b')
@@ -426,7 +426,7 @@ class Watcher(Node):
 
 def test_a_planner_that_was_killed_leaves_an_arm_at_rest_and_is_replaced(spinning, wait_until):
     watcher, said, lines = Watcher(), [], []
-    ros = ['--ros-args', '-r', '__ns:=/killed', '-p', 'seed:=7']
+    ros = ['--ros-args', '-r', '__ns:=/killed', '-p', 'seed:=7', '-p', 'separation:=false']
     module = 'rrth_planner.ros.planner_node'
 
     def ask():

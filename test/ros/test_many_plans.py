@@ -110,7 +110,7 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
     client = Client()
     codes, times, lines = {}, [], []
     module = 'rrth_planner.ros.planner_node'
-    arguments = ['--ros-args', '-p', 'seed:=7']
+    arguments = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
     with ChildProcess(module, arguments, lines.append) as child, spinning(client):
         wait_until(client.plan.service_is_ready, 120.0)
         for _ in range(N_BODIES):

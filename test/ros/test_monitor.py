@@ -76,7 +76,8 @@ def scene_of_a_motion(wait_until, send, spinning):
         client = Client()
         planner, playback = (f'rrth_planner.ros.{n}_node' for n in ('planner', 'playback'))
         # So slow that a busy machine has time to stop the arm.
-        ros = ['--ros-args', '-p', 'seed:=7', '-p', 'max_velocity:=[0.5, 0.5, 0.5, 0.5]']
+        ros = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
+        ros += ['-p', 'max_velocity:=[0.5, 0.5, 0.5, 0.5]']
         for setting in settings:
             ros += ['-p', setting]
         stack.enter_context(ChildProcess(planner, ros, said.append))

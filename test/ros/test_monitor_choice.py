@@ -11,14 +11,13 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from monitored import ARM, FAR, Monitored, PHASE  # noqa: E402
+from monitored import ARM, FAR, Monitored, PHASE, without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
-from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
@@ -62,7 +61,7 @@ def test_an_arm_stops_whether_or_not_its_stop_is_free(monitored, ahead, capfd):
 
 def test_drives_that_can_do_more_stop_sooner_and_before_the_hand():
     node, stops = Node('choice'), []
-    usual = declare_parameters(node)
+    usual = without_separation(node)
     strong = MotionLimits(usual.limits.velocity, np.full(4, 10.0), np.full(4, 400.0))
     for limits in (usual.stop_limits, strong):
         monitored = Monitored(node, replace(usual, stop_limits=limits))

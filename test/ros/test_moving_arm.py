@@ -13,13 +13,13 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
+from monitored import without_separation  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface.inputs import Input, Inputs, InputSnapshot  # noqa: E402
-from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
@@ -70,7 +70,7 @@ class Clock:
 def _ask(monkeypatch):
     """Give what asks for a plan at a time since a motion began [s]."""
     node = Node('moving_arm')
-    parameters, planner = declare_parameters(node), InProcessPlanner()
+    parameters, planner = without_separation(node), InProcessPlanner()
 
     def ask(motion, since, is_known=True, tick=2e-4, reading=0.0, checking=None, pace=1.0):
         clock, disagreement = Clock(BEGIN + since, tick), Revalidation.disagreement

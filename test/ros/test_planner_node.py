@@ -130,6 +130,7 @@ def _start(spinning, wait_until, request):
     namespace = f'/test_{abs(hash(request.node.name)) % 10**9}'
 
     def start(**parameters):
+        parameters = {'separation': False} | parameters
         given = [Parameter(name=name, value=value) for name, value in parameters.items()]
         planner = PlannerNode(InProcessPlanner(), namespace=namespace, parameter_overrides=given)
         stranger = Stranger(namespace, wait_until)
@@ -1269,7 +1270,8 @@ def _process():
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_process_even_while_it_plans(process, spinning, wait_until, number):
     namespace = f'/process_{number}'
-    options = [word for k, v in ENDLESS.items() for word in ('-p', f'{k}:={v}')]
+    given = ENDLESS | {'separation': 'false'}
+    options = [word for k, v in given.items() for word in ('-p', f'{k}:={v}')]
     running = process('--ros-args', '-r', f'__ns:={namespace}', *options)
     stranger = Stranger(namespace, wait_until)
     with spinning(stranger.node):

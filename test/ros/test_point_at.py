@@ -86,7 +86,9 @@ class Bystander(Node):
 def planner(ros_context):
     """Have a planner running as a process."""
     with ChildProcess(
-        'rrth_planner.ros.planner_node', ['--ros-args', '-p', 'seed:=3'], lambda _: None
+        'rrth_planner.ros.planner_node',
+        ['--ros-args', '-p', 'seed:=3', '-p', 'separation:=false'],
+        lambda _: None,
     ) as child:
         yield child
 

@@ -115,7 +115,9 @@ def _run(ros_context, tmp_path_factory):
     bodies.publish(wearer())
     with (
         ChildProcess(
-            'rrth_planner.ros.planner_node', ['--ros-args', '-p', 'seed:=1'], lines.append
+            'rrth_planner.ros.planner_node',
+            ['--ros-args', '-p', 'seed:=1', '-p', 'separation:=false'],
+            lines.append,
         ),
         ChildProcess('rrth_planner.ros.playback_node', [], lines.append),
     ):

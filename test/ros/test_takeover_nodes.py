@@ -65,7 +65,7 @@ def _body():
 def test_handovers_to_new_targets_are_without_a_jump(wait_until, send, ask, spinning, settings):
     client, said, answers = Client(), [], []
     planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
-    ros = ['--ros-args', '-p', 'seed:=7']
+    ros = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
     options = [part for name, value in settings.items() for part in ('-p', f'{name}:={value}')]
     with (
         ChildProcess(planner, ros, lambda _: None) as one,

@@ -202,7 +202,11 @@ def _wire(ros_context):
     planner = PlannerNode(
         InProcessPlanner(),
         namespace='/fire',
-        parameter_overrides=[Parameter('time_limit', value=0.2), Parameter('replan', value=False)],
+        parameter_overrides=[
+            Parameter('time_limit', value=0.2),
+            Parameter('replan', value=False),
+            Parameter('separation', value=False),
+        ],
     )
     yield Wire(planner)
     planner.close()
@@ -395,7 +399,11 @@ def test_after_all_of_this_a_good_motion_is_followed(playback):
 
 
 def test_whatever_comes_over_the_wire_the_nodes_live_on(spinning, send, wait_until):
-    planner = PlannerNode(InProcessPlanner(), namespace='/wire')
+    planner = PlannerNode(
+        InProcessPlanner(),
+        namespace='/wire',
+        parameter_overrides=[Parameter('separation', value=False)],
+    )
     playback = PlaybackNode(namespace='/wire')
     stranger, motions = Node('stranger', namespace='/wire'), []
     topics = {
