@@ -133,7 +133,8 @@ def _move(
 
     arm, frames = parameters.arm, Frames(client, parameters.base_frame)
     if body is not None:
-        client.publish(body)
+        # With separation an old body is none.
+        (client.publish if parameters.separation is None else client.stand)(body)
     client.publish(target)
     report.take(answer_from_text(client.ask(PATIENCE).message))
     if report.exit_code != DONE:

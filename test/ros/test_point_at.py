@@ -110,6 +110,20 @@ def arm(planner):
 
 
 @pytest.mark.slow
+def test_with_separation_the_body_of_a_file_stands_there_until_the_arm_has_arrived(ros_context):
+    separated = ['--ros-args', '-r', '__ns:=/separated']
+    settings = ['-p', 'separation:=true', '-p', 'seed:=3']
+    with (
+        ChildProcess('rrth_planner.ros.planner_node', [*separated, *settings], lambda _: None),
+        ChildProcess('rrth_planner.ros.playback_node', separated, lambda _: None),
+    ):
+        report = report_of(*(1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START, *separated, '--'))
+    assert report['exit_code'] == 0, report
+    assert report['arrived'] is True
+    assert report['pointing_error'] < 1e-3
+
+
+@pytest.mark.slow
 def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
     # Volatile subscribers must be known to the planner before it publishes.
     wait_until(lambda: bystander.count_publishers('joint_trajectory'), START)

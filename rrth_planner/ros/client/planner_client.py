@@ -42,6 +42,8 @@ NODE = 'rrth_planner'
 NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
 # Between two requests to a planner that still lacks an input [s].
 PAUSE = 0.3
+# A wearer who stands still is published so often [s].
+STANDING = 0.02
 # Of an arm at the end of a motion of the demo: greatest deviation [rad] and speed [rad/s].
 ARRIVED, STILL = 1e-3, 1e-6
 
@@ -172,6 +174,11 @@ class PlannerClient(Node):
         # The request that follows must not overtake the message.
         if not publisher.wait_for_all_acked(Duration(seconds=self.timeout)):
             raise NotInTimeError(f'{publisher.topic}: not acknowledged within {self.timeout:g} s')
+
+    def stand(self, body: MarkerArray) -> None:
+        """Publish a body as `publish` does, and again as long as messages are received."""
+        self.publish(body)
+        self.create_timer(STANDING, lambda: self._publishers_by_type[MarkerArray].publish(body))
 
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
