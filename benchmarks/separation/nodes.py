@@ -115,7 +115,6 @@ class Wearer:
         self.lock = Lock()
         self._is_over = Event()
         self._thread = Thread(target=self._run, daemon=True)
-        self._deleted: str | None = None
         self._n_hands = 0
 
     def __enter__(self) -> 'Wearer':
@@ -138,9 +137,7 @@ class Wearer:
 
     def remove_hand(self) -> None:
         """Let the hand be gone."""
-        if self.reaching is not None:
-            self._deleted = self.reaching.names[-1]
-            self.reaching = None
+        self.reaching = None
 
     def _run(self) -> None:
         due = time.monotonic()
@@ -157,10 +154,8 @@ class Wearer:
             boxes = reaching.scene.boxes
             with self.lock:
                 rows = reaching.rows(np.array([now.nanoseconds * 1e-9]))[0]
-        markers = []
-        if self._deleted is not None:
-            markers.append(Marker(ns=self._deleted, action=Marker.DELETE))
-            self._deleted = None
+        # Whole bodies: a planner that stands still may miss that a hand is gone.
+        markers = [Marker(action=Marker.DELETEALL)]
         for box, row in zip(boxes, rows, strict=True):
             marker = Marker(ns=box.name, text=box.name, type=Marker.CUBE, action=Marker.ADD)
             p, o = marker.pose.position, marker.pose.orientation
