@@ -12,12 +12,19 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
 from conftest import spinning, wait_until
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.errors import RrthError
 from rrth_planner.ros.client.viewer_feed import following, SERVICE, ViewerFeed
+from rrth_planner.ros.interface.separation_status import (
+    RATE_KEY,
+    separation_to_msg,
+    SeparationState,
+    SeparationStatus,
+)
 from rrth_planner.ros.middleware.qos import LATCHED
 from rrth_planner.ros.planner import PlannerNode
 from rrth_planner.ros.playback_node import PlaybackNode
@@ -123,6 +130,27 @@ def test_a_failed_request_is_reported_and_the_next_one_is_made(ros_context):
     feed._on_answer(future)
     assert not feed._is_asking
     assert feed.said.startswith('no answer of the planner: no way out')
+    feed.destroy_node()
+
+
+def test_the_feed_knows_how_a_motion_is_executed_and_rejects_what_is_no_state(ros_context):
+    feed = ViewerFeed()
+    assert feed.separation is None
+    slowed = SeparationStatus(
+        SeparationState.SLOWED, 'bar is too near to head', 0.25, 'bar', 'head'
+    )
+    for status in (SeparationStatus(), slowed):
+        feed._on_state(separation_to_msg('planner', status))
+        assert feed.separation == status
+    assert feed.said.startswith(
+        'SLOWED: bar is too near to head, at 25% of its speed; waiting for'
+    )
+    for name, rate in (('SLOW', '0.5'), ('NORMAL', 'fast'), ('NORMAL', 'nan'), ('NORMAL', None)):
+        values = [] if rate is None else [KeyValue(key=RATE_KEY, value=rate)]
+        feed._on_state(DiagnosticStatus(message=name, values=values))
+        assert feed.separation == slowed
+    feed._on_state(separation_to_msg('planner', SeparationStatus(rate=1.004)))
+    assert feed.separation == SeparationStatus()
     feed.destroy_node()
 
 

@@ -28,7 +28,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
-from rrth_planner.ros.interface.separation_status import RATE_KEY
+from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -73,8 +73,9 @@ class ViewerFeed(Node):
         self._states = self.create_subscription(
             DiagnosticStatus, f'{PLANNER}/state', self._on_state, LATCHED
         )
-        # Whether motions come as stretches, and how they are executed then.
-        self._is_separated, self._state = False, ''
+        # Whether motions come as stretches, and how they are executed then; None: not known.
+        self._is_separated = False
+        self.separation: SeparationStatus | None = None
         self._targets = self.create_publisher(PointStamped, 'target', LATCHED)
         self._client = self.create_client(Trigger, SERVICE)
         # The last motion that was published.
@@ -118,7 +119,11 @@ class ViewerFeed(Node):
         if not self._client.service_is_ready():
             missing.append(f'service {self._client.srv_name}')
         waiting = f'waiting for {", ".join(missing)}' if missing else ''
-        said = '; '.join(filter(None, (self._state, self._answer, waiting)))
+        status, state = self.separation, ''
+        if status is not None:
+            cause = f': {one_line(status.cause)}' if status.cause else ''
+            state = f'{status.state.name}{cause}, at {status.rate:.0%} of its speed'
+        said = '; '.join(filter(None, (state, self._answer, waiting)))
         return said or 'drag the target, or press Plan'
 
     def ask(self, target: Array | None = None) -> None:
@@ -167,8 +172,10 @@ class ViewerFeed(Node):
             self._is_asking = False
 
     def _on_state(self, msg: DiagnosticStatus) -> None:
-        rate = next((pair.value for pair in msg.values if pair.key == RATE_KEY), '')
-        self._state = f'{one_line(msg.message)}, at {float(rate):.0%} of its speed' if rate else ''
+        try:
+            self.separation = separation_from_msg(msg)
+        except MessageError as problem:
+            self.get_logger().warning(f'{self._states.topic_name} rejected: {problem}')
 
     def _on_planned_motion(self, msg: JointTrajectory, arrival: Arrival) -> None:
         self._is_separated = False

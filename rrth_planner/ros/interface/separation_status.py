@@ -4,8 +4,10 @@
 
 from dataclasses import dataclass
 from enum import Enum
+import math
 
 from diagnostic_msgs.msg import DiagnosticStatus
+from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.diagnostics import status_to_msg
 
 
@@ -39,7 +41,7 @@ class SeparationStatus:
     box: str = ''
 
 
-RATE_KEY = 'rate [-]'
+RATE_KEY, BAR_KEY, BOX_KEY = 'rate [-]', 'part of the arm', 'box'
 LEVELS = {
     SeparationState.NORMAL: DiagnosticStatus.OK,
     SeparationState.SLOWED: DiagnosticStatus.OK,
@@ -52,5 +54,24 @@ def separation_to_msg(name: str, status: SeparationStatus) -> DiagnosticStatus:
     """Return the message of `~/state`; its message begins with the name of the state."""
     state = status.state
     text = f'{state.name}: {status.cause}' if status.cause else state.name
-    values = {RATE_KEY: f'{status.rate:.3f}', 'part of the arm': status.bar, 'box': status.box}
+    values = {RATE_KEY: f'{status.rate:.3f}', BAR_KEY: status.bar, BOX_KEY: status.box}
     return status_to_msg(name, LEVELS[state], text, values)
+
+
+def separation_from_msg(msg: DiagnosticStatus) -> SeparationStatus:
+    """Return what a message of `~/state` says, or raise MessageError where it is none."""
+    values = {pair.key: pair.value for pair in msg.values}
+    name, _, cause = msg.message.partition(': ')
+    try:
+        state, rate = SeparationState[name], float(values[RATE_KEY])
+    except (KeyError, ValueError):
+        rate = math.nan
+    if not math.isfinite(rate):
+        raise MessageError(
+            f'message "{one_line(msg.message)}" with "{RATE_KEY}" '
+            f'{one_line(values.get(RATE_KEY, "missing"))}, expected one of '
+            f'{", ".join(SeparationState.__members__)} and a number [-]'
+        )
+    # A profile of limited jerk may go beyond by rounding.
+    rate = min(max(rate, 0.0), 1.0)
+    return SeparationStatus(state, cause, rate, values.get(BAR_KEY, ''), values.get(BOX_KEY, ''))

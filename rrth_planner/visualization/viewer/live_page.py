@@ -16,6 +16,8 @@ from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
 FRAME = 1.0 / 30.0
+# Colours of a motion that is slowed down or stopped for a wearer who moves, by the state.
+STATE_COLOURS = {'SLOWED': (232, 138, 32), 'PROTECTIVE_STOP': (209, 50, 70), 'FAULT': (30, 30, 30)}
 
 
 class LivePage:
@@ -54,11 +56,16 @@ class LivePage:
         positions = feed.positions
         if positions is not None and self._is_new('positions', positions):
             self.view.show_configuration(positions, target)
-        trajectory = feed.trajectory
-        if trajectory is not None and self._is_new('trajectory', trajectory):
+        trajectory, status = feed.trajectory, feed.separation
+        if status is not None:
+            self.panel.rate.draw(status.rate, time.monotonic())
+        colour = None if status is None else STATE_COLOURS.get(status.state.name)
+        # Both are taken note of.
+        is_new = self._is_new('trajectory', trajectory) | self._is_new('colour', colour)
+        if trajectory is not None and is_new:
             curve = trajectory_curve(feed.arm, trajectory)
             corners = tool_positions(feed.arm, trajectory.positions[[0, -1]])
-            self.view.show_path('timed', curve, corners)
+            self.view.show_path('timed', curve, corners, colour)
         said = feed.said
         if self._drawn.get('said') != said:
             self._drawn['said'] = said

@@ -9,6 +9,7 @@ from typing import Any
 
 from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
 from rrth_planner.visualization.viewer.planning_worker import Response
+from rrth_planner.visualization.viewer.rate_chart import RateChart
 from rrth_planner.visualization.viewer.scene_view import FIRST, SHORT, TIMED, TREES
 import viser
 
@@ -89,8 +90,10 @@ class Panel:
             brand_color=BRAND,
         )
         gui.set_panel_label('rrth_planner')
-        with gui.add_folder('Response'):
+        response = gui.add_folder('Response')
+        with response:
             self.said = gui.add_html(response_html(Response()))
+        self.rate = RateChart(response, gui)
         with gui.add_folder('Target'):
             self.target_example = gui.add_dropdown('example', (OWN, *TARGETS))
             self.target = gui.add_vector3(

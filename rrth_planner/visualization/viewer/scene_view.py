@@ -176,9 +176,16 @@ class SceneView:
             handles.append(self._dots(f'/tree/nodes_{k}', nodes, colour, 0.011))
         self._replace('tree', handles)
 
-    def show_path(self, layer: str, curve: Array, corners: Array) -> None:
-        """Draw a path of the tool, (n, 3), and its waypoints, (m, 3), in a layer of PATHS [m]."""
-        colour, width = PATHS[layer]
+    def show_path(
+        self, layer: str, curve: Array, corners: Array, colour: Color | None = None
+    ) -> None:
+        """
+        Draw a path of the tool, (n, 3), and its waypoints, (m, 3), in a layer of PATHS [m].
+
+        colour: None for that of the layer.
+        """
+        own, width = PATHS[layer]
+        colour = own if colour is None else colour
         handles = self._lines(f'/{layer}/line', segments_of(curve), colour, width)
         if len(corners):
             handles.append(self._dots(f'/{layer}/corners', corners, colour, 2.6 * width))
