@@ -346,6 +346,13 @@ def _judge(
     distances = distances_to(the_arm(), q_fine, v_fine, reaching.names, rows, contact, 0.05)
     classes = classes_of(distances)
     found.words.append(worst_class(classes))
+    for i, bar, box in np.argwhere(classes == FAST)[:1]:
+        tqdm.write(
+            f'{trial.what}: bar {bar} at {distances.speeds[i, bar, box]:.3f} m/s and '
+            f'"{reaching.names[box]}" {times[i] - times[0]:.3f} s after the event, joint states up'
+            f' to {1e3 * np.diff(stamps).max():.0f} ms apart',
+            file=sys.stderr,
+        )
     found.fastest = max(
         found.fastest, float(distances.speeds[distances.fast <= 0.0].max(initial=0))
     )
