@@ -330,6 +330,8 @@ def fast_distances(
             if any(part == bar.name and is_called(box.name, name) for part, name in arm.allowed):
                 continue
             near = _distances(middle[:, None], box)[:, 0] - half - bar.radius <= within[:, k]
+            if not near.any():
+                continue
             for part in (0, 1):
                 rows = near & (parts[:, part, 0] <= parts[:, part, 1])
                 least = _least_distances(ends[rows, b], parts[rows, part], box) - bar.radius
