@@ -18,7 +18,8 @@ from rrth_planner.visualization.arm_view import draw_motion
 
 JOINT_COLOURS = ('#1b6ca8', '#d1495b', '#2f9e6e', '#c98a1b', '#7a4fa3', '#4c5560')
 LIMIT, GRID, DASHES = '#30343b', '#e4e6ea', (0, (5, 3))
-ROW_SIZE = (13.0, 5.4)
+# Of a motion, and height of the rates below all of them [inch].
+ROW_SIZE, STRIP = (13.0, 5.4), 2.2
 TIME_STEP = 0.005
 LEGEND: dict[str, Any] = {'fontsize': 8, 'frameon': False, 'columnspacing': 1.2}
 
@@ -39,6 +40,7 @@ def motion_figure(
     motions: Sequence[Motion],
     limits: MotionLimits,
     ray_guard_length: float,
+    rates: Array | None = None,
 ) -> Figure:
     """
     Return a figure of motions, a row each: left the arm on its wearer, right the joints' curves.
@@ -49,10 +51,13 @@ def motion_figure(
         Drawn as dashed lines, in the colours of the joints.
     ray_guard_length : float
         How much of the pointing ray stays clear in motion [m].
+    rates : ndarray, shape (n, 2), optional
+        Times [s], and the rate of motions beside a wearer who moves from then on [-]; drawn below.
 
     """
     n = len(motions)
-    figure = Figure(figsize=(ROW_SIZE[0], ROW_SIZE[1] * n), facecolor='white')
+    strip = 0.0 if rates is None else STRIP
+    figure = Figure(figsize=(ROW_SIZE[0], ROW_SIZE[1] * n + strip), facecolor='white')
     FigureCanvasAgg(figure)
     height = figure.get_figheight()
     rows = figure.add_gridspec(
@@ -62,7 +67,7 @@ def motion_figure(
         left=0.0,
         right=0.985,
         top=1.0 - 0.75 / height,
-        bottom=0.6 / height,
+        bottom=(0.6 + strip) / height,
         wspace=0.1,
         hspace=0.3,
     )
@@ -77,7 +82,20 @@ def motion_figure(
         _draw_curves(position, velocity, arm, motion.trajectory, limits)
         title = f'Pointing at "{motion.label}"\n{motion.caption}'.rstrip()
         position.set_title(title, loc='left', fontsize=11, fontweight='bold')
+    if rates is not None:
+        axes = figure.add_axes((0.06, 0.55 / height, 0.925, (strip - 0.85) / height))
+        _draw_rates(axes, rates)
     return figure
+
+
+def _draw_rates(axes: Axes, rates: Array) -> None:
+    axes.step(rates[:, 0], rates[:, 1], where='post', color=JOINT_COLOURS[0], lw=2.0)
+    axes.set_title('Beside a person at work', loc='left', fontsize=11, fontweight='bold')
+    axes.set_xlabel('time [s]')
+    axes.set_ylabel('rate [-]')
+    axes.set_xlim(rates[0, 0], rates[-1, 0])
+    axes.set_ylim(0.0, 1.05)
+    plain(axes)
 
 
 def _draw_curves(
