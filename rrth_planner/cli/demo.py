@@ -3,9 +3,10 @@
 """The demo: planner and playback nodes, targets, a person at work; checked and drawn."""
 
 import argparse
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, ExitStack
 from functools import partial
+from itertools import pairwise
 import math
 import os
 import sys
@@ -19,7 +20,11 @@ from rclpy.signals import SignalHandlerOptions
 from rrth_planner.cli import ros_parsers
 from rrth_planner.cli.program import interrupt_on_signals, INTERRUPTED
 from rrth_planner.collision.motion_inspection import inspect_motion
-from rrth_planner.collision.reference_checker import first_contact, least_clearance
+from rrth_planner.collision.separation_inspection import (
+    inspect_separation,
+    SeparationInspection,
+    Sights,
+)
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
@@ -27,23 +32,30 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
-from rrth_planner.ros.client.planner_client import DemoClient, DemoError
+from rrth_planner.model.separation import Separation
+from rrth_planner.ros.client.planner_client import (
+    DemoClient,
+    DemoError,
+    parameters_of_planner,
+)
+from rrth_planner.ros.interface.separation_status import SeparationState
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
-from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.messages.joint_state import joint_reading
 from rrth_planner.ros.messages.message_file import message_from_file
+from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from rrth_planner.visualization.motion_figure import Motion, motion_figure
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import MarkerArray
 
 POINTING_TOLERANCE = 1e-3
 DOTS_PER_INCH = 110
 # Beside these seconds of a person at work the arm points at these targets; at other times he bends
-# forward so fast that his head would meet an arm that stands still.
-PERSON, PERSON_TARGETS = ('--begin', '1.2', '--end', '5.2'), ('low', 'front')
-# Until a new publisher is known to all nodes [s]; so many bodies come before the first request.
-MATCHED, FIRST_BODIES = 1.0, 30
+# forward so fast that his head would meet an arm that stands still. A busy machine, too, has time
+# for 30 bodies per second.
+PERSON = ('--begin', '1.2', '--end', '5.2', '--fps', '30')
+PERSON_TARGETS = ('low', 'front')
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -80,32 +92,55 @@ def _run(options: argparse.Namespace) -> None:
     domain = os.environ['ROS_DOMAIN_ID']
     print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
     print('The first start compiles the planner, which may take a minute or two.', flush=True)
+    children: list[ChildProcess] = []
+
+    @contextmanager
+    def started(name: str, module: str, words: Sequence[str]) -> Iterator[None]:
+        with ChildProcess(f'rrth_planner.{module}', words, partial(_show, name)) as child:
+            children.append(child)
+            try:
+                yield
+            finally:
+                children.remove(child)
+
+    def planner(separation: str) -> AbstractContextManager[None]:
+        own = ['-p', f'seed:={options.seed}', '-p', f'separation:={separation}']
+        words = ['--ros-args', '--params-file', str(planner_file), *own]
+        return started('planner', 'ros.planner_node', words)
+
+    def check() -> None:
+        for child in children:
+            child.check()
+
     with ExitStack() as stack:
-        children = []
-        for name, file, extra in (
-            ('planner', planner_file, ['-p', f'seed:={options.seed}']),
-            ('playback', resource_path('config/playback.yaml'), []),
-        ):
-            words = ['--ros-args', '--params-file', str(file), *extra]
-            child = ChildProcess(f'rrth_planner.ros.{name}_node', words, partial(_show, name))
-            children.append(stack.enter_context(child))
-
-        def check() -> None:
-            for child in children:
-                child.check()
-
+        playback_file = str(resource_path('config/playback.yaml'))
+        words = ['--ros-args', '--params-file', playback_file]
+        stack.enter_context(started('playback', 'ros.playback_node', words))
+        # The body is published once: beside one that stands still nobody has to keep watching.
+        first = stack.enter_context(ExitStack())
+        first.enter_context(planner('false'))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
         client = DemoClient(arm, options.timeout, check)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
         client.publish(body)
-        lines, figure = _visit(client, settings, frame, body, targets)
-        figure.savefig(options.output, dpi=DOTS_PER_INCH)
+        lines, motions = _visit(client, settings, frame, body, targets)
+        first.close()
+        client.wait_for_end_of_planner()
+        client.withdraw_body()
         print('The wearer is now a person at work, as he was recorded.', flush=True)
-        child = ChildProcess('rrth_planner.cli.wearer', PERSON, partial(_show, 'wearer'))
-        children.append(stack.enter_context(child))
-        beside = _beside_a_person(client, settings, frame, body)
+        stack.enter_context(planner('true'))
+        stack.enter_context(started('wearer', 'cli.wearer', PERSON))
+        client.wait_for_nodes()
+        separation, error = _beside_a_person(client, frame)
+    # Once nobody else needs the processors.
+    beside = _sentences(client, separation, frame, error)
+    scene = scene_of(WearerBody().apply(body, math.inf, frame))
+    figure = motion_figure(
+        arm, scene, motions, settings.limits, settings.ray_guard_length, _rates(client)
+    )
+    figure.savefig(options.output, dpi=DOTS_PER_INCH)
     print('\n' + '\n'.join([HEADER, *lines, *beside]))
     print(f'\nEvery motion passed an independent collision check. Picture: {options.output}')
 
@@ -116,9 +151,9 @@ def _visit(
     frame: str,
     body: MarkerArray,
     targets: dict[str, PointStamped],
-) -> tuple[list[str], Any]:
-    """Return one table row per target, and the figure of all motions."""
-    arm, limits, length = client.arm, settings.limits, settings.ray_guard_length
+) -> tuple[list[str], list[Motion]]:
+    """Return one table row per target, and the motions."""
+    arm = client.arm
     scene = scene_of(WearerBody().apply(body, math.inf, frame))
     motions, lines = [], []
     for name, message in targets.items():
@@ -130,11 +165,11 @@ def _visit(
             arm,
             scene,
             trajectory,
-            limits,
+            settings.limits,
             q_present=q_present,
             target=target,
             margin=settings.margin,
-            ray_guard_length=length,
+            ray_guard_length=settings.ray_guard_length,
         )
         client.wait_for_arrival(trajectory)
         error = _checked_error(client, name, target)
@@ -151,7 +186,7 @@ def _visit(
                 f'{1e3 * found.clearance:.0f} mm clearance, planned in {planning_time:.0f} ms',
             )
         )
-    return lines, motion_figure(arm, scene, motions, limits, length)
+    return lines, motions
 
 
 def _checked_error(client: DemoClient, name: str, target: Array) -> float:
@@ -162,70 +197,92 @@ def _checked_error(client: DemoClient, name: str, target: Array) -> float:
     return error
 
 
-def _beside_a_person(
-    client: DemoClient, settings: PlanSettings, frame: str, before: MarkerArray
-) -> list[str]:
-    """Point beside a person at work who replaces the wearer before; return a line per target."""
-    client.wait_for(
-        lambda: client.count_publishers('body_boxes') > 1, 'the publisher of the person at work'
-    )
-    # The planner, too, is to have found it before the other body is deleted.
-    client.receive_for(MATCHED)
-    client.publish(_without(before))
-    client.see_bodies()
-    client.wait_for(lambda: len(client.bodies) >= FIRST_BODIES, 'body_boxes of the person at work')
-    lines = []
+def _beside_a_person(client: DemoClient, frame: str) -> tuple[Separation, float]:
+    """
+    Point beside a person at work, and keep what is published meanwhile.
+
+    Return what the planner assumes, and by how much the ray misses the targets at most [m].
+    """
+    separation = parameters_of_planner(client).separation
+    if separation is None:
+        raise DemoError('the planner is without separation, expected one with it')
+    client.see_separation()
+    client.wait_for(lambda: bool(client.bodies), 'body_boxes of the person at work')
+    client.wait_for(lambda: bool(client.statuses), 'rrth_planner/state')
+    client.observed, errors = [], []
     for name in PERSON_TARGETS:
         message = _example(f'target_{name}', PointStamped)
         target = goal_from_msg(message, frame).target
         client.publish(message)
-        client.observed = []
-        n_stops = client.point(partial(_aims_at, client, target))
-        clearance, n_bodies = _clearance_beside(client, settings, frame)
-        error = _checked_error(client, name, target)
-        lines.append(
-            f'{name:10} beside a person at work: {n_stops} stops, {clearance:.3f} m clearance at '
-            f'every instant from {n_bodies} bodies, and the ray misses the target by '
-            f'{1e3 * error:.3f} mm'
-        )
-    return lines
+        client.point(partial(_aims_at, client, target))
+        errors.append(_checked_error(client, name, target))
+    # Bodies that were measured until the last state may still be on their way.
+    last = seconds_of(client.observed[-1].header.stamp)
+    client.wait_for(lambda: _measured(_body(client.bodies[-1])) >= last, 'body_boxes')
+    return separation, max(errors)
+
+
+def _sentences(client: DemoClient, separation: Separation, frame: str, error: float) -> list[str]:
+    """Return what was seen beside a person; raise RrthError where the arm was not separate."""
+    found, rules = _inspected(client, separation, frame), separation.rules
+    n_stops = sum(
+        status.state is SeparationState.PROTECTIVE_STOP is not before.state
+        for (_, before), (_, status) in pairwise(client.statuses)
+    )
+    n_targets, share = len(PERSON_TARGETS), 100.0 * found.n_faster / found.n_frames
+    return [
+        f'Beside a person at work, with separation: {n_targets} of {n_targets} targets reached '
+        f'(the ray misses them by at most {1e3 * error:.3f} mm) with {found.n_commitments} '
+        f'commitments, protective stops: {n_stops}, least rate {_rates(client)[:, 1].min():.2f}. '
+        f'Parts of him were faster than assumed in {share:.1f} % of {found.n_frames} frames.',
+        'Each commitment ends at rest and is clear of wherever he may be by then (exceptions: '
+        f'{found.n_excused} near parts faster than assumed, {found.n_unknown} where bodies are '
+        f'missing). At {found.n_instants} instants no part of the arm above '
+        f'{rules.contact_speed:g} m/s was in contact with him (exceptions: {found.n_contacts} '
+        'with parts faster than assumed).',
+    ]
+
+
+def _rates(client: DemoClient) -> Array:
+    """Return the rates that were published and when, up to the last joint state, (n, 2)."""
+    rates = [(time, status.rate) for time, status in client.statuses]
+    rates.append((seconds_of(client.observed[-1].header.stamp), rates[-1][1]))
+    begin = seconds_of(client.observed[0].header.stamp)
+    return np.array([(max(time - begin, 0.0), rate) for time, rate in rates])
 
 
 def _aims_at(client: DemoClient, target: Array, q: Array) -> bool:
     return pointing_error(client.arm, q, target) <= POINTING_TOLERANCE
 
 
-def _without(body: MarkerArray) -> MarkerArray:
-    """Return the array that deletes the boxes of another one, and nothing else."""
-    markers = [m for m in body.markers if m.action == Marker.ADD]
-    return MarkerArray(markers=[Marker(ns=m.ns, id=m.id, action=Marker.DELETE) for m in markers])
-
-
-def _clearance_beside(client: DemoClient, settings: PlanSettings, frame: str) -> tuple[float, int]:
-    """
-    Return the least clearance of all observed states, and from how many bodies.
-
-    Each is checked against the boxes of the newest body that was measured until then. Raises
-    DemoError where the arm or its ray was in contact with one.
-    """
-    arm, length = client.arm, settings.ray_guard_length
-    states = client.observed[:]
-    taken = np.array([seconds_of(msg.header.stamp) for msg in states])
-    q = np.array([configuration_from_msg(msg, arm.joint_names) for msg in states])
-    # Bodies that were measured until the last state may still be on their way.
-    client.wait_for(lambda: _measured(_body(client.bodies[-1])) >= taken[-1], 'body_boxes')
+def _inspected(client: DemoClient, separation: Separation, frame: str) -> SeparationInspection:
+    """Return what became of all that was published."""
+    names = client.joint_names
+    taken = np.array([seconds_of(msg.header.stamp) for msg in client.observed])
+    readings = [
+        joint_reading(msg, names, time, None)
+        for msg, time in zip(client.observed, taken, strict=True)
+    ]
     bodies = [_body(data) for data in client.bodies]
-    measured = np.array([_measured(body) for body in bodies])
-    newest = np.searchsorted(measured, taken, side='right') - 1
-    clearances = []
-    for k in np.unique(newest):
+    sights = Sights(
+        np.array([_measured(body) for body in bodies]),
         # Whenever it was measured: it is the newest of its time.
-        scene = scene_of(WearerBody().apply(bodies[max(k, 0)], math.inf, frame))
-        contact = first_contact(arm, scene, q[newest == k], length, 0.0)
-        if contact is not None:
-            raise DemoError(f'bar {contact.bar} of the arm was in contact with {contact.box}')
-        clearances.append(least_clearance(arm, scene, q[newest == k], length))
-    return min(clearances), len(clearances)
+        tuple(scene_of(WearerBody().apply(body, math.inf, frame)) for body in bodies),
+    )
+    commitments = [
+        (seconds_of(msg.header.stamp), joint_trajectory_from_msg(msg, names))
+        for msg in client.commitments
+    ]
+    return inspect_separation(
+        client.arm,
+        separation.rules,
+        separation.margin,
+        sights,
+        commitments,
+        taken,
+        np.array([reading.positions for reading in readings]),
+        np.array([reading.velocities for reading in readings]),
+    )
 
 
 def _body(data: bytes) -> MarkerArray:

@@ -7,6 +7,7 @@ import time
 from typing import Any
 import warnings
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.duration import Duration
@@ -28,6 +29,7 @@ from rrth_planner.ros.interface.parameters import (
     parameters_from_values,
     PlannerParameters,
 )
+from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
 from rrth_planner.ros.messages.joint_state import configuration_from_msg
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -197,7 +199,10 @@ class DemoClient(PlannerClient):
         """Create publishers, subscriptions and the client of the planner."""
         super().__init__('rrth_demo', timeout, check)
         self.arm = arm
+        # As `see_separation` keeps them; statuses with the time when they were sent [s].
         self.bodies: list[bytes] = []
+        self.commitments: list[JointTrajectory] = []
+        self.statuses: list[tuple[float, SeparationStatus]] = []
 
     def wait_for_nodes(self) -> None:
         """Wait for the planner, for joint states, and for a subscriber of the motions."""
@@ -227,41 +232,50 @@ class DemoClient(PlannerClient):
             trajectory.duration + self.timeout,
         )
 
-    def see_bodies(self) -> None:
-        """Keep every body that is published from now on, serialized, in `bodies`."""
-        # To decode them takes longer than the arm's states leave time for.
-        many, keep = QoSProfile(depth=1000), self.bodies.append
-        self.create_subscription(MarkerArray, 'body_boxes', keep, many, raw=True)
+    def withdraw_body(self) -> None:
+        """Withdraw the body that was published: a planner that starts does not receive it."""
+        self.destroy_publisher(self._publishers_by_type.pop(MarkerArray))
 
-    def point(self, q_aims: Callable[[Array], bool]) -> int:
+    def wait_for_end_of_planner(self) -> None:
+        """Wait until the service of a planner that has ended is gone."""
+        self.wait_for(lambda: not self._plan.service_is_ready(), 'the end of the planner')
+
+    def see_separation(self) -> None:
+        """Keep every body, serialized, commitment and status that is published from now on."""
+        many = QoSProfile(depth=1000)
+        # To decode bodies takes longer than the arm's states leave time for.
+        self.create_subscription(MarkerArray, 'body_boxes', self.bodies.append, many, raw=True)
+        self.create_subscription(
+            JointTrajectory, 'joint_trajectory', self.commitments.append, many
+        )
+        topic = f'{NODE}/state'
+        OpenSubscription(self, DiagnosticStatus, topic, self._on_separation)
+
+    def _on_separation(self, msg: DiagnosticStatus, arrival: Arrival) -> None:
+        self.statuses.append((1e-9 * arrival.sent[0], separation_from_msg(msg)))
+
+    def point(self, q_aims: Callable[[Array], bool]) -> None:
         """
-        Request a motion beside a wearer who moves, and again until the arm aims; return its stops.
+        Request a motion beside a wearer who moves, and again until the arm aims at rest.
 
         `q_aims` says whether a configuration, (dof,) [rad], aims at the target that was published.
-        While he is in the way requests are rejected, or the planner stops the arm and replans.
+        While he is in the way requests are rejected, or the planner stops the arm, goes on, or
+        plans again.
         """
         end = time.monotonic() + self.timeout
-        self.commanded = []
         sentence = 'none was planned'
         while time.monotonic() < end:
-            response = self.ask(self.timeout)
-            sentence = response.message
+            sentence = self.ask(self.timeout).message
             moved = time.monotonic()
-            # The planner may be about to plan again: it is asked once it leaves the arm at rest.
+            # The planner may be about to go on: it is asked once it leaves the arm at rest.
             while time.monotonic() - moved < PAUSE:
                 self.take_messages()
-                if not self._is_at_end():
+                q = self.positions()
+                if not self.is_still_at(q, ARRIVED, STILL):
                     moved = time.monotonic()
-                elif q_aims(self.positions()):
-                    return sum(any(msg.points[0].velocities) for msg in self.commanded)
+                elif q_aims(q):
+                    return
         raise DemoError(f'the arm did not aim at its target within {self.timeout:g} s: {sentence}')
-
-    def _is_at_end(self) -> bool:
-        """Return whether the arm stands still at the end of the last commanded motion."""
-        if not self.commanded:
-            return True
-        motion = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
-        return self.is_still_at(motion.positions[-1], ARRIVED, STILL)
 
 
 def is_matched(node: Node, publisher: Publisher) -> bool:
