@@ -259,16 +259,17 @@ class Commitments:
         begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
         if reading is None or len(begun) < 2:
             return False
+        gap = np.inf
         # What was commanded until then, by all of them in turn.
-        lagging = []
         for time_ago in np.arange(0.0, LONGEST_LAG, LAG_STEP):
             then = reading.taken - time_ago
             last = next((c for c in reversed(begun) if c.start_time <= then), begun[0])
-            lagging.append(_gap(last, reading, time_ago))
-        gap = min(lagging)
+            gap = min(gap, _gap(last, reading, time_ago))
+            if gap <= ASIDE:
+                return False
         gaps = [_gap(c, reading, 0.0) for c in begun[:-1]]
         k = int(np.argmin(gaps))
-        if gap <= ASIDE or gaps[k] >= NEARER * gap:
+        if gaps[k] >= NEARER * gap:
             return False
         self.present = begun[k]
         self._recent = deque([begun[k]], maxlen=REMEMBERED)
