@@ -61,6 +61,8 @@ NOTHING, KILLED, STOPPED = 'nothing', 'SIGKILL', f'SIGSTOP of {STANDSTILL:g} s'
 PATIENCE, LONGEST = 3.0, 20.0
 # What joint states 10 ms apart say of a speed is uncertain by so much [m/s].
 UNCERTAIN = 5e-3
+# Joint states so near to a contact are looked at [s].
+BESIDE = 0.1
 # An arm this near to the end of the planned motion has played out all of it [rad].
 AT_END = 1e-3
 
@@ -347,10 +349,15 @@ def _judge(
     classes = classes_of(distances)
     found.words.append(worst_class(classes))
     for i, bar, box in np.argwhere(classes == FAST)[:1]:
+        # Where a commitment comes too late, the arm jumps, and its velocities do not say so.
+        steps = np.diff(stamps)[:, None]
+        jumps = np.abs(np.diff(q, axis=0) - 0.5 * (v[1:] + v[:-1]) * steps).max(axis=1)
+        near = np.abs(stamps[1:] - stamps[0] - times[i]) < BESIDE
         tqdm.write(
             f'{trial.what}: bar {bar} at {distances.speeds[i, bar, box]:.3f} m/s and '
-            f'"{reaching.names[box]}" {times[i] - times[0]:.3f} s after the event, joint states up'
-            f' to {1e3 * np.diff(stamps).max():.0f} ms apart',
+            f'"{reaching.names[box]}" {times[i] - times[0]:.3f} s after the event; nearby joint '
+            f'states are up to {1e3 * steps[near].max():.0f} ms apart, and jump by up to '
+            f'{jumps[near].max():.4f} rad',
             file=sys.stderr,
         )
     found.fastest = max(
