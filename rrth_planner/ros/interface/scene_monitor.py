@@ -44,8 +44,7 @@ class SceneMonitor:
     on_change : callable, optional
         Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
-        Called after each body, with the wearer since then, its time of arrival [ns], and whether
-        it is the newest of those that came.
+        Called after each body, with the wearer since then, and its time of arrival [ns].
     on_error : callable, optional
         Called after an unexpected error, with its name and message.
 
@@ -57,7 +56,7 @@ class SceneMonitor:
         parameters: PlannerParameters,
         inputs: Inputs,
         on_change: Callable[[], None] = lambda: None,
-        on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
+        on_body: Callable[[WearerBody, int], None] = lambda body, arrived: None,
         on_error: Callable[[str], None] = lambda what: None,
     ) -> None:
         """Subscribe."""
@@ -75,11 +74,7 @@ class SceneMonitor:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
         # The monitor waits for bodies.
-        fast: dict[str, Any] = {
-            'decode': fast_decoder(MarkerArray),
-            'takes_late': True,
-            'takes_all': True,
-        }
+        fast: dict[str, Any] = {'decode': fast_decoder(MarkerArray), 'takes_late': True}
         self._subscriptions = [
             OpenSubscription(
                 node, kind, topic, take, partial(self._reject, source), on_error, **options
@@ -97,7 +92,7 @@ class SceneMonitor:
 
         self._take(source, read, self._now())
         if source is self._inputs.body:
-            self._notify_body(source.value, time.time_ns(), True)
+            self._notify_body(source.value, time.time_ns())
 
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
@@ -138,7 +133,7 @@ class SceneMonitor:
         measured = measured_at(edits, now - self._latency)
         self._take(body, read, measured, is_news=arrival.is_newer is None)
         self._inputs.body_came()
-        self._notify_body(body.value, arrived, not arrival.is_followed)
+        self._notify_body(body.value, arrived)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:
