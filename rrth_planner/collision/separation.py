@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 import functools
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,21 +45,13 @@ def first_unproven(
     boxes = body.scene.boxes
     if not boxes or len(trajectory.times) == 1:
         return None
-    robot, chain = arm_rows(arm, 0.0)
     found = np.empty(2)
     blocking = first_blocked(
         trajectory.times,
         *trajectory.states,
         begin,
         rules.contact_speed,
-        moving_joints(arm),
-        chain,
-        robot,
-        body.scene.numbers,
-        box_classes(arm, body.scene),
-        mount_inverse(arm),
-        growth_at(body, rules, margin + SLACK, 0.0),
-        body.speeds,
+        *_numbers_of(arm, body, growth_at(body, rules, margin + SLACK, 0.0)),
         BERNSTEIN_4,
         BERNSTEIN_3,
         found,
@@ -85,7 +78,6 @@ def permitted_ahead(
     as he will be known when such a stop begins; margin [m]. An estimate: `first_unproven` proves.
     """
     arm, rules = settings.arm, settings.rules
-    robot, chain = arm_rows(arm, 0.0)
     found = np.empty((n_rates, 3))
     permitted_rates(
         piece_coefficients(motion),
@@ -95,17 +87,18 @@ def permitted_ahead(
         *settings.limits.rows[1:],
         *settings.stop_limits.rows[1:],
         rules.contact_speed,
-        moving_joints(arm),
-        chain,
-        robot,
-        body.scene.numbers,
-        box_classes(arm, body.scene),
-        mount_inverse(arm),
-        growth_at(body, rules, margin + SLACK, settings.stretch),
-        body.speeds,
+        *_numbers_of(arm, body, growth_at(body, rules, margin + SLACK, settings.stretch)),
         found,
     )
     return found
+
+
+def _numbers_of(arm: ArmModel, body: SeenBody, growths: Array) -> tuple[Any, ...]:
+    """Return arm and wearer as the kernels take them; growths (m,): of the boxes [m]."""
+    robot, chain = arm_rows(arm, 0.0)
+    numbers, classes = body.scene.numbers, box_classes(arm, body.scene)
+    sight = numbers, classes, mount_inverse(arm), growths, body.speeds
+    return moving_joints(arm), chain, robot, *sight
 
 
 @functools.lru_cache(maxsize=16)
