@@ -380,6 +380,25 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
+def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(5, hand)
+    n, sights = len(arm.published), arm.monitor._commitments._body.n_seen
+    arm.now += FRAME
+    arm.read(*arm.commanded(arm.now)[:2])
+    part = BodyPart((replace(hand, center=hand.center + 0.08),), float('inf'), arm.now - 0.02)
+    body = WearerBody(((('hand', 0), part),))
+    arm.monitor.on_body(body, 0, is_newest=False)
+    assert len(arm.published) == n
+    assert arm.monitor._commitments._body.n_seen == sights + 1
+    assert arm.monitor._commitments._body.n_faster == 1
+    arm.frames(1, hand)
+    assert len(arm.published) > n
+
+
 def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
     arm = separated()
     arm.begin()

@@ -22,6 +22,7 @@ from rrth_planner.ros.messages.marker_edits import read_edits  # noqa: E402
 from rrth_planner.ros.messages.marker_order import MarkerOrder  # noqa: E402
 from rrth_planner.ros.middleware.open_subscription import (  # noqa: E402
     Copies,
+    MOST_AT_ONCE,
     OpenSubscription,
     REMEMBERED,
 )
@@ -285,3 +286,28 @@ def test_of_a_stream_only_the_newest_message_is_read_from_every_publisher(wait_u
         wait_until(lambda: 4.0 in received)
     assert received == [3.0, 4.0]
     assert not stream._reliable
+
+
+@pytest.mark.usefixtures('ros_context')
+def test_all_that_a_reader_holds_is_taken_at_once_and_the_last_one_is_known(wait_until, spinning):
+    node, sender, received = Node('subscriber'), Node('sender'), []
+    OpenSubscription(
+        node,
+        PointStamped,
+        'held',
+        lambda msg, arrival: received.append((msg.point.x, arrival.is_followed)),
+        takes_all=True,
+    )
+    publisher = sender.create_publisher(PointStamped, 'held', QoSProfile(depth=50))
+    with spinning(node):
+        # The reader for reliable publishers as well.
+        wait_until(lambda: publisher.get_subscription_count() == 2)
+    # The node is late.
+    n = MOST_AT_ONCE + 4
+    for x in range(n):
+        publisher.publish(target(float(x)))
+    time.sleep(0.2)
+    with spinning(node):
+        wait_until(lambda: len(received) >= n)
+    lasts = (MOST_AT_ONCE - 1, n - 1)
+    assert received == [(float(x), x not in lasts) for x in range(n)]

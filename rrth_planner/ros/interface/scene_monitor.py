@@ -44,7 +44,8 @@ class SceneMonitor:
     on_change : callable, optional
         Called on the first message of a topic, on a rejection, and on the next good message.
     on_body : callable, optional
-        Called after each body, with the wearer since then, and its time of arrival [ns].
+        Called after each body, with the wearer since then, its time of arrival [ns], and whether
+        it is the newest of those that came.
     on_error : callable, optional
         Called after an unexpected error, with its name and message.
 
@@ -56,7 +57,7 @@ class SceneMonitor:
         parameters: PlannerParameters,
         inputs: Inputs,
         on_change: Callable[[], None] = lambda: None,
-        on_body: Callable[[WearerBody, int], None] = lambda body, arrived: None,
+        on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
         on_error: Callable[[str], None] = lambda what: None,
     ) -> None:
         """Subscribe."""
@@ -74,7 +75,11 @@ class SceneMonitor:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
         # The monitor waits for bodies.
-        fast: dict[str, Any] = {'decode': fast_decoder(MarkerArray), 'takes_late': True}
+        fast: dict[str, Any] = {
+            'decode': fast_decoder(MarkerArray),
+            'takes_late': True,
+            'takes_all': True,
+        }
         self._subscriptions = [
             OpenSubscription(
                 node, kind, topic, take, partial(self._reject, source), on_error, **options
@@ -92,7 +97,7 @@ class SceneMonitor:
 
         self._take(source, read, self._now())
         if source is self._inputs.body:
-            self._notify_body(source.value, time.time_ns())
+            self._notify_body(source.value, time.time_ns(), True)
 
     def goal(self, msg: PointStamped) -> PointingGoal:
         """Return the goal of a request's own target, or raise MessageError."""
@@ -133,7 +138,7 @@ class SceneMonitor:
         measured = measured_at(edits, now - self._latency)
         self._take(body, read, measured, is_news=arrival.is_newer is None)
         self._inputs.body_came()
-        self._notify_body(body.value, arrived)
+        self._notify_body(body.value, arrived, not arrival.is_followed)
 
     def _on_target(self, msg: PointStamped, _: Arrival) -> None:
         if not msg.header.frame_id:

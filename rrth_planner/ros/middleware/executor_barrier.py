@@ -98,14 +98,14 @@ class ExecutorBarrier:
         for reader in list(self._node.subscriptions):
             # No more than these can have come before.
             for _ in range(max(1, reader.qos_profile.depth)):
-                message = _taken(reader)
+                message = taken(reader)
                 if message is None:
                     break
                 reader.callback(*message)
                 yield
 
 
-def _taken(reader: Subscription) -> tuple[Any, ...] | None:
+def taken(reader: Subscription) -> tuple[Any, ...] | None:
     """Return the next message that a reader holds, as its callback takes it."""
     with reader.handle:
         found: tuple[Any, ...] | None = reader.handle.take_message(reader.msg_type, reader.raw)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A subscription that matches every publisher: best effort, reliable, or latched."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 import time
 import traceback
@@ -17,8 +17,11 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 from rrth_planner.model.errors import MessageError, one_line
 from rrth_planner.ros.messages.fields import Stamp
+from rrth_planner.ros.middleware.executor_barrier import taken
 
 DEPTH = 50
+# So many messages are taken at once, so that other callbacks have their turn.
+MOST_AT_ONCE = 16
 # Longer messages are not decoded, which would block the node: half a second for a megabyte of
 # markers.
 MOST_BYTES = 512 * 1024
@@ -57,12 +60,15 @@ class Arrival:
     is_newer : callable or None
         Of a late message, which came after one that was sent later: whether another message was
         sent after it. None: the message is not late, as far as is known.
+    is_followed : bool
+        Whether another message follows at once.
 
     """
 
     sent: Stamp
     received: int
     is_newer: Callable[[Stamp], bool] | None = None
+    is_followed: bool = False
 
 
 class Copies:
@@ -138,6 +144,9 @@ class OpenSubscription:
         Turns the bytes of a message into one; without, rclpy does.
     takes_late : bool, optional
         Without, late messages are dropped, since the last one wins.
+    takes_all : bool, optional
+        What else a reader holds is taken together with a message: else a node that is slower than
+        its publisher for a while would go on with old messages, since it takes one in each round.
     is_stream : bool, optional
         Nobody wants a message that is not the newest: one waits at most, none is sent again, and
         there is one reader, which halves the work.
@@ -154,6 +163,7 @@ class OpenSubscription:
         on_error: Callable[[str], None] = lambda what: None,
         decode: Callable[[bytes], Any] | None = None,
         takes_late: bool = False,
+        takes_all: bool = False,
         is_stream: bool = False,
     ) -> None:
         """Subscribe."""
@@ -161,7 +171,7 @@ class OpenSubscription:
         self._on_message, self._on_rejection, self._on_error = on_message, on_rejection, on_error
         self._decode, self._copies = decode, Copies(takes_late)
         self._reliable: dict[DurabilityPolicy, Subscription] = {}
-        self._is_stream = is_stream
+        self._is_stream, self._takes_all = is_stream, takes_all
         profile = QoSProfile(
             depth=1 if is_stream else DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT
         )
@@ -208,12 +218,31 @@ class OpenSubscription:
 
     def _on_copy(self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None) -> None:
         """Take a copy of a message from a reader; None: the one that matches all publishers."""
-        sent = info['source_timestamp'], info['publication_sequence_number']
-        # Not every middleware has the time of reception.
-        received = info.get('received_timestamp') or time.time_ns()
-        arrival = self._copies.take(sent, received, reader)
-        if arrival is not None:
-            self._deliver(data, arrival)
+        arrived = []
+        for copy, about in self._with_others(data, info, reader):
+            sent = about['source_timestamp'], about['publication_sequence_number']
+            # Not every middleware has the time of reception.
+            received = about.get('received_timestamp') or time.time_ns()
+            arrival = self._copies.take(sent, received, reader)
+            if arrival is not None:
+                arrived.append((copy, arrival))
+        for copy, arrival in arrived[:-1]:
+            self._deliver(copy, replace(arrival, is_followed=True))
+        for copy, arrival in arrived[-1:]:
+            self._deliver(copy, arrival)
+
+    def _with_others(
+        self, data: bytes, info: dict[str, Any], reader: DurabilityPolicy | None
+    ) -> Iterator[tuple[bytes, dict[str, Any]]]:
+        """Yield a copy, and what else its reader holds if all is to be taken."""
+        yield data, info
+        if self._takes_all:
+            source = self._live if reader is None else self._reliable[reader]
+            for _ in range(MOST_AT_ONCE - 1):
+                found = taken(source)
+                if found is None:
+                    return
+                yield found[0], found[1]
 
     def _deliver(self, data: bytes, arrival: Arrival) -> None:
         """Decode a message and call the callback; an error in either does not end the node."""

@@ -199,13 +199,18 @@ class ExecutionMonitor:
         stop = fast_stop(running.trajectory, phase, self._parameters.stop_limits)
         return ExecutingMotion(trajectory=stop, start_time=start)
 
-    def on_body(self, body: WearerBody, arrived: int) -> None:
-        """Check the remaining motion against a body that arrived at a time [ns]."""
+    def on_body(self, body: WearerBody, arrived: int, is_newest: bool = True) -> None:
+        """
+        Check the remaining motion against a body that arrived at a time [ns].
+
+        Of bodies that came together the newest is checked; all of them say how fast parts are.
+        """
 
         def check() -> None:
             separation = self._reporter.parameters.separation
             self._commitments.observe(body, separation, self._now())
-            self._check_remaining_motion(body, arrived)
+            if is_newest:
+                self._check_remaining_motion(body, arrived)
 
         self._run_fail_safe(check)
 
