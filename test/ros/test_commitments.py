@@ -380,6 +380,17 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
+def test_where_commitments_take_longer_to_find_they_last_longer(separated):
+    arm, hand, stretches = separated(), near(0.3), []
+    arm.see(hand)
+    for took in (0.0, 0.015):
+        arm.begin()
+        arm.monitor._commitments._took = took
+        arm.frames(1, hand)
+        stretches.append(arm.monitor._commitments.present.stretch)
+    assert 0.01 < stretches[1] - stretches[0] < 0.02
+
+
 def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):
     arm = separated()
     hand = near(0.3)

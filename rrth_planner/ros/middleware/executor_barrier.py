@@ -94,21 +94,27 @@ class ExecutorBarrier:
             self._tasks.popleft()()
 
     def _reading(self) -> Iterator[None]:
-        """Process the messages that the node's readers hold, one at each step."""
+        """Process the messages that the node's readers hold, one callback at each step."""
+        begin = time.time_ns()
         for reader in list(self._node.subscriptions):
             # No more than these can have come before.
             for _ in range(max(1, reader.qos_profile.depth)):
-                message = taken(reader)
-                if message is None:
+                found = taken(reader)
+                if found is None:
                     break
-                reader.callback(*message)
+                message, info = found
+                has_info = reader._callback_type is Subscription.CallbackType.WithMessageInfo
+                reader.callback(message, *((info,) if has_info else ()))
                 yield
+                # A callback may take further ones; not every middleware has this time.
+                if (info.get('received_timestamp') or 0) > begin:
+                    break
 
 
-def taken(reader: Subscription) -> tuple[Any, ...] | None:
-    """Return the next message that a reader holds, as its callback takes it."""
+def taken(reader: Subscription) -> tuple[Any, dict[str, Any]] | None:
+    """Return the next message that a reader holds, and what the middleware says of it."""
     with reader.handle:
-        found: tuple[Any, ...] | None = reader.handle.take_message(reader.msg_type, reader.raw)
-    if found is None or reader._callback_type is Subscription.CallbackType.WithMessageInfo:
-        return found
-    return found[:1]
+        found: tuple[Any, dict[str, Any]] | None = reader.handle.take_message(
+            reader.msg_type, reader.raw
+        )
+    return found

@@ -21,7 +21,7 @@ from rrth_planner.ros.middleware.executor_barrier import taken
 
 DEPTH = 50
 # So many messages are taken at once, so that other callbacks have their turn.
-MOST_AT_ONCE = 16
+MOST_AT_ONCE = 8
 # Longer messages are not decoded, which would block the node: half a second for a megabyte of
 # markers.
 MOST_BYTES = 512 * 1024
@@ -237,12 +237,12 @@ class OpenSubscription:
         """Yield a copy, and what else its reader holds if all is to be taken."""
         yield data, info
         if self._takes_all:
-            source = self._live if reader is None else self._reliable[reader]
+            source = self._live if reader is None else self._reliable.get(reader, self._live)
             for _ in range(MOST_AT_ONCE - 1):
                 found = taken(source)
                 if found is None:
                     return
-                yield found[0], found[1]
+                yield found
 
     def _deliver(self, data: bytes, arrival: Arrival) -> None:
         """Decode a message and call the callback; an error in either does not end the node."""

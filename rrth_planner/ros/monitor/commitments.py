@@ -35,8 +35,8 @@ FULL_RATE = 0.995
 RESUME_AFTER = 0.2
 # What comes less often is no stream of bodies [s]; how fast a long pause between two is forgotten.
 LONGEST_PERIOD, FADING = 0.25, 0.98
-# A commitment lasts until the next body is there and processed: its period times so much, and that
-# long [s].
+# A commitment lasts until the next one is there: the period of the bodies times so much, what that
+# takes to find, and so long until the controller has it [s].
 PERIODS, PROCESSING = 1.3, 0.012
 # So many commitments are remembered. An arm that is further from the present one than this [rad]
 # executes another one where the distance to that is less than this share.
@@ -72,6 +72,8 @@ class Commitments:
         self._blocked = -np.inf
         # How long after each other bodies come, at most lately [s], and when the last one came.
         self._period, self._came = 0.0, -np.inf
+        # How long it takes from a body to its commitment, at most lately [s].
+        self._took = 0.0
         # Until then the present commitment is not extended: a handover was planned from it [s].
         self._held_until = -np.inf
 
@@ -209,7 +211,9 @@ class Commitments:
             is_stopping = now - present.start_time > present.stretch
             self._report(found, float(path_state(present, now)[1]), is_stopping)
             return None
-        if time.perf_counter() - begin > LATEST:
+        took = time.perf_counter() - begin
+        self._took = max(min(took, LATEST), FADING * self._took)
+        if took > LATEST:
             # The arm is on its way to rest by now: from there the next one goes on.
             return None
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
@@ -225,7 +229,8 @@ class Commitments:
 
     def _stretched(self, separation: Separation) -> Separation:
         """Return the settings for commitments that last until the next body."""
-        stretch = max(separation.stretch, PERIODS * self._period + PROCESSING)
+        # Where this process has to wait for a processor, so has the controller, as a rule.
+        stretch = max(separation.stretch, PERIODS * self._period + PROCESSING + self._took)
         return replace(separation, stretch=stretch)
 
     def _may_resume(self, now: float, parameters: PlannerParameters) -> bool:
