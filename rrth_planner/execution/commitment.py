@@ -27,7 +27,7 @@ N_RATES, SPACING_AHEAD, BEYOND = 21, 0.03, 0.9
 GENTLE, RAMP = 0.5, 0.5
 # Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
 OF_PRESENT, OF_PERMITTED = (1.0, 0.7), (0.5, 0.25)
-# The least rate that is tried where the permitted one is lower [-].
+# The least rate that is tried: a motion at a much lower one would last for hours [-].
 LEAST = 0.03
 # Shares of the permitted rate that a motion from rest may begin with.
 BEGINNINGS = (1.0, 0.5, 0.2)
@@ -157,10 +157,10 @@ def extended(
     Return the commitment that replaces the present one from a time on [s].
 
     body: the wearer at that time. None where the present one leads to the end of the motion, is
-    over, or has arrived there; where no longer one is proven, what keeps it from it: then the
-    present one, which is proven, ends in its stop.
+    over, has arrived there, or is in a stop that ends at rest first; where no longer one is proven,
+    what keeps it from it: then the present one, which is proven, ends in its stop.
     """
-    if commitment.is_whole:
+    if commitment.is_whole or is_in_sharp_stop(commitment, time, settings):
         return None
     state = path_state(commitment, time)
     if state[0] >= commitment.motion.duration - END:
@@ -168,6 +168,18 @@ def extended(
     elapsed = time - commitment.start_time
     held = continued(commitment.profile, elapsed) if elapsed <= commitment.stretch else None
     return _committed(commitment.motion, time, state, held, body, settings)
+
+
+def is_in_sharp_stop(commitment: Commitment, time: float, settings: Separation) -> bool:
+    """
+    Return whether a commitment is at a time [s] in a stop with more jerk than a motion may have.
+
+    It is not left before it has ended: a controller to which that came 20 ms late would jump by
+    more than 2e-4 rad, and mostly the arm brakes harder than a motion may.
+    """
+    is_sharp = bool((settings.stop_limits.jerk > settings.limits.jerk).any())
+    elapsed = time - commitment.start_time
+    return is_sharp and commitment.stretch < elapsed < commitment.trajectory.duration
 
 
 def _committed(
@@ -188,12 +200,11 @@ def _committed(
         blocked = blocked or found
         return found is None
 
-    target = permitted(motion, float(state[0]), body, settings)
-    lower = [min(target, share * float(state[1])) for share in OF_PRESENT]
-    lower += [share * target for share in OF_PERMITTED]
-    if target < LEAST:
-        lower.append(LEAST)
-    for n, rate in enumerate((target, *lower)):
+    target = max(permitted(motion, float(state[0]), body, settings), LEAST)
+    slower = (min(target, share * float(state[1])) for share in OF_PRESENT)
+    rates = [target, *(rate for rate in slower if rate >= LEAST)]
+    rates += [max(share * target, LEAST) for share in OF_PERMITTED]
+    for n, rate in enumerate(dict.fromkeys(rates)):
         profile = steered(motion, state, rate, settings.limits)
         if profile is None and n == 0:
             # At a limit already: the rate goes on changing as it was to.

@@ -20,7 +20,7 @@ from rrth_planner.execution.commitment import (
 from rrth_planner.model.arm import bar_names
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.separation import seen_body, SeparationRules
-from rrth_planner.model.trajectory import part_of, sample
+from rrth_planner.model.trajectory import MotionLimits, part_of, sample
 from rrth_planner.timing.fast_stop import fast_stop
 from rrth_planner.timing.parameterization import excess
 from rrth_planner.timing.rate_profile import rate_state, scaled, steady, steered
@@ -141,14 +141,14 @@ def body_far_away():
     return Scene(tuple(replace(box, center=box.center + [30.0, 0.0, 0.0]) for box in boxes))
 
 
-def stretches(motion):
-    """Return some commitments of a motion that end in a stop on the way, and their body."""
+def stretches(motion, settings=SETTINGS):
+    """Return some commitments of a motion that end in a stop on the way."""
     body, found, time = body_at(), [], 0.0
-    present = first_commitment(motion, time, body, SETTINGS)
+    present = first_commitment(motion, time, body, settings)
     while isinstance(present, Commitment) and not present.is_whole and len(found) < 30:
         found.append(present)
         time += PERIOD
-        present = extended(present, time, body, SETTINGS) or present
+        present = extended(present, time, body, settings) or present
     return found[::12]
 
 
@@ -204,6 +204,41 @@ def test_a_motion_arrives_that_is_extended_late_within_the_stop_or_after_it(paus
             assert has_arrived(last)
             n_paused += last.start_time > pause_at
     assert n_paused >= 2
+
+
+def late_jump(before, after):
+    """Return how far an arm jumps to a commitment that is up to 20 ms late [rad, rad/s]."""
+    late = np.linspace(0.0, 0.02, 6)
+    one = sample(before.trajectory, after.start_time - before.start_time + late)
+    other = sample(after.trajectory, late)
+    return [np.abs(one[k] - other[k]).max() for k in (0, 1)]
+
+
+@pytest.mark.parametrize(('acceleration', 'jerk'), [(4.0, 40.0), (10.0, 400.0)])
+def test_a_controller_that_is_20_ms_late_jumps_by_next_to_nothing(acceleration, jerk):
+    stop = MotionLimits(
+        velocity=limits().velocity, acceleration=np.full(4, acceleration), jerk=np.full(4, jerk)
+    )
+    settings, body = replace(SETTINGS, stop_limits=stop), body_at(scene=body_far_away())
+    n_extended = n_stopping = n_resumed = 0
+    for motion in motions():
+        for before in stretches(motion, settings):
+            end = before.trajectory.duration
+            for elapsed in (PERIOD, *np.arange(0.03, end + 0.1, 0.01)):
+                after = extended(before, before.start_time + elapsed, body, settings)
+                if isinstance(after, Commitment):
+                    n_extended += elapsed == PERIOD
+                    n_resumed += elapsed >= end
+                    jump, speed_jump = late_jump(before, after)
+                    assert jump <= JUMP
+                    assert speed_jump <= SPEED_JUMP
+                    # However slow the arm is there, what is intended has an end.
+                    assert scaled(motion, after.profile).duration < 40.0 * motion.duration
+                elif before.stretch < elapsed < end:
+                    n_stopping += after is None
+    assert min(n_extended, n_resumed) > 10
+    # The motion goes on from a sharp stop only once that has ended.
+    assert (n_stopping > 50) == (jerk == 400.0)
 
 
 def committed(motion, profile):

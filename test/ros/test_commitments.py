@@ -170,6 +170,27 @@ def test_where_no_body_comes_any_more_the_arm_stops_and_goes_on_with_the_next_on
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
+def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why(separated):
+    arm = separated(stop_acceleration=[10.0], stop_jerk=[400.0])
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    n = len(arm.published)
+    # The stop has begun.
+    arm.frames(4, sees=False)
+    arm.frames(1, hand)
+    status = arm.statuses[-1]
+    assert status.state is SeparationState.PROTECTIVE_STOP
+    assert status.cause.startswith('the next body came too late')
+    trajectory, begin = arm.published[-1]
+    arm.frames(30, hand)
+    assert arm.published[n][1] >= begin + trajectory.duration
+    assert arm.statuses[-1].state is SeparationState.SLOWED
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
 def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
     arm = separated()
     hand = near(0.2)

@@ -41,8 +41,9 @@ from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 NODE = 'rrth_planner'
-NO_INPUT_YET = 'UNABLE_TO_AQUIRE_SENSOR_DATA'
-# Between two requests to a planner that still lacks an input [s].
+# Codes of a planner that lacks an input, or a recent one: that may come a moment later.
+LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE_STALE')
+# Between two requests to a planner that lacks an input [s].
 PAUSE = 0.3
 # A wearer who stands still is published so often [s].
 STANDING = 0.02
@@ -152,13 +153,13 @@ class PlannerClient(Node):
         return all(abs(self.state.velocity[names.index(n)]) <= speed for n in self.joint_names)
 
     def ask(self, patience: float) -> Trigger.Response:
-        """Return the planner's answer; ask again while it lacks an input, for a time [s]."""
+        """Return the planner's answer; ask again while it lacks a recent input, for a time [s]."""
         end = time.monotonic() + patience
         while True:
             future = self._plan.call_async(Trigger.Request())
             self.wait_for(future.done, 'an answer of rrth_planner/plan')
             answer = future.result()
-            if not answer.message.startswith(NO_INPUT_YET) or time.monotonic() >= end:
+            if not answer.message.startswith(LACKS_INPUT) or time.monotonic() >= end:
                 return answer
             self.receive_for(PAUSE)
 

@@ -14,6 +14,7 @@ from rrth_planner.execution.commitment import (
     Commitment,
     extended,
     first_commitment,
+    is_in_sharp_stop,
     JUMP_WAY,
     path_state,
 )
@@ -45,6 +46,8 @@ REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # A commitment that takes longer to find is not published [s]: the arm has gone on meanwhile.
 LATEST = 0.02
+# Why a stop takes place that nothing made necessary.
+LATE_BODY = 'the next body came too late: the motion goes on from rest'
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
 
@@ -68,8 +71,8 @@ class Commitments:
         self._last: WearerBody | None = None
         # Why no motion may begin until `reset`; and whether the one that stopped may go on.
         self.fault, self._is_reset = '', False
-        # When it was last not proven that the motion may go on [s].
-        self._blocked = -np.inf
+        # When it was last not proven that the motion may go on [s], and what kept it from that.
+        self._blocked, self._blocked_by = -np.inf, Blocked(0.0, '', '')
         # How long after each other bodies come, at most lately [s], and when the last one came.
         self._period, self._came = 0.0, -np.inf
         # How long it takes from a body to its commitment, at most lately [s].
@@ -202,12 +205,16 @@ class Commitments:
                 waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, 'waits for ~/reset', 0.0)
                 self._reporter.separation_status(waits)
             return None
+        if is_in_sharp_stop(present, now, separation):
+            blocked = self._blocked_by if self._blocked >= present.start_time else None
+            self._report(blocked, float(path_state(present, now)[1]), True)
+            return None
         seen = body_at(self._body, now, separation.rules)
         found = extended(present, now, seen, self._stretched(separation))
         if found is None:
             return None
         if isinstance(found, Blocked):
-            self._blocked = now
+            self._blocked, self._blocked_by = now, found
             is_stopping = now - present.start_time > present.stretch
             self._report(found, float(path_state(present, now)[1]), is_stopping)
             return None
@@ -298,13 +305,15 @@ class Commitments:
         return first_unproven(rest, 0.0, arm, seen, rules, margin) is None
 
     def _report(self, blocked: Blocked | None, rate: float, is_stopping: bool) -> None:
-        if blocked is not None and is_stopping:
+        if is_stopping:
             state = SeparationState.PROTECTIVE_STOP
         elif rate < FULL_RATE:
             state = SeparationState.SLOWED
         else:
             state = SeparationState.NORMAL
-        cause = '' if blocked is None else f'{blocked.bar} is too near to {blocked.box}'
+        cause = LATE_BODY if is_stopping else ''
+        if blocked is not None:
+            cause = f'{blocked.bar} is too near to {blocked.box}'
         self._reporter.separation_status(
             SeparationStatus(
                 state,
