@@ -24,7 +24,8 @@ NODE = 'rrth_planner.ros.planner_node'
 SAMPLE, PER_BODY = 100, 20
 # Wearers that the requests go through again and again.
 N_BODIES = 25
-ARGUMENTS = ['--ros-args', '-p', 'seed:=7']
+# Bodies are sent once, before the request.
+ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
 
 
 def tasks(extent: Extent) -> list[Task]:

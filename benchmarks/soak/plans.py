@@ -25,8 +25,10 @@ from benchmarks.soak.judge import EACH, FREE, judge_bytes, MARGIN, name_of, newe
 from benchmarks.soak.looks import Look, look_at
 
 NODE = 'rrth_planner.ros.planner_node'
-# The arm of this part stands where it is said to: a brake is not followed by another plan.
-ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'replan:=false', '--log-level', 'warn']
+# The arm of this part stands where it is said to: a brake is not followed by another plan. Whole
+# motions are judged, which are published without separation.
+ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'replan:=false', '-p', 'separation:=false']
+ARGUMENTS += ['--log-level', 'warn']
 # Plans round one wearer, fewest starts of so many drawn, plans between looks at the memory.
 PER_WEARER, STARTS, DRAWS, SAMPLE = 1000, 30, 2000, 20
 # Bodies before a motion that it may have been planned round.

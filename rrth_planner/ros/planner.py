@@ -66,6 +66,7 @@ class PlannerNode(Node):
         super().__init__(NAME, **kwargs)
         parameters = declare_parameters(self)
         self._compile()
+        from rrth_planner.execution.warm_up import warm_up
         from rrth_planner.pipeline.planning_process import PlanningProcess
 
         # It loads in parallel to the node.
@@ -78,6 +79,14 @@ class PlannerNode(Node):
         )
         try:
             self._create_components(parameters)
+            # In this process, while the other one loads.
+            warm_up(
+                parameters.arm,
+                parameters.stop_limits,
+                parameters.margin,
+                parameters.ray_guard_length,
+                parameters.separation,
+            )
             self._planner.warm_up(parameters.arm, parameters.options, parameters.second_checker)
         except BaseException:
             self._planner.close()

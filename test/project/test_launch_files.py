@@ -140,7 +140,7 @@ def test_the_demo_starts_everything_on_the_packages_files(stand_in):
     assert description['robot_description'] == (ROOT / 'urdf/arm.urdf').read_text(encoding='utf-8')
     assert started(found, 'rviz2')['arguments'] == ['-d', str(ROOT / 'rviz/rrth_planner.rviz')]
     (command,) = [kwargs['cmd'] for name, kwargs in found if name == 'ExecuteProcess']
-    assert command[:5] == ['ros2', 'topic', 'pub', '--rate', '1']
+    assert command[:5] == ['ros2', 'topic', 'pub', '--rate', '50']
     assert command[5:7] == ['/body_boxes', 'visualization_msgs/msg/MarkerArray']
     assert yaml.safe_load(command[7]) == load_yaml(resource_path('msg_examples/body.yaml'))
 

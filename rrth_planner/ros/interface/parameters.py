@@ -101,7 +101,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
             f'older joint positions are rejected; {by_default.format(TIMEOUTS["joint_timeout"])}',
             *given_timeout,
         ),
-        Setting('separation', False, '-', separate, is_read_only=True),
+        Setting('separation', True, '-', separate, is_read_only=True),
         Setting('contact_speed', RULES.contact_speed, 'm/s', meeting, 0.0, 10.0),
         Setting('body_speeds', SPEEDS, 'words: m/s', moving),
         Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
