@@ -331,12 +331,8 @@ def test_a_held_commitment_is_not_extended_until_then(separated):
     assert len(arm.published) > n
 
 
-def test_until_a_handover_the_controller_is_given_what_was_proven_before(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+def hand_over(arm):
+    """Have another motion replace the running one; return when [s], and where it ends [rad]."""
     handover = arm.now + 0.025
     arm.monitor.hold(handover)
     before, begun = arm.published[-1]
@@ -354,6 +350,17 @@ def test_until_a_handover_the_controller_is_given_what_was_proven_before(separat
             start_time=handover,
         )
     )
+    return handover, end
+
+
+def test_until_a_handover_the_controller_is_given_what_was_proven_before(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    before, begun = arm.published[-1]
+    handover, end = hand_over(arm)
     trajectory, start = arm.published[-1]
     assert trajectory is not before
     assert start == arm.now
@@ -367,6 +374,28 @@ def test_until_a_handover_the_controller_is_given_what_was_proven_before(separat
         assert np.abs(new - old).max() < same
     arm.frames(200, hand)
     assert np.abs(arm.commanded(arm.now)[0] - end).max() < 1e-3
+
+
+def test_where_the_controller_rejects_a_handover_the_motion_before_it_goes_on(separated):
+    arm = separated()
+    hand = near(0.3)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    kept, begin = arm.published[-1]
+    _, end = hand_over(arm)
+    assert np.abs(end - arm.motion.positions[-1]).max() > 0.1
+    n_kept = len(arm.published) - 1
+    # Nothing that belongs to the new motion reaches the controller.
+    while len(arm.monitor._reporter.monitor_state[1]) == 0 and arm.now < begin + 2.0:
+        arm.now += FRAME
+        arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
+        arm.see(hand)
+    assert 'monitoring the previous one' in arm.monitor._reporter.monitor_state[1]
+    assert arm.now < begin + 0.3
+    arm.published[:] = [*arm.published[:n_kept], *arm.published[-1:]]
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
 @pytest.mark.parametrize('resume', ['auto', 'manual'])

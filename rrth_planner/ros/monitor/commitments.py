@@ -63,6 +63,8 @@ class Commitments:
         """Begin with no motion, and a wearer who was never seen."""
         self._reporter, self._publishers = reporter, publishers
         self.planned: ExecutingMotion | None = None
+        # The motion that it replaced.
+        self._replaced: ExecutingMotion | None = None
         self.present: Commitment | None = None
         # The last ones, in their order: a controller may have rejected one.
         self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
@@ -142,15 +144,18 @@ class Commitments:
             )
         self._held_until = self._blocked = -np.inf
         self._is_reset = False
+        # The controller may reject what replaces a running motion.
+        replaced = [] if self.present is None else [self.present]
+        self._recent = deque([*replaced, found], maxlen=REMEMBERED)
+        self._replaced = self.planned
         self.planned, self.present, self._parameters = planned, found, parameters
-        self._recent = deque([found], maxlen=REMEMBERED)
         with suppress(Exception):
             self._report(None, float(path_state(found, found.start_time)[1]), False)
         return _executing(found, planned)
 
     def end(self) -> None:
         """Forget the running motion."""
-        self.planned = self.present = None
+        self.planned = self.present = self._replaced = None
 
     def hold(self, until: float) -> None:
         """Let the present commitment be the last one until a time [s]."""
@@ -285,6 +290,9 @@ class Commitments:
             return False
         self.present = begun[k]
         self._recent = deque([begun[k]], maxlen=REMEMBERED)
+        if self.planned is not None and begun[k].motion is not self.planned.trajectory:
+            # It is of the motion before that.
+            self.planned, self._replaced = self._replaced, None
         return True
 
     def is_separate(self, motion: ExecutingMotion, now: float) -> bool:

@@ -298,9 +298,13 @@ class ExecutionMonitor:
         begin: now [s] by `time.perf_counter`.
         """
         if self._commitments.is_active and not self.pending_stop:
+            planned = self._commitments.planned
             motion = self._commitments.extend(now, begin, self._inputs.joints.value)
             if motion is not None:
                 self._tracker.replace(motion)
+            if self._commitments.planned is not planned:
+                self._node.get_logger().error(SWITCHED[False])
+                self._set_state(MonitorState.MONITORING, SWITCHED[False])
 
     def _holds(
         self, check: Callable[..., bool], running: ExecutingMotion, phase: float, scene: Scene
