@@ -12,6 +12,7 @@ import sys
 import tempfile
 from threading import Event, Lock, Thread
 import time
+from typing import Any
 
 import numpy as np
 from rclpy.qos import QoSProfile
@@ -55,8 +56,12 @@ SET_OFF, REST = 0.2, 1e-3
 LATEST = 0.5
 # The planner stands still for so long [s].
 STANDSTILL = 1.2
+# What a planner says once it offers its service.
+READY = 'ready after'
 # What happens to the planner at that instant.
 NOTHING, KILLED, STOPPED = 'nothing', 'SIGKILL', f'SIGSTOP of {STANDSTILL:g} s'
+# Whatever was published is there by then [s].
+TAKEN = 0.1
 # Longest waits: for an arm that sets off, and that comes to rest [s].
 PATIENCE, LONGEST = 3.0, 20.0
 # What joint states 10 ms apart say of a speed is uncertain by so much [m/s].
@@ -187,6 +192,12 @@ class Client(SoakClient):
         planned = 'rrth_planner/planned_trajectory'
         self.create_subscription(JointTrajectory, planned, self._keep_end, LATCHED)
 
+    def _publish_acked(self, publisher: Any, message: Any) -> None:
+        # A planner that was killed acknowledges nothing for 20 s, and waiting for that would also
+        # keep the wearer from being published.
+        publisher.publish(message)
+        self.hear(TAKEN)
+
     def _keep(self, msg: JointTrajectory) -> None:
         self.last = msg
 
@@ -239,7 +250,12 @@ def _planners(arguments: list[str], client: Client) -> Iterator[Iterator[ChildPr
 
     def each() -> Iterator[ChildProcess]:
         while True:
-            with ChildProcess(PLANNER, arguments, lambda _: None) as child:
+            ready: list[str] = []
+            with ChildProcess(PLANNER, arguments, ready.append) as child:
+                # The service of a planner that was killed seems to be there for 20 s.
+                while not any(READY in line for line in ready):
+                    child.check()
+                    client.hear(0.1)
                 client.wait_for_service(child)
                 client.hear(LONGEST, lambda: client.states)
                 client.hear(1.0)
