@@ -376,9 +376,11 @@ def bezier_quintic(control):
 def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halves):
     """Walk a curve instant by instant: products of frames, bars clipped by slabs."""
     dof = curve.shape[1]
+    R, p = np.empty((3, 3)), np.empty(3)
+    turned, corner, end = np.empty((3, 3)), np.empty(3), np.empty(3)
     for k in range(n):
         u = k / (n - 1) if n > 1 else 0.0
-        R, p = T0[:3, :3].copy(), T0[:3, 3].copy()
+        R[:], p[:] = T0[:3, :3], T0[:3, 3]
         for i in range(dof + 1):
             value = 0.0
             if i < dof:
@@ -392,8 +394,6 @@ def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halve
             else:
                 theta += value
             ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-            corner, turned = np.empty(3), np.empty((3, 3))
-            end = np.empty(3)
             for r in range(3):
                 corner[r] = p[r] + a * R[r, 0]
                 y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
@@ -409,23 +409,33 @@ def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halve
                     continue
                 first, last = (p, corner) if side == 0 else (corner, end)
                 for j in range(centers.shape[0]):
-                    enter, leave = 0.0, 1.0
-                    for axis in range(3):
-                        at, step = 0.0, 0.0
-                        for r in range(3):
-                            at += (first[r] - centers[j, r]) * rotations[j, r, axis]
-                            step += (last[r] - first[r]) * rotations[j, r, axis]
-                        half = halves[j, axis] + radii[i]
-                        if step == 0.0:
-                            if abs(at) > half:
-                                enter = 2.0
-                        else:
-                            s, t = (-half - at) / step, (half - at) / step
-                            enter, leave = max(enter, min(s, t)), min(leave, max(s, t))
-                    if enter <= leave:
+                    if _is_touched(
+                        first, last, centers[j], rotations[j], halves[j], radii[i]
+                    ):
                         return k
-            R, p = turned, end
+            R[:], p[:] = turned, end
     return -1
+
+
+@njit
+def _is_touched(first, last, center, rotation, half, radius):
+    """Clip a bar by the slabs of a box that is grown by its radius."""
+    enter, leave = 0.0, 1.0
+    for axis in range(3):
+        at, step = 0.0, 0.0
+        for r in range(3):
+            at += (first[r] - center[r]) * rotation[r, axis]
+            step += (last[r] - first[r]) * rotation[r, axis]
+        reach = half[axis] + radius
+        if step == 0.0:
+            if abs(at) > reach:
+                return False
+        else:
+            s, t = (-reach - at) / step, (reach - at) / step
+            enter, leave = max(enter, min(s, t)), min(leave, max(s, t))
+        if enter > leave:
+            return False
+    return True
 
 
 def dense_touch(arm, scene, margin, ray, curve, n):

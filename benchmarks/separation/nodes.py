@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Separation of real nodes: hands that reach for the arm, planners that die or stand still."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 import os
@@ -24,6 +24,7 @@ from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import speed_bound
 from rrth_planner.model.trajectory import sample, Trajectory
+from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess
 from tqdm import tqdm
@@ -66,6 +67,9 @@ TAKEN = 0.1
 PATIENCE, LONGEST = 3.0, 20.0
 # What joint states 10 ms apart say of a speed is uncertain by so much [m/s].
 UNCERTAIN = 5e-3
+# A joint state so near to a commitment is of it [rad, rad/s]; so many are remembered of the time
+# before a hand leaves.
+SAME, RECENT = 1e-4, 20
 # Joint states so near to a contact are looked at [s].
 BESIDE = 0.1
 # An arm this near to the end of the planned motion has played out all of it [rad].
@@ -182,6 +186,8 @@ class Client(SoakClient):
         """Subscribe to the motions as a controller does."""
         super().__init__(folder)
         self.last: JointTrajectory | None = None
+        # All of a hand.
+        self.commitments: list[JointTrajectory] = []
         # Not latched: a planner that starts must not get a hand that is gone.
         self.bodies = self.create_publisher(MarkerArray, 'body_boxes', 10)
         # Where the planned motion ends, with separation [rad].
@@ -200,6 +206,7 @@ class Client(SoakClient):
 
     def _keep(self, msg: JointTrajectory) -> None:
         self.last = msg
+        self.commitments.append(msg)
 
     def _keep_end(self, msg: JointTrajectory) -> None:
         self.planned_end = np.array(msg.points[-1].positions)
@@ -301,6 +308,7 @@ def _one_hand(
     reaching = wearer.reaching
     assert reaching is not None
     n_states = max(0, len(client.states) - 10)
+    client.commitments = client.commitments[-RECENT:]
     begin = client.get_clock().now().nanoseconds * 1e-9
     if trial.event == KILLED:
         os.kill(child.pid, signal.SIGKILL)
@@ -355,10 +363,8 @@ def _judge(
     kept = np.concatenate([[True], np.diff(stamps) > 1e-6])
     stamps = stamps[kept]
     q, v = (np.array([s[k] for s in states])[kept] for k in (1, 2))
-    # Between two joint states the arm is where their positions and velocities lead.
-    motion = Trajectory(stamps - stamps[0], q, v, np.gradient(v, stamps, axis=0))
-    times = np.arange(begin - stamps[0], motion.duration, 1e-3)
-    q_fine, v_fine, _ = sample(motion, times)
+    times = np.arange(begin - stamps[0], stamps[-1] - stamps[0], 1e-3)
+    q_fine, v_fine = _executed(stamps, q, v, times + stamps[0], client.commitments)
     rows = reaching.rows(times + stamps[0])
     contact = trial.case.contact_speed + UNCERTAIN
     distances = distances_to(the_arm(), q_fine, v_fine, reaching.names, rows, contact, 0.05)
@@ -388,6 +394,34 @@ def _judge(
             np.abs(client.planned_end - end.positions[-1]).max() < AT_END
         )
         (found.played if is_played else found.rests).append(rest)
+
+
+def _executed(
+    stamps: Array, q: Array, v: Array, times: Array, commitments: Sequence[JointTrajectory]
+) -> tuple[Array, Array]:
+    """
+    Return the states of the arm at times, (n, dof) twice, by its joint states at stamps [s].
+
+    Between two of them it executes the commitment that leads to the later one. Where none does, it
+    is where their positions and velocities lead, whose speed is uncertain: jerks are unknown.
+    """
+    motion = Trajectory(stamps - stamps[0], q, v, np.gradient(v, stamps, axis=0))
+    q_found, v_found, _ = sample(motion, times - stamps[0])
+    names = the_arm().joint_names
+    curves = [
+        (seconds_of(m.header.stamp), joint_trajectory_from_msg(m, names)) for m in commitments
+    ]
+    for i in range(1, len(stamps)):
+        within = (stamps[i - 1] < times) & (times <= stamps[i])
+        for begin, curve in reversed(curves):
+            if begin > stamps[i] or not within.any():
+                continue
+            p, w, _ = sample(curve, [stamps[i] - begin])
+            if max(np.abs(p[0] - q[i]).max(), np.abs(w[0] - v[i]).max()) < SAME:
+                later = within & (times >= begin)
+                q_found[later], v_found[later], _ = sample(curve, times[later] - begin)
+                break
+    return q_found, v_found
 
 
 def _place_near(q: Array, rng: np.random.Generator) -> Array:

@@ -497,3 +497,27 @@ def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_co
     assert n > 30
     arm.frames(900, hand)
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
+def test_an_arm_that_rests_beside_its_commitment_goes_on_from_where_it_is(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(25, hand)
+    kept, begin = arm.published[-1]
+    arm.frames(1, hand)
+    # That one does not reach the controller.
+    lost, _ = arm.published.pop()
+    gap = np.abs(lost.positions[-1] - kept.positions[-1]).max()
+    assert 5e-4 < gap < 0.01
+    arm.monitor.hold(arm.now + 0.6)
+    n = len(arm.published)
+    while len(arm.published) == n and arm.now < begin + 2.0:
+        arm.now += FRAME
+        arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
+        arm.see(hand)
+        arm.monitor._on_timer()
+    trajectory, start = arm.published[-1]
+    assert start > begin + kept.duration
+    assert np.abs(trajectory.positions[0] - kept.positions[-1]).max() < 1e-4

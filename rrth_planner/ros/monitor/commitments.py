@@ -42,6 +42,8 @@ PERIODS, PROCESSING = 1.3, 0.012
 # So many commitments are remembered. An arm that is further from the present one than this [rad]
 # executes another one where the distance to that is less than this share.
 REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
+# At rest an arm does not lag behind: these count there.
+ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # A commitment that takes longer to find is not published [s]: the arm has gone on meanwhile.
@@ -276,17 +278,19 @@ class Commitments:
         begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
         if reading is None or len(begun) < 2:
             return False
+        is_at_rest = begun[-1].end_time < reading.taken and not reading.is_moving(reading.taken)
+        aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
         gap = np.inf
         # What was commanded until then, by all of them in turn.
         for time_ago in np.arange(0.0, LONGEST_LAG, LAG_STEP):
             then = reading.taken - time_ago
             last = next((c for c in reversed(begun) if c.start_time <= then), begun[0])
             gap = min(gap, _gap(last, reading, time_ago))
-            if gap <= ASIDE:
+            if gap <= aside:
                 return False
         gaps = [_gap(c, reading, 0.0) for c in begun[:-1]]
         k = int(np.argmin(gaps))
-        if gaps[k] >= NEARER * gap:
+        if gaps[k] >= nearer * gap:
             return False
         self.present = begun[k]
         self._recent = deque([begun[k]], maxlen=REMEMBERED)
