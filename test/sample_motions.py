@@ -66,14 +66,18 @@ def motion_of(rng, arm):
 
 
 def path_distance(points, trajectory, begin, end):
-    """Return how far points, (n, dof), are from a stretch of a motion, joint by joint [rad]."""
+    """
+    Return how far points, (n, dof), are from a stretch of a motion, joint by joint [rad].
+
+    Only the samples round the nearest one count: what is returned may be greater, not less.
+    """
     path = sample(trajectory, np.linspace(begin, end, 3001))[0]
-    best = np.full(len(points), np.inf)
-    for a, b in zip(path[:-1], path[1:], strict=True):
-        along = b - a
-        share = np.clip((points - a) @ along / (along @ along + 1e-300), 0.0, 1.0)
-        off = np.abs(points - a - share[:, None] * along).max(axis=1)
-        best = np.minimum(best, off)
+    squares = (path**2).sum(axis=1) - 2.0 * points @ path.T
+    nearest = np.clip(squares.argmin(axis=1)[:, None] + np.arange(-8, 8), 0, len(path) - 2)
+    a, along = path[nearest], np.diff(path, axis=0)[nearest]
+    off = points[:, None] - a
+    share = np.clip((off * along).sum(axis=2) / ((along**2).sum(axis=2) + 1e-300), 0.0, 1.0)
+    best: np.ndarray = np.abs(off - share[..., None] * along).max(axis=2).min(axis=1)
     return best
 
 
