@@ -14,6 +14,7 @@ pytest.importorskip('fcl')
 from conftest import spinning, wait_until
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import pointing_error
@@ -39,7 +40,9 @@ TARGETS = np.array([[1.5, 0.1 + 0.01 * k, 0.3] for k in range(10)])
 def test_the_feed_shows_what_the_nodes_say_and_asks_for_the_newest_target():
     with following(None, None, LEFT) as feed:
         assert f'waiting for {feed.resolve_topic_name("body_boxes")}' in feed.said
-        planner, playback = PlannerNode(), PlaybackNode()
+        # The wearer is published once.
+        planner = PlannerNode(parameter_overrides=[Parameter('separation', value=False)])
+        playback = PlaybackNode()
         try:
             with spinning(planner), spinning(playback):
                 feed.create_publisher(MarkerArray, 'body_boxes', LATCHED).publish(wearer())
