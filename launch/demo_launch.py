@@ -78,7 +78,7 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'body_file',
                 default_value=share('msg_examples', 'body.yaml'),
-                description='MarkerArray to send on body_boxes 50 times a second; empty: send none.',
+                description='MarkerArray to send on body_boxes, 50 Hz; empty: send none.',
             ),
             DeclareLaunchArgument(
                 'rviz',

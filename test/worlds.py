@@ -409,9 +409,7 @@ def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halve
                     continue
                 first, last = (p, corner) if side == 0 else (corner, end)
                 for j in range(centers.shape[0]):
-                    if _is_touched(
-                        first, last, centers[j], rotations[j], halves[j], radii[i]
-                    ):
+                    if _is_touched(first, last, centers[j], rotations[j], halves[j], radii[i]):
                         return k
             R[:], p[:] = turned, end
     return -1

@@ -157,8 +157,8 @@ def extended(
     Return the commitment that replaces the present one from a time on [s].
 
     body: the wearer at that time. None where the present one leads to the end of the motion, is
-    over, has arrived there, or is in a stop that ends at rest first; where no longer one is proven,
-    what keeps it from it: then the present one, which is proven, ends in its stop.
+    over, has arrived there, or is in a stop that ends at rest first; where no longer one is
+    proven, what keeps it from it: then the present one, which is proven, ends in its stop.
     """
     if commitment.is_whole or is_in_sharp_stop(commitment, time, settings):
         return None

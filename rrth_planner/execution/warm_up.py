@@ -40,5 +40,6 @@ def warm_up(
         if separation is not None:
             seen = body_at(first_sight(scene, np.zeros(1)), 0.0, separation.rules)
             found = first_commitment(motion, 0.0, seen, separation)
-            for instant in INSTANTS if isinstance(found, Commitment) else ():
-                extended(found, instant, seen, separation)
+            if isinstance(found, Commitment):
+                for instant in INSTANTS:
+                    extended(found, instant, seen, separation)

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the first body of the first motion would have to wait for is loaded before."""
 
+from functools import partial
+
 import pytest
 from rrth_planner.collision.separation import Blocked
 from rrth_planner.execution import warm_up as module
@@ -17,14 +19,14 @@ from worlds import limits
 def test_a_motion_is_monitored_in_each_way_that_there_is(monkeypatch, file, is_separated):
     arm = load_arm() if file is None else load_arm(file)
     found = []
+
+    def noted(name, call, *args, **kwargs):
+        result = call(*args, **kwargs)
+        found.append((name, type(result)))
+        return result
+
     for name in ('is_remaining_free', 'escapes_by_continuing', 'fast_stop', 'extended'):
-
-        def noted(*args, name=name, call=getattr(module, name), **kwargs):
-            result = call(*args, **kwargs)
-            found.append((name, type(result)))
-            return result
-
-        monkeypatch.setattr(module, name, noted)
+        monkeypatch.setattr(module, name, partial(noted, name, getattr(module, name)))
     rates = limits(arm.dof)
     separation = Separation(
         arm=arm, rules=SeparationRules(), margin=0.02, limits=rates, stop_limits=rates

@@ -110,6 +110,15 @@ def near(clearance):
     return Box('hand', begin.mean(axis=0) + (clearance + 0.05) * aside, [0.1] * 3, np.eye(3))
 
 
+def beside(separated, clearance, n_frames=20, **values):
+    """Return a monitor of a motion beside a hand, after some frames of it, and that hand."""
+    arm, hand = separated(**values), near(clearance)
+    arm.see(hand)
+    arm.begin()
+    arm.frames(n_frames, hand)
+    return arm, hand
+
+
 def test_without_a_wearer_near_the_whole_rest_is_given(separated):
     arm = separated()
     assert len(arm.published) == 1
@@ -157,11 +166,7 @@ def test_beside_a_wearer_each_commitment_continues_the_last_one_and_is_separate(
 
 
 def test_where_no_body_comes_any_more_the_arm_stops_and_goes_on_with_the_next_ones(separated):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
     n = len(arm.published)
     # Shorter than `body_timeout`.
     arm.frames(15, sees=False)
@@ -171,11 +176,7 @@ def test_where_no_body_comes_any_more_the_arm_stops_and_goes_on_with_the_next_on
 
 
 def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why(separated):
-    arm = separated(stop_acceleration=[10.0], stop_jerk=[400.0])
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.3, stop_acceleration=[10.0], stop_jerk=[400.0])
     n = len(arm.published)
     # The stop has begun.
     arm.frames(4, sees=False)
@@ -192,11 +193,7 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
 
 
 def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
     arm.frames(40, sees=False)
     assert arm.statuses[-1].state is SeparationState.PROTECTIVE_STOP
     assert 'expected at most 0.2 s (body_timeout)' in arm.statuses[-1].cause
@@ -207,11 +204,7 @@ def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
 def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
     separated, monkeypatch, broken
 ):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
 
     def fail(*_):
         raise ZeroDivisionError('of the test')
@@ -235,11 +228,7 @@ def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
 def test_a_stop_that_is_not_proven_leaves_the_arm_on_its_commitment_while_that_is(
     separated, monkeypatch, is_kept
 ):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
     # Of the stop, of the commitment, and of what is left of it with the next bodies.
     unproven, proven = separation.Blocked(0.0, 'bar', 'box'), None
     answers = [unproven, proven if is_kept else unproven]
@@ -258,11 +247,7 @@ def test_a_stop_that_is_not_proven_leaves_the_arm_on_its_commitment_while_that_i
 def test_a_stop_comes_after_all_where_the_commitment_is_not_proven_any_more(
     separated, monkeypatch
 ):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
     unproven = separation.Blocked(0.0, 'bar', 'box')
     answers = [unproven, None, None, unproven]
     monkeypatch.setattr(commitments, 'first_unproven', lambda *_: answers.pop(0))
@@ -278,11 +263,7 @@ def test_a_stop_comes_after_all_where_the_commitment_is_not_proven_any_more(
 
 
 def test_a_stop_that_is_proven_separate_comes_at_once(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.3)
     n = len(arm.published)
     arm.monitor.fail('of the test')
     assert len(arm.published) == n + 1
@@ -290,11 +271,7 @@ def test_a_stop_that_is_proven_separate_comes_at_once(separated):
 
 
 def test_a_stop_begins_where_the_arm_is_commanded_though_joint_states_are_late(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(30, hand)
+    arm, hand = beside(separated, 0.3, 30)
     # The last reading is older than the present commitment.
     arm.now += 0.001
     arm.read(*arm.commanded(arm.now - 0.015)[:2])
@@ -318,11 +295,7 @@ def test_a_motion_that_cannot_begin_is_rejected_and_nothing_is_published(separat
 
 
 def test_a_held_commitment_is_not_extended_until_then(separated):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2)
     n = len(arm.published)
     assert arm.monitor.hold(arm.now + 3.5 * FRAME) is arm.monitor.running
     arm.frames(3, hand)
@@ -354,11 +327,7 @@ def hand_over(arm):
 
 
 def test_until_a_handover_the_controller_is_given_what_was_proven_before(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.3)
     before, begun = arm.published[-1]
     handover, end = hand_over(arm)
     trajectory, start = arm.published[-1]
@@ -377,11 +346,7 @@ def test_until_a_handover_the_controller_is_given_what_was_proven_before(separat
 
 
 def test_where_the_controller_rejects_a_handover_the_motion_before_it_goes_on(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.3)
     kept, begin = arm.published[-1]
     _, end = hand_over(arm)
     assert np.abs(end - arm.motion.positions[-1]).max() > 0.1
@@ -400,11 +365,7 @@ def test_where_the_controller_rejects_a_handover_the_motion_before_it_goes_on(se
 
 @pytest.mark.parametrize('resume', ['auto', 'manual'])
 def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separated, resume):
-    arm = separated(resume=resume, replan=False)
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(20, hand)
+    arm, hand = beside(separated, 0.2, resume=resume, replan=False)
     arm.monitor.hold(arm.now + 0.6)
     arm.frames(75, hand)
     arm.frames(10, hand)
@@ -418,11 +379,7 @@ def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separ
 
 
 def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
-    arm = separated()
-    hand = near(0.5)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(5, hand)
+    arm, hand = beside(separated, 0.5, 5)
     jumps = [hand, replace(hand, center=hand.center + 0.08)]
     for k in range(20):
         arm.frames(1, jumps[k % 2])
@@ -442,11 +399,7 @@ def test_where_commitments_take_longer_to_find_they_last_longer(separated):
 
 
 def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):
-    arm = separated()
-    hand = near(0.3)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(5, hand)
+    arm, hand = beside(separated, 0.3, 5)
     n, sights = len(arm.published), arm.monitor._commitments._body.n_seen
     arm.now += FRAME
     arm.read(*arm.commanded(arm.now)[:2])
@@ -476,11 +429,7 @@ def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
 
 
 def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_continued(separated):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(25, hand)
+    arm, hand = beside(separated, 0.2, 25)
     # From here on nothing reaches the controller for a while.
     kept, begin = arm.published[-1]
     for _ in range(12):
@@ -500,11 +449,7 @@ def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_co
 
 
 def test_an_arm_that_rests_beside_its_commitment_goes_on_from_where_it_is(separated):
-    arm = separated()
-    hand = near(0.2)
-    arm.see(hand)
-    arm.begin()
-    arm.frames(25, hand)
+    arm, hand = beside(separated, 0.2, 25)
     kept, begin = arm.published[-1]
     arm.frames(1, hand)
     # That one does not reach the controller.
