@@ -3,6 +3,7 @@
 """The monitor with separation: what it gives the controller, and what it leaves as it is."""
 
 from dataclasses import replace
+import time
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker, separation  # noqa: E402
 from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
 from rrth_planner.execution.body_motion import body_at  # noqa: E402
+from rrth_planner.execution.commitment import extended  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
@@ -24,7 +26,7 @@ from rrth_planner.ros.interface.separation_status import SeparationState  # noqa
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
-from rrth_planner.ros.monitor import commitments  # noqa: E402
+from rrth_planner.ros.monitor import commitments, execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import MonitorState  # noqa: E402
 import worlds  # noqa: E402
 
@@ -83,6 +85,29 @@ class Separated(Monitored):
         """Whether the arm is at rest for good."""
         trajectory, begin = self.published[-1]
         return self.now > begin + trajectory.duration
+
+
+class StillClock:
+    """The module `time` of a machine on which computing takes no time."""
+
+    def __init__(self):
+        """Begin."""
+        self.present = 0.0
+
+    def perf_counter(self):
+        """Return the time [s]."""
+        return self.present
+
+    def __getattr__(self, name):
+        return getattr(time, name)
+
+
+@pytest.fixture(name='clock', autouse=True)
+def _clock(monkeypatch):
+    clock = StillClock()
+    for module in (commitments, execution_monitor):
+        monkeypatch.setattr(module, 'time', clock)
+    return clock
 
 
 @pytest.fixture(name='separated')
@@ -396,6 +421,27 @@ def test_where_commitments_take_longer_to_find_they_last_longer(separated):
         arm.frames(1, hand)
         stretches.append(arm.monitor._commitments.present.stretch)
     assert 0.01 < stretches[1] - stretches[0] < 0.02
+
+
+def test_a_commitment_that_comes_when_a_sharp_stop_has_begun_is_not_published(
+    separated, monkeypatch, clock
+):
+    arm, hand = beside(separated, 0.3, stop_acceleration=[10.0], stop_jerk=[400.0])
+    # Less than what is too long in any case.
+    took = arm.monitor._commitments.present.stretch - FRAME - 0.001
+    assert 0.0 < took < commitments.LATEST
+
+    def slow(*arguments):
+        clock.present += took
+        return extended(*arguments)
+
+    monkeypatch.setattr(commitments, 'extended', slow)
+    n = len(arm.published)
+    arm.frames(1, hand)
+    assert len(arm.published) == n
+    monkeypatch.setattr(commitments, 'extended', extended)
+    arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
 def test_of_bodies_that_came_together_all_are_seen_and_the_newest_is_checked(separated):

@@ -46,8 +46,9 @@ REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
-# A commitment that takes longer to find is not published [s]: the arm has gone on meanwhile.
-LATEST = 0.02
+# A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
+# long the controller has one that is published [s].
+LATEST, ARRIVAL = 0.02, 0.005
 # Why a stop takes place that nothing made necessary.
 LATE_BODY = 'the next body came too late: the motion goes on from rest'
 # The end of a motion counts as reached so near to it [s].
@@ -227,8 +228,8 @@ class Commitments:
             return None
         took = time.perf_counter() - begin
         self._took = max(min(took, LATEST), FADING * self._took)
-        if took > LATEST:
-            # The arm is on its way to rest by now: from there the next one goes on.
+        if took > LATEST or is_in_sharp_stop(present, now + took + ARRIVAL, separation):
+            # The arm is on its way to rest by then: from there the next one goes on.
             return None
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
         self.present = found
