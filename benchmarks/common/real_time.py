@@ -9,6 +9,8 @@ import os
 import psutil
 
 REAL_TIME = {os.SCHED_FIFO: 'SCHED_FIFO', os.SCHED_RR: 'SCHED_RR'}
+# The controller manager of ros2_control gives itself this priority of SCHED_FIFO by default.
+CONTROLLER = 50
 
 
 def put_ahead(*threads: int, by: int = 1) -> None:
@@ -27,6 +29,17 @@ def put_ahead(*threads: int, by: int = 1) -> None:
         with suppress(ProcessLookupError):
             present = os.sched_getparam(thread).sched_priority or priority
             os.sched_setscheduler(thread, kind, os.sched_param(min(present + by, most)))
+
+
+def run_as_controller(pid: int) -> bool:
+    """Run a process in real time, as the controllers of ros2_control; return whether it may."""
+    try:
+        for thread in psutil.Process(pid).threads():
+            with suppress(ProcessLookupError):
+                os.sched_setscheduler(thread.id, os.SCHED_FIFO, os.sched_param(CONTROLLER))
+    except PermissionError:
+        return False
+    return True
 
 
 @contextmanager

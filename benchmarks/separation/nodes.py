@@ -33,6 +33,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from benchmarks.common.client import FRAME, LATCHED, ros_client
 from benchmarks.common.random_draws import random_target
+from benchmarks.common.real_time import run_as_controller
 from benchmarks.separation.contacts import (
     AT_REST,
     box_distances,
@@ -237,10 +238,13 @@ def run(trial: Trial, n: int, seed: int) -> Hands:
     with (
         tempfile.TemporaryDirectory() as folder,
         ros_client(lambda: Client(Path(folder))) as client,
-        ChildProcess(PLAYBACK, playback, lambda _: None),
+        ChildProcess(PLAYBACK, playback, lambda _: None) as controller,
         Wearer(client) as wearer,
     ):
         client.listen_to_states()
+        client.hear(LONGEST, lambda: client.states)
+        if not run_as_controller(controller.pid):
+            tqdm.write('the controller runs at ordinary priority', file=sys.stderr)
         with _planners(planner, client) as planners:
             child = next(planners)
             for _ in tqdm(range(n), desc=trial.what, file=sys.stderr):
