@@ -5,6 +5,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+import itertools
 import os
 from pathlib import Path
 import signal
@@ -58,6 +59,8 @@ SET_OFF, REST = 0.2, 1e-3
 LATEST = 0.5
 # The planner stands still for so long [s].
 STANDSTILL = 1.2
+# So often it is asked for a motion beside a hand.
+MOST_REQUESTS = 50
 # What a planner says once it offers its service.
 READY = 'ready after'
 # What happens to the planner at that instant.
@@ -292,12 +295,12 @@ def _one_hand(
     client.hear(LONGEST, lambda: client.speed < REST)
     wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
     client.hear(0.3)
-    while True:
+    for n_requests in itertools.count():
         client.publish_target(random_target(rng))
         found.n_requests += 1
         _, answer = client.question()
         if answer is None or not answer.success:
-            if found.n_requests > 50 * (1 + len(found.words)):
+            if n_requests > MOST_REQUESTS:
                 raise RuntimeError(f'no motion any more: {answer and answer.message}')
             # It may be the hand that is in the way.
             wearer.remove_hand()
