@@ -42,7 +42,7 @@ PATTERNS = tuple(
 # What others call so: a parameter, rclpy, sockets, the switch that cuts the drives, files.
 ALLOWED = re.compile(
     r'\bray guard length\b|\bguard condition\b|\bconnection refused\b'
-    r'|\bemergency stop\s+switch\b|^\.(tell|touch)$',
+    r'|\bemergency stop\s+switch\b|^\.(tell|touch| guard|guards)$',
     re.I,
 )
 
@@ -113,6 +113,8 @@ def test_what_others_call_so_is_allowed():
         '`ray_guard_length`, create_guard_condition, ConnectionRefusedError',
         'an emergency-stop switch',
         '.tell',
+        '.guards',
+        '._guard',
         'A rest of 0.1 s; a look at it; the right way; the depth; a clean sample; grippers.',
     ):
         assert not private_words(text), text

@@ -3,7 +3,7 @@
 """An executor for a node that one thread spins, and what such a process needs besides."""
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
 from functools import partial
 import gc
@@ -23,19 +23,19 @@ from rrth_planner.model.errors import one_line
 
 # After so long a thread lets another one run [s].
 SWITCH_INTERVAL = 5e-4
-# What a wait set calls its entities, in the order in which their callbacks are called, and what a
-# node does.
-WAITABLE, GUARD = 'waitable', 'guard_condition'
-KINDS = {
-    WAITABLE: 'waitables',
-    'timer': 'timers',
-    'subscription': 'subscriptions',
-    GUARD: 'guards',
-    'client': 'clients',
-    'service': 'services',
+# What a wait set calls its entities, in the order in which their callbacks are called, and those
+# of a node.
+WAITABLE, CONDITION = 'waitable', 'guard_condition'
+KINDS: dict[str, Callable[[Node], Iterable[Any]]] = {
+    WAITABLE: lambda node: node.waitables,
+    'timer': lambda node: node.timers,
+    'subscription': lambda node: node.subscriptions,
+    CONDITION: lambda node: node.guards,
+    'client': lambda node: node.clients,
+    'service': lambda node: node.services,
 }
 # Those that it counts, in its order.
-COUNTED = ('subscription', GUARD, 'timer', 'client', 'service')
+COUNTED = ('subscription', CONDITION, 'timer', 'client', 'service')
 # From rclpy 7.1.9 on a task that waits for something is called again once that is there. Before,
 # it has to be called to see whether it is.
 RESUMES = hasattr(Task, '_add_resume_callback')
@@ -47,7 +47,7 @@ class _WaitSet:
     def __init__(self, executor: 'OneThreadExecutor', entities: list[tuple[str, Any]]) -> None:
         """Use the entities, each with its kind; what is destroyed already is left out."""
         self._stack = ExitStack()
-        own = [(GUARD, guard) for guard in (executor._guard, executor._sigint_gc)]
+        own = [(CONDITION, one) for one in (executor._guard, executor._sigint_gc)]
         used = [found for found in (*own, *entities) if self._use(*found)]
         self._waitables = [entity for kind, entity in used if kind == WAITABLE]
         others = [(kind, entity) for kind, entity in used if kind != WAITABLE]
@@ -164,8 +164,8 @@ class OneThreadExecutor(Executor):
         entities = [
             (kind, entity)
             for node in self.get_nodes()
-            for kind, name in KINDS.items()
-            for entity in getattr(node, name)
+            for kind, entities_of in KINDS.items()
+            for entity in entities_of(node)
         ]
         if self._waiting:
             entities = [e for e in entities if e[1].callback_group.can_execute(e[1])]
@@ -186,7 +186,7 @@ class OneThreadExecutor(Executor):
         group = entity.callback_group
         if not group.beginning_execution(entity):
             # A callback of its group waits since this round began: what is ready stays so.
-            if kind == GUARD:
+            if kind == CONDITION:
                 entity.trigger()
             return
         callback = getattr(entity, 'callback', None)
