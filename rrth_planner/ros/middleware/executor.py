@@ -207,7 +207,7 @@ class OneThreadExecutor(Executor):
                 handle().send(None)
 
     def _call(self, task: Task) -> None:
-        """Call a task, and raise what it raises, or what it has another one raise."""
+        """Call a task; raise what it raises, or what a task raises that it resumes."""
         task()
         tasks = dict.fromkeys((*self._waiting, task))
         ended = [t for t in tasks if t.done() or t.cancelled()]
