@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from rrth_planner.kernels.jit import cache_folder
 from rrth_planner.kernels.kept_code import private_folder, read_whole, write_whole
 
 COMPILE = """
@@ -60,6 +61,32 @@ import sys
 import rrth_planner.kernels.kinematics.trigonometry
 print('done', file=sys.stderr)
 """
+# A kernel that is kept, and another one that calls it once there is a file `more`.
+CALLER = """
+import os, sys
+from pathlib import Path
+from numba import float64
+from rrth_planner.kernels import jit
+@jit.kernel(float64(float64))
+def root_sum(x):
+    return (x + x) ** 0.5 if x > 0.0 else -1.0
+assert root_sum(8.0) == 4.0 and root_sum(-8.0) == -1.0
+if Path(os.environ['RRTH_CACHE_DIR'], 'more').exists():
+    @jit.kernel(float64(float64))
+    def again(x):
+        return 1.0 + root_sum(x)
+    assert again(8.0) == 5.0
+    twice = jit.first_class(root_sum)
+    assert twice(8.0) == 4.0 and twice.address
+print('scipy.linalg' in sys.modules, file=sys.stderr)
+"""
+# What both processes of a planner load.
+PLANNER = """
+import sys
+import rrth_planner.execution.warm_up
+import rrth_planner.pipeline.in_process_planner
+print([m for m in ('numba.np.linalg', 'scipy.linalg') if m in sys.modules], file=sys.stderr)
+"""
 SILENT = "import logging; logging.getLogger('rrth_planner').setLevel(logging.ERROR)"
 
 
@@ -105,6 +132,23 @@ def test_a_folder_of_ones_own_is_used_without_a_word(tmp_path):
     for made in (folder.parent, folder, first.parent):
         assert made.stat().st_mode & 0o777 == 0o700
     assert first.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_kept_kernel_is_called_by_one_that_is_compiled_later(tmp_path):
+    folder = tmp_path / 'cache'
+    assert run(CALLER, folder, tmp_path) == ['True']
+    assert run(CALLER, folder, tmp_path) == ['False']
+    (folder / 'more').touch()
+    assert run(CALLER, folder, tmp_path) == ['True']
+    assert len(code_in(folder)) == 2
+    assert run(CALLER, folder, tmp_path) == ['False']
+
+
+def test_a_planner_whose_kernels_are_kept_loads_nothing_of_the_compiler(tmp_path):
+    kept = cache_folder().parent
+    # They may not be kept yet.
+    run(SILENT + PLANNER, kept, tmp_path)
+    assert run(SILENT + PLANNER, kept, tmp_path) == ['[]']
 
 
 def test_that_kernels_are_compiled_is_logged_once_a_machine(tmp_path):

@@ -57,7 +57,10 @@ def first_rest(curves, times, now):
     """Return the first point of a motion after some time [s] at which it is at rest."""
     n = curves.shape[0]
     for i in range(1, n):
-        if times[i] > now and not curves[i, 1:3].any():
+        fastest = 0.0
+        for k in range(curves.shape[2]):
+            fastest = max(fastest, abs(curves[i, 1, k]), abs(curves[i, 2, k]))
+        if times[i] > now and fastest == 0.0:
             return i
     return n
 

@@ -230,8 +230,11 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     for i in range(n):
         bound_derivatives(directions, turns, i, places[i], q_s)
         squares[i + 1] = slowed_square(q_s, limits, cells[i, LENGTH], squares[i], squares[i + 1])
+        bend = 0.0
+        for k in range(dof):
+            bend = max(bend, q_s[1, k])
         # Within a blend no faster than at its knots, for which the acceleration was bounded.
-        if q_s[1].max() > 0.0:
+        if bend > 0.0:
             cells[i, V_MAX] = math.sqrt(max(squares[i], squares[i + 1]))
         path_limits(q_s, limits, cells[i, V_MAX], cells[i])
         speeds[i] = math.sqrt(squares[i])
