@@ -271,11 +271,11 @@ def _from_address(seam: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             made = cgutils.create_struct_proxy(seam)(context, builder)
             pointer = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
-            made.c_addr = pointer
-            # Nothing is ever called through these.
-            made.py_addr = made.c_addr.type(None)
-            if hasattr(made, 'jit_addr'):
-                made.jit_addr = made.c_addr.type(None)
+            # The first is called through, the others never; numba 0.61 has given all new names.
+            called, *others = made._datamodel._fields
+            setattr(made, called, pointer)
+            for other in others:
+                setattr(made, other, pointer.type(None))
             return made._getvalue()
 
         return seam(int64), generate
