@@ -3,6 +3,7 @@
 """A commanded motion, and the time within it that an arm has come to, by readings of the arm."""
 
 from dataclasses import dataclass
+import functools
 import math
 
 import numpy as np
@@ -203,11 +204,9 @@ def phase_of(
     q and v, shape (dof,), are a reading of the arm [rad, rad/s]; None where the motion does not
     pass it within `same` [rad, rad/s].
     """
-    n = max(2, int(running.duration / SEARCH_SPACING))
-    times = np.linspace(0.0, running.duration, n)
-    path, along, _ = sample(running, times)
+    times, path, along, pace = _search_samples(running)
     # A motion that passes a point twice does so in different directions.
-    speed, pace = float(np.linalg.norm(v)), np.linalg.norm(along, axis=1)
+    speed = float(np.linalg.norm(v))
     heading = along @ v / (pace * speed + 1e-300)
     gaps = np.linalg.norm(path - q, axis=1) + np.where(heading > 0.9, 0.0, np.inf)
     phase = float(times[int(np.argmin(gaps))])
@@ -221,3 +220,14 @@ def phase_of(
     rate = float(v @ w / (w @ w + 1e-300))
     is_same = np.abs(q - p).max() <= same[0] and np.abs(v - rate * w).max() <= same[1]
     return (phase, rate) if is_same else None
+
+
+@functools.lru_cache(maxsize=4)
+def _search_samples(motion: Trajectory) -> tuple[Array, Array, Array, Array]:
+    """Return times of a motion [s], positions, velocities and speeds at these (read-only)."""
+    times = np.linspace(0.0, motion.duration, max(2, int(motion.duration / SEARCH_SPACING)))
+    path, along, _ = sample(motion, times)
+    samples = times, path, along, np.linalg.norm(along, axis=1)
+    for array in samples:
+        array.setflags(write=False)
+    return samples
