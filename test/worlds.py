@@ -84,6 +84,7 @@ def table_1_mapping():
     }
 
 
+@functools.cache
 def table_1_arm(radius=0.0):
     """Return the arm of the paper, all its bars of one radius [m]."""
     data = table_1_mapping()
@@ -92,11 +93,13 @@ def table_1_arm(radius=0.0):
     return arm_from_mapping(data)
 
 
+@functools.cache
 def wearer():
     """Return the standing wearer, forearms forward."""
     return Scene(tuple(Box(n, c, s, rotation_matrix(quat)) for n, c, s, quat in WEARER))
 
 
+@functools.cache
 def limits(dof=4):
     """Return the default limits of every joint."""
     return MotionLimits(
@@ -244,6 +247,7 @@ def _few_chains(seed, has_tail):
     return random_chain(np.random.default_rng(seed), has_tail, fewest=3 if has_tail else 2)
 
 
+@functools.cache
 def wearer_world(margin=MARGIN, ray=RAY, radius=0.0):
     """Return the world of the paper's arm round the standing wearer."""
     return arm_world(table_1_arm(radius), wearer(), margin, ray)

@@ -115,13 +115,14 @@ def bar_distances(one: Array, other: Array) -> Array:
     """
     Return the distances of the lines of two bars, (n, 2, 3) each -> (n,) [m].
 
-    The distance of a point of one line from the other line is convex along the first: its least
-    value is found by golden section.
+    The distance of a point of one line from the other one is convex along the first. It is least
+    at an end of the first, nearest to an end of the other, or where the common normal of both
+    meets it.
     """
-    golden = 0.5 * (np.sqrt(5.0) - 1.0)
     a, step = one[:, 0], one[:, 1] - one[:, 0]
     b, along = other[:, 0], other[:, 1] - other[:, 0]
     square = np.maximum((along * along).sum(axis=1), 1e-300)
+    step_square = np.maximum((step * step).sum(axis=1), 1e-300)
 
     def distance(s: Array) -> Array:
         p = a + s[:, None] * step
@@ -129,12 +130,17 @@ def bar_distances(one: Array, other: Array) -> Array:
         result: Array = np.linalg.norm(p - b - t[:, None] * along, axis=1)
         return result
 
-    low, high = np.zeros(len(a)), np.ones(len(a))
-    for _ in range(60):
-        left, right = high - golden * (high - low), low + golden * (high - low)
-        is_left = distance(left) <= distance(right)
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    return np.minimum(distance(0.5 * (low + high)), np.minimum(distance(low), distance(high)))
+    def nearest(point: Array) -> Array:
+        result: Array = np.clip(((point - a) * step).sum(axis=1) / step_square, 0.0, 1.0)
+        return result
+
+    # Without its part along the other line a step leads to the common normal.
+    across = step - ((step * along).sum(axis=1) / square)[:, None] * along
+    across_square = np.maximum((across * across).sum(axis=1), 1e-300)
+    normal = np.clip(((b - a) * across).sum(axis=1) / across_square, 0.0, 1.0)
+    ends = (np.zeros(len(a)), np.ones(len(a)), nearest(b), nearest(b + along))
+    least: Array = np.minimum.reduce([distance(s) for s in (*ends, normal)])
+    return least
 
 
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
