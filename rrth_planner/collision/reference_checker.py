@@ -188,14 +188,19 @@ def bar_radii(arm: ArmModel) -> Array:
 
 
 def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> float:
+    """Return the least distance of the arm from the boxes over the instants q, (n, dof) [m]."""
+    return float(clearances(arm, scene, q, ray_length).min())
+
+
+def clearances(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Array:
     """
-    Return the least distance of the arm from the boxes over the instants q, (n, dof) [m].
+    Return the distance of the arm from the boxes at each of the instants q, (n, dof) -> (n,) [m].
 
     The closest point of each bar is found by golden section: its distance from a box is convex.
     """
     ends = bars(arm, q, ray_length)
     radii = bar_radii(arm)
-    least = np.inf
+    least = np.full(len(q), np.inf)
     golden = 0.5 * (np.sqrt(5.0) - 1.0)
     for box in scene.boxes:
         local = (ends - box.center) @ box.rotation
@@ -212,7 +217,7 @@ def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) ->
             left, right = high - golden * (high - low), low + golden * (high - low)
             is_left = distance(left) <= distance(right)
             low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-        least = min(least, float((distance(0.5 * (low + high)) - radii).min()))
+        least = np.minimum(least, (distance(0.5 * (low + high)) - radii).min(axis=1))
     return least
 
 

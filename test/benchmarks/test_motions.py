@@ -185,8 +185,10 @@ def test_distances_from_the_rounded_path_are_those_of_a_dense_look():
 def test_python_fcl_agrees_with_the_oracle_about_distances():
     arm, scene, rng = table_1_arm(), wearer(), np.random.default_rng(5)
     n_near = 0
-    for q in rng.uniform(*arm.bounds, (400, 4)):
-        exact = reference_checker.least_clearance(arm, scene, q[None], RAY)
+    places = rng.uniform(*arm.bounds, (400, 4))
+    for q, exact in zip(
+        places, reference_checker.clearances(arm, scene, places, RAY), strict=True
+    ):
         found = least_distance(arm, scene, q[None], RAY, MARGIN)
         if 1e-4 < exact < MARGIN:
             n_near += 1
