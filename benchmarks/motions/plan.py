@@ -13,7 +13,9 @@ from unittest.mock import patch
 import numpy as np
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.text_file import load_yaml
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
+from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 from rrth_planner.pipeline import time_path
 from rrth_planner.pipeline.motion_plan import MotionPlan
@@ -50,7 +52,9 @@ class Motion:
     ----------
     body, index : int
         Which wearer, which of its queries; the index is the seed.
-    case : Case
+    scene : Scene
+    q_start : ndarray, shape (dof,)
+        Of the query; not its world, whose kernels another process would compile again [rad].
     plan : MotionPlan
     rounded : tuple of Blend
         The corners as large as they are proven free; none unless a path was found.
@@ -63,7 +67,8 @@ class Motion:
 
     body: int
     index: int
-    case: Case
+    scene: Scene
+    q_start: Array
     plan: MotionPlan
     rounded: tuple[Blend, ...]
     chosen: tuple[Blend, ...]
@@ -138,7 +143,8 @@ def _motion(body: int, index: int, case: Case, plan: MotionPlan, calls: list[Cal
     return Motion(
         body=body,
         index=index,
-        case=case,
+        scene=case.scene,
+        q_start=case.q_start,
         plan=plan,
         rounded=last['round_corners'].result if 'round_corners' in last else (),
         chosen=_chosen(last['in_time'], last['first_proven'].result) if 'in_time' in last else (),

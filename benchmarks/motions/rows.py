@@ -73,11 +73,11 @@ def motion_row(motion: Motion, is_sought: bool, limits: MotionLimits) -> Row:
 
 
 def _judged(motion: Motion, limits: MotionLimits) -> Row:
-    arm, case, plan = table_1_arm(), motion.case, motion.plan
+    arm, plan = table_1_arm(), motion.plan
     path, trajectory = plan.path, plan.trajectory
     assert path is not None and trajectory is not None
     found = verdict(
-        *(arm, case.scene, trajectory, limits),
+        *(arm, motion.scene, trajectory, limits),
         margin=MARGIN,
         ray_length=RAY,
         reach=plan.target_distance,
@@ -87,7 +87,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
     curve = curve_of(trajectory)
     pieces = [piece for part in planned_pieces(path, motion.chosen) for piece in part]
     q = derivative(curve, instants(curve), 0)
-    ends = np.array([case.q_start, path.waypoints[-1]])
+    ends = np.array([motion.q_start, path.waypoints[-1]])
     unlimited = without_jerk(path, motion.rounded, limits)
     is_bent = any(blend.half_length > 0.0 for blend in motion.rounded)
     return {
@@ -111,7 +111,7 @@ def _judged(motion: Motion, limits: MotionLimits) -> Row:
 
 def _fcl_distance(motion: Motion, curve: Curve) -> float:
     """Return the least distance by python-fcl, at the end out to the target [m]."""
-    arm, scene = table_1_arm(), motion.case.scene
+    arm, scene = table_1_arm(), motion.scene
     q = derivative(curve, instants(curve, PERIOD), 0)
     along = least_distance(arm, scene, q, RAY, MARGIN)
     return min(
