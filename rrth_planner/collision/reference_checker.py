@@ -196,28 +196,40 @@ def clearances(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Arra
     """
     Return the distance of the arm from the boxes at each of the instants q, (n, dof) -> (n,) [m].
 
-    The closest point of each bar is found by golden section: its distance from a box is convex.
+    The square of the distance of a point of a bar from a box is convex along the bar, and between
+    two crossings of planes of the box its derivative is linear: that is 0 at the closest point.
     """
     ends = bars(arm, q, ray_length)
     radii = bar_radii(arm)
     least = np.full(len(q), np.inf)
-    golden = 0.5 * (np.sqrt(5.0) - 1.0)
     for box in scene.boxes:
         local = (ends - box.center) @ box.rotation
         a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
         half = 0.5 * box.size
 
-        def distance(t: Array, a: Array = a, step: Array = step, half: Array = half) -> Array:
-            excess = np.maximum(np.abs(a + t[..., None] * step) - half, 0.0)
-            result: Array = np.linalg.norm(excess, axis=-1)
+        def excess(t: Array, a: Array = a, step: Array = step, half: Array = half) -> Array:
+            place = a[..., None, :] + t[..., None] * step[..., None, :]
+            result: Array = place - np.clip(place, -half, half)
             return result
 
-        low, high = np.zeros(a.shape[:-1]), np.ones(a.shape[:-1])
-        for _ in range(48):
-            left, right = high - golden * (high - low), low + golden * (high - low)
-            is_left = distance(left) <= distance(right)
-            low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-        least = np.minimum(least, (distance(0.5 * (low + high)) - radii).min(axis=1))
+        with np.errstate(divide='ignore', invalid='ignore'):
+            crossings = np.concatenate([(-half - a) / step, (half - a) / step], axis=-1)
+        ends_of_bar = np.broadcast_to([0.0, 1.0], (*a.shape[:-1], 2))
+        t = np.concatenate([np.clip(np.nan_to_num(crossings), 0.0, 1.0), ends_of_bar], axis=-1)
+        t.sort(axis=-1)
+        slope = (excess(t) * step[..., None, :]).sum(axis=-1)
+        # The first where it rises, and the one before it.
+        after = np.minimum((slope < 0.0).sum(axis=-1), t.shape[-1] - 1)[..., None]
+        before = np.maximum(after - 1, 0)
+        t0, t1, s0, s1 = (
+            np.take_along_axis(values, at, axis=-1)
+            for values in (t, slope)
+            for at in (before, after)
+        )
+        share = np.clip(-s0 / np.where(s1 > s0, s1 - s0, 1.0), 0.0, 1.0)
+        nearest = np.concatenate([t0 + share * (t1 - t0), ends_of_bar], axis=-1)
+        gaps = np.linalg.norm(excess(nearest), axis=-1).min(axis=-1)
+        least = np.minimum(least, (gaps - radii).min(axis=1))
     return least
 
 
