@@ -146,7 +146,16 @@ def bar_distances(one: Array, other: Array) -> Array:
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
     local = (ends - center) @ rotation
-    a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
+    half = np.broadcast_to(half, local[..., 0, :].shape)
+    a, b = local[..., 0, :], local[..., 1, :]
+    result: Array = np.ones(a.shape[:-1], dtype=bool)
+    for i in range(3):
+        # Not where both ends are beyond the same face.
+        result &= (np.minimum(a[..., i], b[..., i]) <= half[..., i]) & (
+            np.maximum(a[..., i], b[..., i]) >= -half[..., i]
+        )
+    a, b, half = a[result], b[result], half[result]
+    step = b - a
     with np.errstate(divide='ignore', invalid='ignore'):
         t0, t1 = (-half - a) / step, (half - a) / step
     is_parallel = step == 0.0
@@ -155,7 +164,7 @@ def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) ->
     leave = np.where(is_parallel, np.where(is_between, np.inf, -np.inf), np.maximum(t0, t1))
     first = np.maximum(enter.max(axis=-1), 0.0)
     last = np.minimum(leave.min(axis=-1), 1.0)
-    result: Array = first <= last
+    result[result] = first <= last
     return result
 
 
