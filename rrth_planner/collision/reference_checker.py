@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.model.arm import ArmModel, bar_ends, bars_of, Capsule, is_called, NO_BARS
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
@@ -143,12 +144,12 @@ def bar_distances(one: Array, other: Array) -> Array:
     return least
 
 
-def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> Array:
+def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> NDArray[np.bool_]:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
     local = (ends - center) @ rotation
     half = np.broadcast_to(half, local[..., 0, :].shape)
     a, b = local[..., 0, :], local[..., 1, :]
-    result: Array = np.ones(a.shape[:-1], dtype=bool)
+    result = np.ones(a.shape[:-1], dtype=np.bool_)
     for i in range(3):
         # Not where both ends are beyond the same face.
         result &= (np.minimum(a[..., i], b[..., i]) <= half[..., i]) & (
