@@ -9,6 +9,9 @@ _worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0')
 _run = os.getppid() if 'PYTEST_XDIST_WORKER' in os.environ else os.getpid()
 os.environ['ROS_DOMAIN_ID'] = str(1 + (7 * _run + int(_worker.removeprefix('gw'))) % 100)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# Before anything imports numpy: its products are small here, and threads for them only wait for
+# each other, and for the other workers.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 from contextlib import ExitStack  # noqa: E402
 

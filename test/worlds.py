@@ -376,7 +376,7 @@ def bezier_quintic(control):
     return np.ascontiguousarray(to_powers @ control)
 
 
-@njit
+@njit(cache=True)
 def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halves):
     """Walk a curve instant by instant: products of frames, bars clipped by slabs."""
     dof = curve.shape[1]
@@ -419,7 +419,7 @@ def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halve
     return -1
 
 
-@njit
+@njit(cache=True)
 def _is_touched(first, last, center, rotation, half, radius):
     """Clip a bar by the slabs of a box that is grown by its radius."""
     enter, leave = 0.0, 1.0

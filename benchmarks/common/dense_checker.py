@@ -121,7 +121,7 @@ def colliding_edges(
     return flags
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _check(
     dh, T, frames, ends, radii, bodies, pairs, reach, centers, rotations, halves, q0, q1, spacing,
     flags,
@@ -170,7 +170,7 @@ def _check(
             size += 2
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _place(dh, T, frames, ends, q, placed):
     dof = q.shape[0]
     R, p, turned = T[:3, :3].copy(), T[:3, 3].copy(), np.empty((3, 3))
@@ -196,7 +196,7 @@ def _place(dh, T, frames, ends, q, placed):
         R[:] = turned
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _distance(one, other):
     least = min(
         min(_to_line(one[0], other[0], other[1]), _to_line(one[1], other[0], other[1])),
@@ -219,7 +219,7 @@ def _distance(one, other):
     return least
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _to_line(point, begin, end):
     square, along = 0.0, 0.0
     for r in range(3):
@@ -232,7 +232,7 @@ def _to_line(point, begin, end):
     return np.sqrt(gap)
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def _bar_collides(first, last, growth, centers, rotations, halves):
     for j in range(centers.shape[0]):
         enter, leave = 0.0, 1.0

@@ -8,8 +8,8 @@ Where one capsule is too thick, the surface is cut into slabs, triangles at the 
 each slab gets its own.
 """
 
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
 import math
 from typing import NamedTuple, Protocol
 
@@ -179,20 +179,20 @@ class _Slabs:
         self._planes = np.linspace(heights.min(), heights.max(), N_PLANES)
         thin = [_extreme(part, N_COARSE) for part in self.parts(self._planes)]
         self._costs = np.full((N_PLANES, N_PLANES), np.inf)
-        for low in range(N_PLANES - 1):
-            for high in range(low + 1, N_PLANES):
-                self._costs[low, high] = _least_volume(np.concatenate(thin[low:high]))
+        rows, columns = np.triu_indices(N_PLANES, 1)
+        self._costs[rows, columns] = _least_volumes(
+            [np.concatenate(thin[low:high]) for low, high in zip(rows, columns, strict=True)]
+        )
 
-    def parts(self, planes: Array) -> list[Array]:
-        """Return the corners of what lies between each two planes, (n, 3) [m]."""
-        left, result = self._triangles, []
+    def parts(self, planes: Array) -> Iterator[Array]:
+        """Yield the corners of what lies between each two planes, (n, 3) [m]."""
+        left = self._triangles
         for low, high in pairwise(planes):
             # Nothing of what lies below the first plane or above the last one, but for rounding.
             rest = left if low == planes[0] else half_of(left, -self._axis, OVERLAP - low)
             part = rest if high == planes[-1] else half_of(rest, self._axis, high + OVERLAP)
-            result.append(part.reshape(-1, 3))
+            yield part.reshape(-1, 3)
             left = half_of(left, -self._axis, OVERLAP - high)
-        return result
 
     def best(self, n: int) -> tuple[float, list[int]]:
         """Return the least volume of capsules round n slabs [m^3], and the planes between."""
@@ -214,20 +214,29 @@ class _Slabs:
                 for shift, moved in zip((0.0, -step, step), tried, strict=True):
                     moved[k] += shift
                 # The slabs beyond the neighbours stay as they are.
-                costs = [
-                    sum(map(_least_volume, self.parts(moved)[k - 1 : k + 1])) for moved in tried
+                beside = [
+                    part for moved in tried for part in islice(self.parts(moved), k - 1, k + 1)
                 ]
+                costs = _least_volumes(beside).reshape(3, 2).sum(axis=1)
                 planes = tried[int(np.argmin(costs))]
         return planes
 
 
-def _least_volume(points: Array) -> float:
-    """Return about the volume of a capsule round points, (n, 3) [m^3], or inf: there are none."""
-    if len(points) == 0:
-        return np.inf
-    few = _extreme(points, N_COARSE)
-    directions = np.concatenate([_principal_axes(few), COARSE])
-    return float(_volumes(*_capsules_along(few, directions)).min())
+def _least_volumes(parts: list[Array]) -> Array:
+    """Return about the volumes of capsules round points, each (n, 3) [m^3]; inf: no points."""
+    result: Array = np.full(len(parts), np.inf)
+    chosen = [k for k, points in enumerate(parts) if len(points)]
+    if not chosen:
+        return result
+    few = [_extreme(parts[k], N_COARSE) for k in chosen]
+    directions = np.stack([np.concatenate([_principal_axes(points), COARSE]) for points in few])
+    # All at once: the first point again and again changes nothing.
+    most = max(map(len, few))
+    filled = np.stack(
+        [points[np.where(np.arange(most) < len(points), np.arange(most), 0)] for points in few]
+    )
+    result[chosen] = _volumes(*_capsules_along(filled, directions)).min(axis=1)
+    return result
 
 
 def _capsule_around(points: Array) -> Enclosure:
@@ -235,12 +244,12 @@ def _capsule_around(points: Array) -> Enclosure:
     points = np.unique(points, axis=0)
     few = _extreme(points, N_FINE)
     directions = np.concatenate([np.eye(3), _principal_axes(few), COARSE])
-    centres, axes, radii, ends = _capsules_along(few, directions)
+    centres, axes, radii, ends = _capsules_round(few, directions)
     for tilt in TILTS:
         k = int(_volumes(centres, axes, radii, ends).argmin())
         beside = axes[k] + tilt * AROUND
         tried = beside / np.linalg.norm(beside, axis=1)[:, None]
-        centres, axes, radii, ends = _capsules_along(few, np.concatenate([axes[k : k + 1], tried]))
+        centres, axes, radii, ends = _capsules_round(few, np.concatenate([axes[k : k + 1], tried]))
     k = int(_volumes(centres, axes, radii, ends).argmin())
     line = centres[k] + ends[k][:, None] * axes[k]
     # Few of the points were looked at: what they miss, the radius makes up for.
@@ -263,49 +272,74 @@ def _slack(points: Array, ends: Array, radius: float) -> float:
     return float((reach - (points @ directions).max(axis=0)).max())
 
 
+def _capsules_round(points: Array, axes: Array) -> tuple[Array, ...]:
+    """Return `_capsules_along` of one set of points, (n, 3), along axes, (m, 3)."""
+    return tuple(values[0] for values in _capsules_along(points[None], axes[None]))
+
+
 def _capsules_along(points: Array, axes: Array) -> tuple[Array, Array, Array, Array]:
     """
-    Return the capsule of least volume along each of m axes that contains points, (n, 3) [m].
+    Return the capsule of least volume along each of m axes that contains points, for k sets.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, n, 3)
+        [m].
+    axes : ndarray, shape (k, m, 3)
 
     Returns
     -------
-    centres, axes : ndarray, shape (m, 3)
+    centres, axes : ndarray, shape (k, m, 3)
         A point of the line [m] and its direction.
-    radii : ndarray, shape (m,)
+    radii : ndarray, shape (k, m)
         [m].
-    ends : ndarray, shape (m, 2)
+    ends : ndarray, shape (k, m, 2)
         From the centre along the axis [m].
 
     """
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    middle = 0.5 * (points.min(axis=-2) + points.max(axis=-2))[..., None, :]
     local = points - middle
-    along = axes @ local.T
-    square = (local * local).sum(axis=1) - along * along
-    centre = np.zeros((len(axes), 3))
-    row = np.arange(len(axes))
+    across_axes, twice = local.swapaxes(-1, -2), 2.0 * local.swapaxes(-1, -2)
+    along = axes @ across_axes
+    square = (local * local).sum(axis=-1)[..., None, :] - along * along
+    centre = np.zeros(axes.shape)
     # Centre of the least circle around the projections (Badoiu and Clarkson 2003).
-    best, least, nearest = centre, np.full(len(axes), np.inf), square
+    which, row = np.ogrid[: len(axes), : axes.shape[1]]
+    best, least, here = centre, np.full(axes.shape[:2], np.inf), np.empty(square.shape)
     for i in range(N_ROUNDS):
-        here = square - 2.0 * (centre @ local.T) + (centre * centre).sum(axis=1)[:, None]
-        far = here.argmax(axis=1)
-        is_less = (here[row, far] < least)[:, None]
-        least = np.where(is_less[:, 0], here[row, far], least)
-        best, nearest = np.where(is_less, centre, best), np.where(is_less, here, nearest)
-        across = local[far] - along[row, far, None] * axes
+        _squares_from(centre, twice, square, here)
+        far = here.argmax(axis=-1)
+        farthest = here[which, row, far]
+        is_less = farthest < least
+        least = np.where(is_less, farthest, least)
+        best = np.where(is_less[..., None], centre, best)
+        across = local[which, far] - along[which, row, far, None] * axes
         centre = centre + (across - centre) / (i + 2.0)
-    square = np.maximum(nearest, 0.0)
-    radii = THICKER[:, None] * np.sqrt(square.max(axis=1))
-    # A cap contains a point so far beyond its end.
-    beyond = np.sqrt(np.maximum(radii[..., None] ** 2 - square, 0.0))
-    low, high = (along + beyond).min(axis=2), (along - beyond).max(axis=2)
+    _squares_from(best, twice, square, here)
+    square = np.maximum(here, 0.0)
+    radii = THICKER * np.sqrt(square.max(axis=-1))[..., None]
+    low, high = np.empty(radii.shape), np.empty(radii.shape)
+    for k in range(len(THICKER)):
+        # A cap contains a point so far beyond its end.
+        beyond = np.sqrt(np.maximum(radii[..., k, None] ** 2 - square, 0.0))
+        low[..., k], high[..., k] = (along + beyond).min(axis=-1), (along - beyond).max(axis=-1)
     low, high = np.minimum(low, 0.5 * (low + high)), np.maximum(high, 0.5 * (low + high))
-    k = (np.pi * radii**2 * (high - low + 4.0 / 3.0 * radii)).argmin(axis=0)
-    return middle + best, axes, radii[k, row], np.stack([low[k, row], high[k, row]], axis=1)
+    volumes = np.pi * radii**2 * (high - low + 4.0 / 3.0 * radii)
+    k = volumes.argmin(axis=-1)
+    ends = np.stack([low[which, row, k], high[which, row, k]], axis=-1)
+    return middle + best, axes, radii[which, row, k], ends
+
+
+def _squares_from(centre: Array, twice: Array, square: Array, here: Array) -> None:
+    """Fill in the squares of the distances of points from centres, (..., m, n) [m^2]."""
+    np.matmul(centre, twice, out=here)
+    np.subtract(square, here, out=here)
+    here += (centre * centre).sum(axis=-1)[..., None]
 
 
 def _volumes(_centres: Array, _axes: Array, radii: Array, ends: Array) -> Array:
     """Return the volumes of capsules of `_capsules_along` [m^3]."""
-    result: Array = np.pi * radii**2 * (ends[:, 1] - ends[:, 0] + 4.0 / 3.0 * radii)
+    result: Array = np.pi * radii**2 * (ends[..., 1] - ends[..., 0] + 4.0 / 3.0 * radii)
     return result
 
 
