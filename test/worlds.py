@@ -5,6 +5,7 @@
 from dataclasses import replace
 import functools
 import itertools
+import math
 
 from hypothesis import HealthCheck, settings
 from numba import njit
@@ -373,46 +374,82 @@ def bezier_quintic(control):
 
 
 @njit
-def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halves):
-    """Walk a curve instant by instant: products of frames, bars clipped by slabs."""
-    dof = curve.shape[1]
+def _first_touch(dh, slides, T0, radii, q, reaches, centers, rotations, halves):
+    """
+    Look at instants, q (n, dof): products of frames, bars clipped by slabs.
+
+    Instants one after the other are passed at once where the arm at the middle one touches no box
+    that is grown by the most that any of its points moves to another of them.
+    """
+    dof = q.shape[1]
+    moved, stack = np.zeros(dof + 1), np.empty((64, 2), np.int64)
+    size, stack[0, 0], stack[0, 1] = 1, 0, q.shape[0] - 1
+    while size > 0:
+        size -= 1
+        first, last = stack[size, 0], stack[size, 1]
+        middle = (first + last) // 2
+        for j in range(dof + 1):
+            # By more than rounding.
+            moved[j] = 1e-9 if first < last else 0.0
+        for i in range(dof):
+            most = 0.0
+            for k in range(first, last + 1):
+                most = max(most, abs(q[k, i] - q[middle, i]))
+            for j in range(i, dof + 1):
+                moved[j] += most * reaches[i, j]
+        if not _touches(dh, slides, T0, radii, q[middle], moved, centers, rotations, halves):
+            continue
+        if first == last:
+            return first
+        # The earlier half is the next.
+        stack[size, 0], stack[size, 1] = middle + 1, last
+        stack[size + 1, 0], stack[size + 1, 1] = first, middle
+        size += 2
+    return -1
+
+
+@njit
+def _touches(dh, slides, T0, radii, q, moved, centers, rotations, halves):
+    """Return whether the arm touches a box; the bars of each row grow by what they may move."""
+    dof = q.shape[0]
     R, p = np.empty((3, 3)), np.empty(3)
     turned, corner, end = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for k in range(n):
-        u = k / (n - 1) if n > 1 else 0.0
-        R[:], p[:] = T0[:3, :3], T0[:3, 3]
-        for i in range(dof + 1):
-            value = 0.0
-            if i < dof:
-                for power in range(curve.shape[0] - 1, -1, -1):
-                    value = value * u + curve[power, i]
-            alpha, a, theta, d = dh[i]
-            if i == dof:
-                d = ray
-            elif slides[i]:
-                d += value
+    for r in range(3):
+        p[r] = T0[r, 3]
+        for c in range(3):
+            R[r, c] = T0[r, c]
+    for i in range(dof + 1):
+        alpha, a, theta, d = dh[i, 0], dh[i, 1], dh[i, 2], dh[i, 3]
+        if i < dof:
+            if slides[i]:
+                d += q[i]
             else:
-                theta += value
-            ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-            for r in range(3):
-                corner[r] = p[r] + a * R[r, 0]
-                y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
-                turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
-                turned[r, 2] = z
-                end[r] = corner[r] + d * z
-            for side in range(2):
-                length = a if side == 0 else d
-                is_mount = i == 0 and (side == 0 or not slides[0])
-                # An offset without length is no bar, whatever its radius.
-                is_bar = length != 0.0 or (side == 1 and (i == dof or slides[i]))
-                if is_mount or not is_bar:
-                    continue
-                first, last = (p, corner) if side == 0 else (corner, end)
-                for j in range(centers.shape[0]):
-                    if _is_touched(first, last, centers[j], rotations[j], halves[j], radii[i]):
-                        return k
-            R[:], p[:] = turned, end
-    return -1
+                theta += q[i]
+        ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+        for r in range(3):
+            corner[r] = p[r] + a * R[r, 0]
+            y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
+            turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
+            turned[r, 2] = z
+            end[r] = corner[r] + d * z
+        for side in range(2):
+            length = a if side == 0 else d
+            is_mount = i == 0 and (side == 0 or not slides[0])
+            # An offset without length is no bar, whatever its radius.
+            is_bar = length != 0.0 or (side == 1 and (i == dof or slides[i]))
+            if is_mount or not is_bar:
+                continue
+            start, stop = (p, corner) if side == 0 else (corner, end)
+            for j in range(centers.shape[0]):
+                if _is_touched(
+                    start, stop, centers[j], rotations[j], halves[j], radii[i] + moved[i]
+                ):
+                    return True
+        for r in range(3):
+            p[r] = end[r]
+            for c in range(3):
+                R[r, c] = turned[r, c]
+    return False
 
 
 @njit
@@ -438,19 +475,37 @@ def _is_touched(first, last, center, rotation, half, radius):
 
 def dense_touch(arm, scene, margin, ray, curve, n):
     """Return the first of n instants at which a polynomial motion touches a box, or -1."""
-    boxes = scene.boxes
+    u, q = np.arange(n)[:, None] / max(n - 1, 1), np.zeros((n, arm.dof))
+    for coefficients in curve[::-1]:
+        q = q * u + coefficients
+    boxes, dh, slides = scene.boxes, np.array(arm.dh), np.array(arm.is_prismatic)
+    dh[-1, 3] = ray
     return _first_touch(
-        arm.dh,
-        np.array(arm.is_prismatic),
-        arm.T_base_mount,
-        ray,
-        arm.radii,
-        np.ascontiguousarray(curve),
-        n,
+        dh,
+        slides,
+        np.array(arm.T_base_mount),
+        np.array(arm.radii),
+        np.ascontiguousarray(q),
+        _reaches(dh, slides, q),
         np.array([box.center for box in boxes]).reshape(-1, 3),
         np.array([box.rotation for box in boxes]).reshape(-1, 3, 3),
         np.array([0.5 * box.size + margin for box in boxes]).reshape(-1, 3),
     )
+
+
+def _reaches(dh, slides, q):
+    """
+    Return how far a unit of a joint moves the bars of a row at most, (dof, dof + 1) [m].
+
+    A joint that turns moves a point by no more than its distance from the axis, and that is no
+    more than the offsets after the joint; one that slides, by as much as itself.
+    """
+    lengths = np.abs(dh[:, [1, 3]]).sum(axis=1)
+    lengths[:-1] += np.where(slides, np.abs(q).max(axis=0), 0.0)
+    reaches = np.zeros((len(slides), len(dh)))
+    for i, is_sliding in enumerate(slides):
+        reaches[i, i:] = 1.0 if is_sliding else np.append(0.0, np.cumsum(lengths[i + 1 :]))
+    return reaches
 
 
 def edge_touches(arm, scene, margin, ray, q_from, q_to, spacing=5e-4):
