@@ -10,10 +10,19 @@ import math
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.collision.reference_checker import bar_ends_at
+from rrth_planner.collision.bar_pairs import pairs_of
+from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world, robot_rows, World
 from rrth_planner.io.arm_file import arm_from_mapping
-from rrth_planner.model.arm import ArmModel, bar_names, bars_of, Capsule, NO_BARS, tool_pose
+from rrth_planner.model.arm import (
+    ArmModel,
+    bar_names,
+    bars_of,
+    Capsule,
+    mount_bars,
+    NO_BARS,
+    tool_pose,
+)
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
@@ -85,6 +94,8 @@ def table_1_mapping():
     }
 
 
+# What is worked out of an arm once is known of that object, not of its equals.
+@functools.cache
 def table_1_arm(radius=0.0):
     """Return the arm of the paper, all its bars of one radius [m]."""
     data = table_1_mapping()
@@ -235,6 +246,12 @@ def capsule_arm(rng, dof=7):
     )
 
 
+@functools.cache
+def seeded_capsule_arm(seed):
+    """Return the same arm of capsules again and again."""
+    return capsule_arm(np.random.default_rng(seed))
+
+
 def compiled_chain(rng, has_tail):
     """Return one of a few random arms: each must be compiled, which takes a moment."""
     return _few_chains(int(rng.integers(N_CHAINS)), bool(has_tail))
@@ -350,6 +367,28 @@ def oracle_bars(arm, q, ray):
     """Return the bars that have a length as the oracle sees them, (n, n_bars, 2, 3) [m]."""
     ends: np.ndarray = bar_ends_at(arm, np.atleast_2d(q), ray)
     return ends[:, : len(bars_of(arm))]
+
+
+def self_distances(arm, q, ray):
+    """
+    Return the least distance of any pair that must not touch, by numpy, (n, dof) -> (n,) [m].
+
+    Pairs whose middles are so far apart that they cannot be the nearest are left out.
+    """
+    ends = bar_ends_at(arm, q, ray)
+    radii = np.array([bar.radius for bar in (*bars_of(arm), *mount_bars(arm))])
+    pairs = pairs_of(arm)
+    inner, outer = [pair.inner for pair in pairs], [pair.outer for pair in pairs]
+    middles = ends.mean(axis=2)
+    halves = 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    away = np.linalg.norm(middles[:, inner] - middles[:, outer], axis=2)
+    away -= radii[inner] + radii[outer]
+    least = away - halves[:, inner] - halves[:, outer]
+    row, k = np.nonzero(least <= away.min(axis=1, keepdims=True) + 1e-9)
+    i, j = np.array(inner)[k], np.array(outer)[k]
+    distances = np.full(least.shape, np.inf)
+    distances[row, k] = bar_distances(ends[row, i], ends[row, j]) - radii[i] - radii[j]
+    return distances.min(axis=1)
 
 
 def line(q_from, q_to):

@@ -11,17 +11,17 @@ import pytest
 from rrth_planner.collision import second_checker
 from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.distance_library import LIBRARIES, library_of
-from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import bars_of, mount_bars, tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import (
-    capsule_arm,
     compiled_chain,
     dense_touch,
     free_configuration,
     random_boxes,
+    seeded_capsule_arm,
+    self_distances,
     table_1_arm,
     varied_body,
     wearer,
@@ -293,7 +293,7 @@ def test_objects_of_the_library_are_used_again(checker, monkeypatch):
 
 @pytest.mark.parametrize('seed', [0, 2])
 def test_capsules_are_as_far_from_boxes_as_by_the_kernels(checker, seed):
-    arm = capsule_arm(np.random.default_rng(seed))
+    arm = seeded_capsule_arm(seed)
     names = sorted({bar.name for bar in (*bars_of(arm), *mount_bars(arm))})
     rng = np.random.default_rng(30 + seed)
     allowed = replace(arm, allowed=((names[1], 'box_0'), (names[-2], 'box_1')))
@@ -303,7 +303,7 @@ def test_capsules_are_as_far_from_boxes_as_by_the_kernels(checker, seed):
 
 @pytest.mark.parametrize('seed', [0, 2, 3])
 def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(checker, seed):
-    arm, rng = capsule_arm(np.random.default_rng(seed)), np.random.default_rng(40 + seed)
+    arm, rng = seeded_capsule_arm(seed), np.random.default_rng(40 + seed)
     nothing, n_free, n_touching = Scene(()), 0, 0
     pairs = {frozenset(pair_names(arm, pair)) for pair in pairs_of(arm)}
     for _ in range(40):
@@ -311,14 +311,7 @@ def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(check
         q_to = np.clip(q_from + 0.6 * rng.standard_normal(arm.dof), *arm.bounds)
         trajectory = straight(q_from, q_to)
         dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 201))
-        ends = bar_ends_at(arm, dense, 0.4)
-        radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
-        least = min(
-            (
-                bar_distances(ends[:, p.inner], ends[:, p.outer]) - radii[p.inner] - radii[p.outer]
-            ).min()
-            for p in pairs_of(arm)
-        )
+        least = self_distances(arm, dense, 0.4).min()
         violation = checker.first_violation(arm, nothing, trajectory, 0.02, 0.4, 0.4)
         if least > 1e-4:
             n_free += 1
