@@ -235,18 +235,26 @@ def is_free_at_instants(q_from, q_to, resolution, chain, robot, boxes):
     length = 0.0
     for k in range(q_from.shape[0]):
         length += (q_to[k] - q_from[k]) ** 2
-    length = np.sqrt(length)
-    n = int(length / resolution) + 2
-    q = np.empty(q_from.shape[0])
-    i = 0
-    while i < n:
+    n = int(np.sqrt(length) / resolution) + 2
+    q, stack = np.empty(q_from.shape[0]), np.empty((64, 2), np.int64)
+    size, stack[0, 0], stack[0, 1] = 1, 0, n - 1
+    while size > 0:
+        size -= 1
+        first, last = stack[size, 0], stack[size, 1]
+        i = (first + last) // 2
         for k in range(q.shape[0]):
             q[k] = q_from[k] + i / (n - 1) * (q_to[k] - q_from[k])
         if not is_configuration_free(q, robot[q.shape[0], D], chain, robot, boxes):
             return False
-        # Less by more than rounding; the instants are less than `resolution` apart.
+        # Instants are less than `resolution` apart; by 1e-9 less than the radius, for rounding.
         radius = free_radius(q, chain, robot, boxes) - 1e-9
-        i += 1 + max(0, int(min(radius / resolution, n)))
+        n_beside = max(0, int(min(radius / resolution, n)))
+        if first < i - n_beside:
+            stack[size, 0], stack[size, 1] = first, i - n_beside - 1
+            size += 1
+        if i + n_beside < last:
+            stack[size, 0], stack[size, 1] = i + n_beside + 1, last
+            size += 1
     return True
 
 
