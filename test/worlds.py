@@ -547,6 +547,18 @@ def _reaches(dh, slides, q):
     return reaches
 
 
+def longest_ways(arm, q, ray):
+    """
+    Return how far a point of the arm may have moved until each instant, (n, dof) -> (n,) [m].
+
+    Between two of them none moves further than the difference.
+    """
+    dh = np.array(arm.dh)
+    dh[-1, 3] = ray
+    reaches = _reaches(dh, np.array(arm.is_prismatic), q).max(axis=1)
+    return np.append(0.0, np.cumsum(np.abs(np.diff(q, axis=0)) @ reaches))
+
+
 def edge_touches(arm, scene, margin, ray, q_from, q_to, spacing=5e-4):
     """Return whether an edge looked at every `spacing` [rad] touches a box."""
     n = int(np.linalg.norm(q_to - q_from) / spacing) + 2
