@@ -5,14 +5,24 @@
 from dataclasses import replace
 import functools
 import itertools
+import math
 
 from hypothesis import HealthCheck, settings
 from numba import njit
 import numpy as np
-from rrth_planner.collision.reference_checker import bar_ends_at
+from rrth_planner.collision.bar_pairs import pairs_of
+from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world, robot_rows, World
 from rrth_planner.io.arm_file import arm_from_mapping
-from rrth_planner.model.arm import ArmModel, bar_names, bars_of, Capsule, NO_BARS, tool_pose
+from rrth_planner.model.arm import (
+    ArmModel,
+    bar_names,
+    bars_of,
+    Capsule,
+    mount_bars,
+    NO_BARS,
+    tool_pose,
+)
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
@@ -84,6 +94,7 @@ def table_1_mapping():
     }
 
 
+# What is worked out of an arm once is known of that object, not of its equals.
 @functools.cache
 def table_1_arm(radius=0.0):
     """Return the arm of the paper, all its bars of one radius [m]."""
@@ -237,6 +248,12 @@ def capsule_arm(rng, dof=7):
     )
 
 
+@functools.cache
+def seeded_capsule_arm(seed):
+    """Return the same arm of capsules again and again."""
+    return capsule_arm(np.random.default_rng(seed))
+
+
 def compiled_chain(rng, has_tail):
     """Return one of a few random arms: each must be compiled, which takes a moment."""
     return _few_chains(int(rng.integers(N_CHAINS)), bool(has_tail))
@@ -355,6 +372,28 @@ def oracle_bars(arm, q, ray):
     return ends[:, : len(bars_of(arm))]
 
 
+def self_distances(arm, q, ray):
+    """
+    Return the least distance of any pair that must not touch, by numpy, (n, dof) -> (n,) [m].
+
+    Pairs whose middles are so far apart that they cannot be the nearest are left out.
+    """
+    ends = bar_ends_at(arm, q, ray)
+    radii = np.array([bar.radius for bar in (*bars_of(arm), *mount_bars(arm))])
+    pairs = pairs_of(arm)
+    inner, outer = [pair.inner for pair in pairs], [pair.outer for pair in pairs]
+    middles = ends.mean(axis=2)
+    halves = 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    away = np.linalg.norm(middles[:, inner] - middles[:, outer], axis=2)
+    away -= radii[inner] + radii[outer]
+    least = away - halves[:, inner] - halves[:, outer]
+    row, k = np.nonzero(least <= away.min(axis=1, keepdims=True) + 1e-9)
+    i, j = np.array(inner)[k], np.array(outer)[k]
+    distances = np.full(least.shape, np.inf)
+    distances[row, k] = bar_distances(ends[row, i], ends[row, j]) - radii[i] - radii[j]
+    return distances.min(axis=1)
+
+
 def line(q_from, q_to):
     """Return the straight motion as polynomial coefficients, lowest first, (2, dof)."""
     return np.stack([q_from, q_to - q_from])
@@ -377,46 +416,82 @@ def bezier_quintic(control):
 
 
 @njit(cache=True)
-def _first_touch(dh, slides, T0, ray, radii, curve, n, centers, rotations, halves):
-    """Walk a curve instant by instant: products of frames, bars clipped by slabs."""
-    dof = curve.shape[1]
+def _first_touch(dh, slides, T0, radii, q, reaches, centers, rotations, halves):
+    """
+    Look at instants, q (n, dof): products of frames, bars clipped by slabs.
+
+    Instants one after the other are passed at once where the arm at the middle one touches no box
+    that is grown by the most that any of its points moves to another of them.
+    """
+    dof = q.shape[1]
+    moved, stack = np.zeros(dof + 1), np.empty((64, 2), np.int64)
+    size, stack[0, 0], stack[0, 1] = 1, 0, q.shape[0] - 1
+    while size > 0:
+        size -= 1
+        first, last = stack[size, 0], stack[size, 1]
+        middle = (first + last) // 2
+        for j in range(dof + 1):
+            # By more than rounding.
+            moved[j] = 1e-9 if first < last else 0.0
+        for i in range(dof):
+            most = 0.0
+            for k in range(first, last + 1):
+                most = max(most, abs(q[k, i] - q[middle, i]))
+            for j in range(i, dof + 1):
+                moved[j] += most * reaches[i, j]
+        if not _touches(dh, slides, T0, radii, q[middle], moved, centers, rotations, halves):
+            continue
+        if first == last:
+            return first
+        # The earlier half is the next.
+        stack[size, 0], stack[size, 1] = middle + 1, last
+        stack[size + 1, 0], stack[size + 1, 1] = first, middle
+        size += 2
+    return -1
+
+
+@njit(cache=True)
+def _touches(dh, slides, T0, radii, q, moved, centers, rotations, halves):
+    """Return whether the arm touches a box; the bars of each row grow by what they may move."""
+    dof = q.shape[0]
     R, p = np.empty((3, 3)), np.empty(3)
     turned, corner, end = np.empty((3, 3)), np.empty(3), np.empty(3)
-    for k in range(n):
-        u = k / (n - 1) if n > 1 else 0.0
-        R[:], p[:] = T0[:3, :3], T0[:3, 3]
-        for i in range(dof + 1):
-            value = 0.0
-            if i < dof:
-                for power in range(curve.shape[0] - 1, -1, -1):
-                    value = value * u + curve[power, i]
-            alpha, a, theta, d = dh[i]
-            if i == dof:
-                d = ray
-            elif slides[i]:
-                d += value
+    for r in range(3):
+        p[r] = T0[r, 3]
+        for c in range(3):
+            R[r, c] = T0[r, c]
+    for i in range(dof + 1):
+        alpha, a, theta, d = dh[i, 0], dh[i, 1], dh[i, 2], dh[i, 3]
+        if i < dof:
+            if slides[i]:
+                d += q[i]
             else:
-                theta += value
-            ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
-            for r in range(3):
-                corner[r] = p[r] + a * R[r, 0]
-                y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
-                turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
-                turned[r, 2] = z
-                end[r] = corner[r] + d * z
-            for side in range(2):
-                length = a if side == 0 else d
-                is_mount = i == 0 and (side == 0 or not slides[0])
-                # An offset without length is no bar, whatever its radius.
-                is_bar = length != 0.0 or (side == 1 and (i == dof or slides[i]))
-                if is_mount or not is_bar:
-                    continue
-                first, last = (p, corner) if side == 0 else (corner, end)
-                for j in range(centers.shape[0]):
-                    if _is_touched(first, last, centers[j], rotations[j], halves[j], radii[i]):
-                        return k
-            R[:], p[:] = turned, end
-    return -1
+                theta += q[i]
+        ca, sa, ct, st = math.cos(alpha), math.sin(alpha), math.cos(theta), math.sin(theta)
+        for r in range(3):
+            corner[r] = p[r] + a * R[r, 0]
+            y, z = ca * R[r, 1] + sa * R[r, 2], ca * R[r, 2] - sa * R[r, 1]
+            turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
+            turned[r, 2] = z
+            end[r] = corner[r] + d * z
+        for side in range(2):
+            length = a if side == 0 else d
+            is_mount = i == 0 and (side == 0 or not slides[0])
+            # An offset without length is no bar, whatever its radius.
+            is_bar = length != 0.0 or (side == 1 and (i == dof or slides[i]))
+            if is_mount or not is_bar:
+                continue
+            start, stop = (p, corner) if side == 0 else (corner, end)
+            for j in range(centers.shape[0]):
+                if _is_touched(
+                    start, stop, centers[j], rotations[j], halves[j], radii[i] + moved[i]
+                ):
+                    return True
+        for r in range(3):
+            p[r] = end[r]
+            for c in range(3):
+                R[r, c] = turned[r, c]
+    return False
 
 
 @njit(cache=True)
@@ -442,19 +517,49 @@ def _is_touched(first, last, center, rotation, half, radius):
 
 def dense_touch(arm, scene, margin, ray, curve, n):
     """Return the first of n instants at which a polynomial motion touches a box, or -1."""
-    boxes = scene.boxes
+    u, q = np.arange(n)[:, None] / max(n - 1, 1), np.zeros((n, arm.dof))
+    for coefficients in curve[::-1]:
+        q = q * u + coefficients
+    boxes, dh, slides = scene.boxes, np.array(arm.dh), np.array(arm.is_prismatic)
+    dh[-1, 3] = ray
     return _first_touch(
-        arm.dh,
-        np.array(arm.is_prismatic),
-        arm.T_base_mount,
-        ray,
-        arm.radii,
-        np.ascontiguousarray(curve),
-        n,
+        dh,
+        slides,
+        np.array(arm.T_base_mount),
+        np.array(arm.radii),
+        np.ascontiguousarray(q),
+        _reaches(dh, slides, q),
         np.array([box.center for box in boxes]).reshape(-1, 3),
         np.array([box.rotation for box in boxes]).reshape(-1, 3, 3),
         np.array([0.5 * box.size + margin for box in boxes]).reshape(-1, 3),
     )
+
+
+def _reaches(dh, slides, q):
+    """
+    Return how far a unit of a joint moves the bars of a row at most, (dof, dof + 1) [m].
+
+    A joint that turns moves a point by no more than its distance from the axis, and that is no
+    more than the offsets after the joint; one that slides, by as much as itself.
+    """
+    lengths = np.abs(dh[:, [1, 3]]).sum(axis=1)
+    lengths[:-1] += np.where(slides, np.abs(q).max(axis=0), 0.0)
+    reaches = np.zeros((len(slides), len(dh)))
+    for i, is_sliding in enumerate(slides):
+        reaches[i, i:] = 1.0 if is_sliding else np.append(0.0, np.cumsum(lengths[i + 1 :]))
+    return reaches
+
+
+def longest_ways(arm, q, ray):
+    """
+    Return how far a point of the arm may have moved until each instant, (n, dof) -> (n,) [m].
+
+    Between two of them none moves further than the difference.
+    """
+    dh = np.array(arm.dh)
+    dh[-1, 3] = ray
+    reaches = _reaches(dh, np.array(arm.is_prismatic), q).max(axis=1)
+    return np.append(0.0, np.cumsum(np.abs(np.diff(q, axis=0)) @ reaches))
 
 
 def edge_touches(arm, scene, margin, ray, q_from, q_to, spacing=5e-4):

@@ -11,17 +11,19 @@ import pytest
 from rrth_planner.collision import second_checker
 from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.distance_library import LIBRARIES, library_of
-from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world
 from rrth_planner.model.arm import bars_of, mount_bars, tool_pose
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import sample, Trajectory
 from worlds import (
-    capsule_arm,
     compiled_chain,
     dense_touch,
     free_configuration,
+    longest_ways,
+    oracle_bars,
     random_boxes,
+    seeded_capsule_arm,
+    self_distances,
     table_1_arm,
     varied_body,
     wearer,
@@ -100,7 +102,7 @@ def test_contacts_deeper_than_a_millimetre_are_found(checker):
         curve = np.stack([q_from, q_to - q_from])
         violation = checker.first_violation(arm, scene, trajectory, 0.02, 1.0, 1.0)
         # Round corners: what the grown boxes touch only at their edges may pass the margin.
-        if min(world.clearances(q).min() for q in dense[::8]) < -0.0125:
+        if world.clearances(np.ascontiguousarray(dense[::8])).min() < -0.0125:
             assert violation is not None
             n_touching += 1
         if dense_touch(arm, scene, 0.02, 1.0, curve, 8000) < 0:
@@ -113,7 +115,7 @@ def test_contacts_deeper_than_a_millimetre_are_found(checker):
             assert own[bar, box] < 0.02 + 1e-5
             earlier = dense[: int(violation.time * 4000) - 8 : 8]
             bare = arm_world(arm, scene, 0.0, 1.0)
-            assert all(bare.clearances(q).min() > 0.019 for q in earlier)
+            assert bare.clearances(np.ascontiguousarray(earlier)).min() > 0.019
     assert n_touching > 8
     assert n_free > 10
 
@@ -132,30 +134,66 @@ def wiggle(rng, arm, scale):
     )
 
 
+def every_millisecond(trajectory):
+    """Return the instants that the checker may look at, and the joint positions there."""
+    n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
+    times = np.linspace(0.0, trajectory.duration, n + 1)
+    return times, sample(trajectory, times)[0]
+
+
+def next_instant(ways, k, room):
+    """Return the first instant after k until which a point of the arm may move that far [m]."""
+    # By less than it, for rounding of the library.
+    return max(k + 1, int(np.searchsorted(ways, ways[k] + room - 1e-5)))
+
+
 def first_touch_by_brute_force(checker, arm, scene, trajectory, margin, ray):
     """
     Return the time of the first millisecond at which the library finds less, or None.
 
     Those within which no point of the arm can come as near are left out.
     """
-    n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
-    times = np.linspace(0.0, trajectory.duration, n + 1)
-    least, way, k = margin - second_checker.TOLERANCE, fastest(arm, trajectory, ray) * times[1], 0
-    q = sample(trajectory, times)[0]
-    while k <= n:
+    times, q = every_millisecond(trajectory)
+    ways, least, k = longest_ways(arm, q, ray), margin - second_checker.TOLERANCE, 0
+    while k < len(q):
         distance = checker.nearest(arm, scene, q[k], ray).distance
         if distance < least:
             return times[k]
-        k += 1 + int((distance - least) / way)
+        k = next_instant(ways, k, distance - least)
     return None
 
 
-def fastest(arm, trajectory, ray):
-    """Return a speed that no point of the arm exceeds in a motion [m/s]."""
-    speeds = np.abs(sample(trajectory, np.linspace(0.0, trajectory.duration, 2000))[1]).max(axis=0)
-    slides = np.array(arm.is_prismatic)
-    length = np.abs(arm.dh[:, [1, 3]]).sum() + np.abs(arm.bounds).max(axis=0)[slides].sum() + ray
-    return 1.1 * (speeds * np.where(slides, 1.0, length)).sum()
+def least_by_brute_force(checker, arm, scene, trajectory, ray):
+    """
+    Return the least distance that the library finds at any millisecond; < 0: some contact.
+
+    Those at which no point of the arm can be nearer than elsewhere are left out.
+    """
+    _, q = every_millisecond(trajectory)
+    ways = longest_ways(arm, q, ray)
+    # A first idea.
+    least = min(checker.nearest(arm, scene, one, ray).distance for one in q[::25])
+    k = 0
+    while k < len(q) and least >= 0.0:
+        distance = checker.nearest(arm, scene, q[k], ray).distance
+        least = min(least, distance)
+        k = next_instant(ways, k, distance - least)
+    return least
+
+
+def test_no_point_of_an_arm_moves_further_than_its_longest_way():
+    rng = np.random.default_rng(27)
+    shares = []
+    for i in range(40):
+        arm = compiled_chain(rng, i % 2 == 0) if i % 4 else table_1_arm()
+        _, q = every_millisecond(wiggle(rng, arm, rng.choice([0.3, 1.0, 3.0])))
+        ends, ways = oracle_bars(arm, q, 0.5), longest_ways(arm, q, 0.5)
+        for k in range(0, len(q), 20):
+            moved = np.linalg.norm(ends - ends[k], axis=-1).max(axis=(1, 2))
+            longest = np.abs(ways - ways[k])
+            assert (moved <= longest + 1e-9).all()
+            shares.append((moved / np.maximum(longest, 1e-9)).max())
+    assert max(shares) > 0.5
 
 
 def test_the_first_violation_is_that_of_a_check_every_millisecond(checker):
@@ -188,19 +226,15 @@ def test_a_violation_of_one_instant_is_found(checker):
     for _ in range(40):
         scene = varied_body(rng)
         trajectory = wiggle(rng, arm, 1.0)
-        n = int(np.ceil(trajectory.duration / second_checker.PERIOD))
-        times = np.linspace(0.0, trajectory.duration, n + 1)
-        q, _, _ = sample(trajectory, times)
-        least = [checker.nearest(arm, scene, one, 1.0).distance for one in q]
-        lowest = int(np.argmin(least))
-        if least[lowest] < 0.0:
+        least = least_by_brute_force(checker, arm, scene, trajectory, 1.0)
+        if least < 0.0:
             continue
         n_found += 1
-        margin = least[lowest] + 2 * second_checker.TOLERANCE
+        margin = least + 2 * second_checker.TOLERANCE
         violation = checker.first_violation(arm, scene, trajectory, margin, 1.0, 1.0)
         assert violation is not None
-        assert violation.distance == pytest.approx(least[lowest], abs=2 * second_checker.TOLERANCE)
-        assert checker.first_violation(arm, scene, trajectory, least[lowest], 1.0, 1.0) is None
+        assert violation.distance == pytest.approx(least, abs=2 * second_checker.TOLERANCE)
+        assert checker.first_violation(arm, scene, trajectory, least, 1.0, 1.0) is None
     assert n_found > 10
 
 
@@ -293,7 +327,7 @@ def test_objects_of_the_library_are_used_again(checker, monkeypatch):
 
 @pytest.mark.parametrize('seed', [0, 2])
 def test_capsules_are_as_far_from_boxes_as_by_the_kernels(checker, seed):
-    arm = capsule_arm(np.random.default_rng(seed))
+    arm = seeded_capsule_arm(seed)
     names = sorted({bar.name for bar in (*bars_of(arm), *mount_bars(arm))})
     rng = np.random.default_rng(30 + seed)
     allowed = replace(arm, allowed=((names[1], 'box_0'), (names[-2], 'box_1')))
@@ -303,7 +337,7 @@ def test_capsules_are_as_far_from_boxes_as_by_the_kernels(checker, seed):
 
 @pytest.mark.parametrize('seed', [0, 2, 3])
 def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(checker, seed):
-    arm, rng = capsule_arm(np.random.default_rng(seed)), np.random.default_rng(40 + seed)
+    arm, rng = seeded_capsule_arm(seed), np.random.default_rng(40 + seed)
     nothing, n_free, n_touching = Scene(()), 0, 0
     pairs = {frozenset(pair_names(arm, pair)) for pair in pairs_of(arm)}
     for _ in range(40):
@@ -311,14 +345,7 @@ def test_an_arm_that_touches_itself_is_found_and_one_that_does_not_is_free(check
         q_to = np.clip(q_from + 0.6 * rng.standard_normal(arm.dof), *arm.bounds)
         trajectory = straight(q_from, q_to)
         dense, _, _ = sample(trajectory, np.linspace(0.0, 1.0, 201))
-        ends = bar_ends_at(arm, dense, 0.4)
-        radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
-        least = min(
-            (
-                bar_distances(ends[:, p.inner], ends[:, p.outer]) - radii[p.inner] - radii[p.outer]
-            ).min()
-            for p in pairs_of(arm)
-        )
+        least = self_distances(arm, dense, 0.4).min()
         violation = checker.first_violation(arm, nothing, trajectory, 0.02, 0.4, 0.4)
         if least > 1e-4:
             n_free += 1

@@ -18,7 +18,7 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import growth_at, seen_body, SeparationRules
 from rrth_planner.model.trajectory import part_of, sample, Trajectory
 from sample_motions import motion_of
-from worlds import capsule_arm, random_boxes, random_chain, random_rotation, table_1_arm
+from worlds import random_boxes, random_chain, random_rotation, seeded_capsule_arm, table_1_arm
 
 RULES = SeparationRules()
 LENGTH, RADIUS = 0.5, 0.03
@@ -34,7 +34,7 @@ def arms():
     """Return arms of thick bars, of capsules on a mount, and some that slide: few to compile."""
     chains = [random_chain(np.random.default_rng(seed), True) for seed in (1, 29)]
     assert all(any(arm.is_prismatic) and arm.radii.any() for arm in chains)
-    return (table_1_arm(0.03), capsule_arm(np.random.default_rng(0)), *chains)
+    return (table_1_arm(0.03), seeded_capsule_arm(0), *chains)
 
 
 def margins_at(arm, body, motion, rules, times):

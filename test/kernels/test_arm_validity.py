@@ -16,6 +16,7 @@ from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.certificate import derivative_bounds
 from rrth_planner.collision.reference_checker import bar_box_contact, bars, first_contact
 from rrth_planner.collision.world import arm_world
+from rrth_planner.kernels.collision.arm_clearance import free_radius
 from rrth_planner.kernels.collision.arm_validity import (
     is_configuration_free,
     is_edge_free,
@@ -104,18 +105,23 @@ def test_configurations_are_checked_as_by_the_reference_checker():
 
 def test_the_dense_oracle_of_the_tests_is_the_reference_checker():
     rng = np.random.default_rng(13)
-    n_touching = 0
+    n_touching = n_later = 0
     for i in range(60):
         arm, scene = random_chain(rng, i % 2 == 0), random_boxes(rng, 4, spread=0.6)
         thin = np.full(arm.dof + 1, 0.02)
         object.__setattr__(arm, 'radii', thin)
         q_from, q_to = rng.uniform(*arm.bounds, (2, arm.dof))
-        share = np.linspace(0.0, 1.0, 200)[:, None]
-        contact = first_contact(arm, scene, q_from + share * (q_to - q_from), 0.5, 0.01)
-        expected = -1 if contact is None else contact.index
-        assert dense_touch(arm, scene, 0.01, 0.5, line(q_from, q_to), 200) == expected
-        n_touching += contact is not None
-    assert 10 < n_touching < 58
+        control = q_from + 0.3 * (rng.uniform(*arm.bounds, (6, arm.dof)) - q_from)
+        for curve in (line(q_from, q_to), bezier_quintic(control)):
+            u = np.linspace(0.0, 1.0, 1000)[:, None]
+            q = sum(c * u**power for power, c in enumerate(curve))
+            contact = first_contact(arm, scene, q, 0.5, 0.01)
+            expected = -1 if contact is None else contact.index
+            assert dense_touch(arm, scene, 0.01, 0.5, curve, 1000) == expected
+            n_touching += contact is not None
+            n_later += contact is not None and contact.index > 0
+    assert 20 < n_touching < 116
+    assert n_later > 10
 
 
 def test_no_random_edge_is_certified_that_collides():
@@ -221,24 +227,41 @@ def test_planned_edges_are_certified_in_the_other_direction_too(shortened_edges)
 
 @kernel(boolean(VEC, VEC, float64, CHAIN, MAT, MAT))
 def is_free_at_instants(q_from, q_to, resolution, chain, robot, boxes):
-    """Return whether an edge is free at instants of some spacing: no proof."""
+    """
+    Return whether an edge is free at instants of some spacing: no proof.
+
+    Those in the free ball round one that is looked at need no look.
+    """
     length = 0.0
     for k in range(q_from.shape[0]):
         length += (q_to[k] - q_from[k]) ** 2
     n = int(np.sqrt(length) / resolution) + 2
-    q = np.empty(q_from.shape[0])
-    for i in range(n):
+    q, stack = np.empty(q_from.shape[0]), np.empty((64, 2), np.int64)
+    size, stack[0, 0], stack[0, 1] = 1, 0, n - 1
+    while size > 0:
+        size -= 1
+        first, last = stack[size, 0], stack[size, 1]
+        i = (first + last) // 2
         for k in range(q.shape[0]):
             q[k] = q_from[k] + i / (n - 1) * (q_to[k] - q_from[k])
         if not is_configuration_free(q, robot[q.shape[0], D], chain, robot, boxes):
             return False
+        # Instants are less than `resolution` apart; by 1e-9 less than the radius, for rounding.
+        radius = free_radius(q, chain, robot, boxes) - 1e-9
+        n_beside = max(0, int(min(radius / resolution, n)))
+        if first < i - n_beside:
+            stack[size, 0], stack[size, 1] = first, i - n_beside - 1
+            size += 1
+        if i + n_beside < last:
+            stack[size, 0], stack[size, 1] = i + n_beside + 1, last
+            size += 1
     return True
 
 
 def test_edges_shortened_with_a_sampled_check_are_nearly_all_certified_if_free():
     world, arm, scene = wearer_world(), table_1_arm(), wearer()
     sampled = replace(world, edge_check=first_class(is_free_at_instants))
-    options = RRTHOptions(club_attempts=0, improve_time=0.0)
+    options = RRTHOptions(club_attempts=0, improve_time=0.0, time_limit=1000.0)
     rng = np.random.default_rng(11)
     results = []
     while len(results) < 300:

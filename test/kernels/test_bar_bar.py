@@ -15,30 +15,34 @@ from rrth_planner.kernels.collision.arm_validity import prove_curve
 from rrth_planner.kernels.collision.bar_bar import segment_gap
 from rrth_planner.model.arm import bar_names, bars_of, Capsule, mount_bars
 from rrth_planner.model.scene import Scene
-from worlds import bezier_quintic, capsule_arm, examples, random_boxes, table_1_arm, wearer
+from worlds import (
+    bezier_quintic,
+    examples,
+    random_boxes,
+    seeded_capsule_arm,
+    self_distances,
+    table_1_arm,
+    wearer,
+)
 
 SEEDS = st.integers(0, 2**32 - 1)
 RAY = 0.4
 ARMS = (0, 2, 3)
 
 
-def arm_of(k):
-    return capsule_arm(np.random.default_rng(k))
-
-
-def self_distances(arm, q):
-    """Return the least distance of any pair that must not touch, by numpy, (n, dof) -> (n,)."""
-    ends = bar_ends_at(arm, q, RAY)
-    radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
-    return np.min(
-        [
+def test_the_least_distance_of_pairs_is_that_of_all_pairs():
+    for k in ARMS:
+        arm = seeded_capsule_arm(k)
+        q = np.random.default_rng(300 + k).uniform(*arm.bounds, (200, arm.dof))
+        ends = bar_ends_at(arm, q, RAY)
+        radii = [bar.radius for bar in (*bars_of(arm), *mount_bars(arm))]
+        every = [
             bar_distances(ends[:, pair.inner], ends[:, pair.outer])
             - radii[pair.inner]
             - radii[pair.outer]
             for pair in pairs_of(arm)
-        ],
-        axis=0,
-    )
+        ]
+        assert np.array_equal(self_distances(arm, q, RAY), np.min(every, axis=0))
 
 
 @examples(300)
@@ -61,10 +65,10 @@ def test_the_gap_of_two_lines_is_the_reference_checkers(seed, is_parallel, n_poi
 
 @pytest.mark.parametrize('k', ARMS)
 def test_a_configuration_is_valid_where_no_pair_touches(k):
-    arm, rng = arm_of(k), np.random.default_rng(k)
+    arm, rng = seeded_capsule_arm(k), np.random.default_rng(k)
     world = arm_world(arm, Scene(()), 0.0, RAY)
     q = rng.uniform(*arm.bounds, (1000, arm.dof))
-    least = self_distances(arm, q)
+    least = self_distances(arm, q, RAY)
     valid = np.array([world.is_valid(row) for row in q])
     assert np.array_equal(valid, least > 1e-9)
     assert 0.02 < np.mean(valid) < 0.98
@@ -77,7 +81,7 @@ def test_a_configuration_is_valid_where_no_pair_touches(k):
 
 @pytest.mark.parametrize('k', ARMS)
 def test_no_accepted_edge_touches_itself_and_those_that_keep_apart_are_accepted(k):
-    arm, rng = arm_of(k), np.random.default_rng(100 + k)
+    arm, rng = seeded_capsule_arm(k), np.random.default_rng(100 + k)
     world = arm_world(arm, Scene(()), 0.0, RAY)
     n_accepted = n_apart = 0
     for _ in range(40):
@@ -86,7 +90,8 @@ def test_no_accepted_edge_touches_itself_and_those_that_keep_apart_are_accepted(
         q_to = np.clip(q_to, *arm.bounds)
         is_free = world.is_edge_valid(q_from, q_to)
         n = int(np.linalg.norm(q_to - q_from) / 1e-2) + 2
-        least = self_distances(arm, q_from + np.linspace(0.0, 1.0, n)[:, None] * (q_to - q_from))
+        q = q_from + np.linspace(0.0, 1.0, n)[:, None] * (q_to - q_from)
+        least = self_distances(arm, q, RAY)
         if is_free:
             n_accepted += 1
             assert least.min() > 0.0
@@ -98,7 +103,7 @@ def test_no_accepted_edge_touches_itself_and_those_that_keep_apart_are_accepted(
 
 @pytest.mark.parametrize('k', ARMS)
 def test_no_proven_curve_touches_itself(k):
-    arm, rng = arm_of(k), np.random.default_rng(200 + k)
+    arm, rng = seeded_capsule_arm(k), np.random.default_rng(200 + k)
     world, n_proven = arm_world(arm, Scene(()), 0.0, RAY), 0
     for _ in range(25):
         middle = rng.uniform(*arm.bounds)
@@ -110,7 +115,7 @@ def test_no_proven_curve_touches_itself(k):
         n_proven += 1
         u = np.linspace(0.0, 1.0, 300)[:, None]
         q = sum(c * u**power for power, c in enumerate(curve))
-        assert self_distances(arm, q).min() > 0.0
+        assert self_distances(arm, q, RAY).min() > 0.0
     assert n_proven > 3
 
 
@@ -118,7 +123,7 @@ def test_no_proven_curve_touches_itself(k):
 @given(seed=SEEDS)
 def test_pairs_left_out_never_collide_or_always_do(seed):
     rng = np.random.default_rng(seed)
-    arm = arm_of(ARMS[rng.integers(len(ARMS))])
+    arm = seeded_capsule_arm(ARMS[rng.integers(len(ARMS))])
     bars, kept = (*bars_of(arm), *mount_bars(arm)), {(p.inner, p.outer) for p in pairs_of(arm)}
     q = rng.uniform(*arm.bounds, (400, arm.dof))
     ends = bar_ends_at(arm, q, RAY)
@@ -136,7 +141,7 @@ def test_the_arm_of_the_paper_cannot_touch_itself():
 
 
 def test_pairs_that_may_touch_are_no_pairs():
-    arm = arm_of(0)
+    arm = seeded_capsule_arm(0)
     names = {bar.name for bar in (*bars_of(arm), *mount_bars(arm))}
     allowed = tuple((one, other) for one in names for other in names)
     assert pairs_of(replace(arm, allowed=allowed)) == ()
@@ -168,7 +173,7 @@ def test_a_bar_that_may_touch_a_box_ignores_that_box_and_nothing_else():
 
 
 def test_boxes_and_the_arm_itself_are_both_avoided():
-    arm, rng = arm_of(1), np.random.default_rng(9)
+    arm, rng = seeded_capsule_arm(1), np.random.default_rng(9)
     scene = random_boxes(rng, 12, spread=0.8)
     both, boxes = arm_world(arm, scene, 0.01, RAY), arm_world(arm, Scene(()), 0.0, RAY)
     free = replace(arm, allowed=tuple((a, b) for a in names_of(arm) for b in names_of(arm)))
