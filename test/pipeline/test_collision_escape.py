@@ -82,7 +82,7 @@ def collides(arm, box, q, growth, part=ARM):
     """
     Return at which of the instants q, (n, dof), the reference finds a part in a grown box.
 
-    growth: of all instants, or (n,) [m].
+    growth: of all instants, or (n,); or of one instant, n of them [m].
     """
     ends = ends_at(arm, np.ascontiguousarray(q).tobytes(), len(q))[:, part]
     radii = [arm.radii[row] for row, _ in bar_ends(arm)][part]
@@ -105,11 +105,10 @@ def reference_depth(arm, box, q, part=ARM):
     low, high = -0.5 * box.size.min(), FREE
     if not collides(arm, box, q[None], high, part)[0]:
         return MARGIN - FREE
-    q = np.repeat(q[None], 65, axis=0)
     for _ in range(8):
         # 64 intervals at once.
         growths = np.linspace(low, high, 65)
-        first = int(collides(arm, box, q, growths, part).argmax())
+        first = int(collides(arm, box, q[None], growths, part).argmax())
         low, high = growths[max(first - 1, 0)], growths[first]
     return MARGIN - high
 
