@@ -107,8 +107,11 @@ def bar_ends_at(arm: ArmModel, q: Array, ray_length: float) -> Array:
         if arm.radii[i] != NO_BARS and (i > 0 or (end == 'd' and arm.is_prismatic[0]))
     ]
     wanted = [*range(n), *(n + rows.index(offset) for offset in bar_ends(arm))]
+    on_mount = [capsule for capsule in arm.capsules if capsule.link == 0]
+    if not on_mount:
+        return ends[:, wanted]
     T = frames(arm, q)
-    mount = [_capsule_ends(arm, T, c)[:, None] for c in arm.capsules if c.link == 0]
+    mount = [_capsule_ends(arm, T, c)[:, None] for c in on_mount]
     return np.concatenate([ends[:, wanted], *mount], axis=1)
 
 

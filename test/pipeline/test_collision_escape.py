@@ -78,13 +78,13 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
     )
 
 
-def collides(arm, box, q, growth, part=ARM):
+def collides(arm, box, q, growth, part=ARM, first=0):
     """
-    Return at which of the instants q, (n, dof), the reference finds a part in a grown box.
+    Return at which instants q, (n, dof), from the first on, the reference has a part in a box.
 
-    growth: of all instants, or (n,) [m].
+    growth: how much larger the box is, at all instants, or (n,); or of one instant, n of them [m].
     """
-    ends = ends_at(arm, np.ascontiguousarray(q).tobytes(), len(q))[:, part]
+    ends = ends_at(arm, np.ascontiguousarray(q).tobytes(), len(q))[first:, part]
     radii = [arm.radii[row] for row, _ in bar_ends(arm)][part]
     halves = 0.5 * box.size + np.reshape(growth, (-1, 1))
     hits = [
@@ -105,11 +105,10 @@ def reference_depth(arm, box, q, part=ARM):
     low, high = -0.5 * box.size.min(), FREE
     if not collides(arm, box, q[None], high, part)[0]:
         return MARGIN - FREE
-    q = np.repeat(q[None], 65, axis=0)
     for _ in range(8):
         # 64 intervals at once.
         growths = np.linspace(low, high, 65)
-        first = int(collides(arm, box, q, growths, part).argmax())
+        first = int(collides(arm, box, q[None], growths, part).argmax())
         low, high = growths[max(first - 1, 0)], growths[first]
     return MARGIN - high
 
@@ -320,7 +319,7 @@ def entry_faults(arm, scene, q):
             faults.add('ray')
         for at in np.flatnonzero(is_hit & ~collides(arm, box, q, 0.0, POINTING))[::8]:
             depth = reference_depth(arm, box, q[at], POINTING)
-            if collides(arm, box, q[at:], MARGIN - depth - 2e-6, POINTING).any():
+            if collides(arm, box, q, MARGIN - depth - 2e-6, POINTING, at).any():
                 faults.add('deeper')
     return faults
 
