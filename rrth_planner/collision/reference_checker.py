@@ -150,8 +150,7 @@ def bar_distances(one: Array, other: Array) -> Array:
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> NDArray[np.bool_]:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
     local = (ends - center) @ rotation
-    half = np.broadcast_to(half, local[..., 0, :].shape)
-    a, b = local[..., 0, :], local[..., 1, :]
+    a, b, half = np.broadcast_arrays(local[..., 0, :], local[..., 1, :], half)
     result = np.ones(a.shape[:-1], dtype=np.bool_)
     for i in range(3):
         # Not where both ends are beyond the same face.
