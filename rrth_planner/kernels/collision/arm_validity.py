@@ -12,6 +12,7 @@ from rrth_planner.kernels.collision.bar_bar import (
     BOWS_ROOM,
     colliding_pair,
     curvature_bound,
+    is_pair_in_contact,
     is_pair_open,
     pair_bounds,
 )
@@ -216,6 +217,16 @@ def open_pair(points, a, b, p, width, speed, curvature, bows, robot, pool, n_ope
     return n_open + 1
 
 
+@kernel(boolean(OUT_VEC, int64, int64, MAT, OUT_POOL, int64, int64))
+def is_open_pair_in_contact(points, at, dof, robot, pool, first, last):
+    """Return whether any pair in the pool from entry `first` to `last` is in contact: exact."""
+    for k in range(first, last):
+        p = -1 - int64(pool[ENTRY * k])
+        if p >= 0 and is_pair_in_contact(points, at, int64(robot[dof + 1, FIRST_PAIR]) + p, robot):
+            return True
+    return False
+
+
 @kernel(int64(MAT, VEC, VEC, float64, CHAIN, MAT, MAT))
 def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     """
@@ -226,7 +237,8 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     width^2 / 8 times the bound of the second derivative, is apart from each box, and the hulls of
     two bars that must not collide are apart. Otherwise it is bisected, breadth first, and the
     halves test only what is still open, bars on short intervals part by part, until an interval is
-    shorter than `resolution` [rad] (`docs/algorithms.md`, section 3).
+    shorter than `resolution` [rad] (`docs/algorithms.md`, section 3). The ends of an interval belong
+    to it: at them only pairs that are open need to be looked at.
     """
     length = extent = 0.0
     for k in range(curve.shape[1]):
@@ -253,7 +265,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     u[0] = 1.0
     curve_point(curve, 1.0, q)
     n_bars = chain(q, ray_length, points, 0)
-    if collides(points, 0, n_bars, dof, robot, boxes):
+    if is_in_contact(points, 0, n_bars, dof, robot, boxes):
         return 0
     max_nodes = min(MAX_NODES, POINTS_ROOM // stride)
     n_pieces = int64(length / FIRST_INTERVAL) + 1
@@ -265,7 +277,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         curve_point(curve, u[i], q)
         chain(q, ray_length, points, i * stride)
         # The start is checked below: mostly it is known to be free.
-        if i > 1 and collides(points, i * stride, n_bars, dof, robot, boxes):
+        if i > 1 and is_in_contact(points, i * stride, n_bars, dof, robot, boxes):
             return 0
         queue[tail], queue[tail + 1] = i, i + 1 if i < n_pieces else 0
         queue[tail + 2], queue[tail + 3] = 0, -1
@@ -328,14 +340,23 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
                 return -1
         if n_open == start:
             continue
-        if a == 1 and last < 0 and collides(points, stride, n_bars, dof, robot, boxes):
-            return 0
+        if last < 0:
+            if is_open_pair_in_contact(points, b * stride, dof, robot, pool, start, n_open):
+                return 0
+            if a == 1 and (
+                is_in_contact(points, stride, n_bars, dof, robot, boxes)
+                or is_open_pair_in_contact(points, stride, dof, robot, pool, start, n_open)
+            ):
+                return 0
         if width * length < resolution or n_nodes >= max_nodes or tail > QUEUE_ROOM - 8:
             return -1
         u[n_nodes] = 0.5 * (u[a] + u[b])
         curve_point(curve, u[n_nodes], q)
         chain(q, ray_length, points, n_nodes * stride)
-        if collides(points, n_nodes * stride, n_bars, dof, robot, boxes):
+        middle = n_nodes * stride
+        if is_in_contact(points, middle, n_bars, dof, robot, boxes) or is_open_pair_in_contact(
+            points, middle, dof, robot, pool, start, n_open
+        ):
             return 0
         queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = a, n_nodes, start, n_open
         tail += 4

@@ -16,6 +16,8 @@ from rrth_planner.kernels.layout import (
     FRAMES,
     INNER,
     KIND,
+    MAX_BARS,
+    MAX_DOF,
     MAX_PAIRS,
     OUTER,
     PRISMATIC,
@@ -29,6 +31,8 @@ CONTACT = 1e-9
 # the sum of their speeds.
 BOW_SIZE, SPEED = 5, 4
 BOWS_ROOM = BOW_SIZE * MAX_PAIRS
+# The speed of each bar, seen from each link.
+SPEEDS_ROOM = MAX_BARS * (MAX_DOF + 1)
 # Two bars at two instants.
 SEEN_ROOM = 4 * BAR_SIZE
 # Shorter lines are points [m^2].
@@ -82,30 +86,32 @@ def segment_gap(first, i, second, j, gap):
 @kernel(boolean(OUT_VEC, int64, int64, float64), inline='always')
 def are_far(points, a, b, distance):
     """Return whether the middles of two bars prove them further apart than a distance [m]."""
-    between = half = other = 0.0
+    twice = 0.0
     for c in range(3):
-        p, q, r, s = points[a + c], points[a + 4 + c], points[b + c], points[b + 4 + c]
-        between += (r + s - p - q) * (r + s - p - q)
-        half += (q - p) * (q - p)
-        other += (s - r) * (s - r)
-    # Twice the distance of the middles, and twice the half lengths.
-    far = math.sqrt(half) + math.sqrt(other) + 2.0 * distance
-    return between > far * far
+        apart = points[b + c] + points[b + 4 + c] - points[a + c] - points[a + 4 + c]
+        twice += apart * apart
+    far = points[a + 3] + points[b + 3] + distance
+    return twice > 4.0 * far * far
+
+
+@kernel(boolean(OUT_VEC, int64, int64, MAT))
+def is_pair_in_contact(points, at, row, robot):
+    """Return whether a pair of bars, row in `robot`, is in contact at points[at]: exact."""
+    a = at + BAR_SIZE * int64(robot[row, INNER])
+    b = at + BAR_SIZE * int64(robot[row, OUTER])
+    radius = points[a + 7] + points[b + 7] + CONTACT
+    if are_far(points, a, b, radius):
+        return False
+    # Also for NaN, which must never count as apart.
+    return not segment_gap(points, a, points, b, scratch.floats(3)) > radius * radius
 
 
 @kernel(int64(OUT_VEC, int64, int64, MAT))
 def colliding_pair(points, at, dof, robot):
     """Return the first pair of bars in contact with the arm at points[at], or -1: exact."""
-    gap = scratch.floats(3)
     first = int64(robot[dof + 1, FIRST_PAIR])
     for row in range(first, robot.shape[0]):
-        a = at + BAR_SIZE * int64(robot[row, INNER])
-        b = at + BAR_SIZE * int64(robot[row, OUTER])
-        radius = points[a + 7] + points[b + 7] + CONTACT
-        if are_far(points, a, b, radius):
-            continue
-        # Also for NaN, which must never count as apart.
-        if not segment_gap(points, a, points, b, gap) > radius * radius:
+        if is_pair_in_contact(points, at, row, robot):
             return row - first
     return -1
 
@@ -147,19 +153,22 @@ def pair_bounds(robot, speed, bows):
     """Write what is known of the motion of each pair at first, BOW_SIZE numbers each."""
     dof = speed.shape[0]
     first = int64(robot[dof + 1, FIRST_PAIR])
+    # Of each bar, seen from each link: the sum over the joints that move it.
+    fastest = scratch.floats(SPEEDS_ROOM)
+    for bar in range(first - dof - 2):
+        row, start, end = dof + 2 + bar, 0.0, 0.0
+        fastest[(dof + 1) * bar + dof] = 0.0
+        for j in range(dof - 1, -1, -1):
+            start += robot[row, REACH + j] * speed[j]
+            end += robot[row, REACH + dof + j] * speed[j]
+            fastest[(dof + 1) * bar + j] = max(start, end)
     for row in range(first, robot.shape[0]):
         n, body = BOW_SIZE * (row - first), int64(robot[row, BODY])
-        total = 0.0
-        for k in range(2):
-            bar = dof + 2 + int64(robot[row, OUTER if k else INNER])
-            fastest = 0.0
-            for end in range(2):
-                along = 0.0
-                for j in range(body, dof):
-                    along += robot[bar, REACH + end * dof + j] * speed[j]
-                fastest = max(fastest, along)
-            total += fastest
-        bows[n], bows[n + SPEED] = -1.0, total
+        inner, outer = int64(robot[row, INNER]), int64(robot[row, OUTER])
+        bows[n] = -1.0
+        bows[n + SPEED] = (
+            fastest[(dof + 1) * inner + body] + fastest[(dof + 1) * outer + body]
+        )
 
 
 @kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64))
@@ -214,24 +223,26 @@ def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
 
     points[a], points[b]: the arm at both; width: of the interval of the curve's parameter; row:
     that of the pair in `robot`; speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint;
-    n: where those of the pair are in `bows`. Apart are: bars that do not move to each other, those
-    too far away from each other to meet within the interval, and those whose hulls at both
+    n: where those of the pair are in `bows`. Apart are: bars that do not move to each other and are
+    not in contact, those too far away from each other to meet within the interval, and those whose hulls at both
     instants, thickened by width^2 / 8 times the second derivative and seen from the link of the
     inner bar, are separated by the direction in which they are nearest at one of the instants
     (`docs/algorithms.md`, section 3).
     """
     if bows[n + SPEED] == 0.0:
-        # Checked at the nodes.
-        return False
+        return is_pair_in_contact(points, a, row, robot)
     inner, outer = BAR_SIZE * int64(robot[row, INNER]), BAR_SIZE * int64(robot[row, OUTER])
     radius = points[a + inner + 7] + points[a + outer + 7] + CONTACT
-    if are_far(points, a + inner, a + outer, radius + bows[n + SPEED] * width):
+    way = bows[n + SPEED] * width
+    if are_far(points, a + inner, a + outer, radius + way):
         return False
     one, other = scratch.floats(3), scratch.floats(3)
     length_one = math.sqrt(segment_gap(points, a + inner, points, a + outer, one))
+    if length_one > radius + way:
+        return False
     length_other = math.sqrt(segment_gap(points, b + inner, points, b + outer, other))
     # On the way from one distance to the other they would have to lose both.
-    if length_one + length_other > 2.0 * radius + bows[n + SPEED] * width:
+    if length_one + length_other > 2.0 * radius + way:
         return False
     dof = speed.shape[0]
     if bows[n] < 0.0:

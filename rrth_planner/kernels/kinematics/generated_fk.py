@@ -126,8 +126,8 @@ def chain_source(rows: Any) -> str:
 
     rows: `robot` as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta) Tz(d) each.
     The kernel `chain(q, ray_length, points, at)` writes BAR_SIZE numbers a bar from points[at] on,
-    in the order of their rows: its start in the arm's base frame, 0, its end [m], and its radius
-    [m]; then FRAME_SIZE numbers for each link whose frame a pair of bars needs: its origin [m] and
+    in the order of their rows: its start in the arm's base frame, half its length, its end, and its
+    radius [m]; then FRAME_SIZE numbers for each link whose frame a pair of bars needs: its origin [m] and
     its axes. It returns the number of bars that are checked against boxes.
     """
     source = _Source()
@@ -148,8 +148,14 @@ def chain_source(rows: Any) -> str:
         for k, value in enumerate(values):
             source.lines.append(f'    points[at + {at + k}] = {value}')
 
-    def write_offset(start: list[Term], radius: float) -> None:
-        write(BAR_SIZE * offsets.pop(0), *start, 0.0, *p, radius)
+    def half(length: Term) -> Term:
+        """Return half a length, which only pairs of bars need."""
+        if not len(pairs):
+            return 0.0
+        return 0.5 * abs(length) if isinstance(length, float) else f'0.5 * abs({length})'
+
+    def write_offset(start: list[Term], length: Term, radius: float) -> None:
+        write(BAR_SIZE * offsets.pop(0), *start, half(length), *p, radius)
 
     def write_link(link: int) -> None:
         """Write the capsules of a link, and its frame where it is needed."""
@@ -167,7 +173,8 @@ def chain_source(rows: Any) -> str:
                     ]
                     for c in (bar[ENDS : ENDS + 3], bar[ENDS + 3 : ENDS + 6])
                 ]
-                write(BAR_SIZE * n, *ends[0], 0.0, *ends[1], float(bar[RADIUS]))
+                length = math.dist(bar[ENDS : ENDS + 3], bar[ENDS + 3 : ENDS + 6])
+                write(BAR_SIZE * n, *ends[0], half(length), *ends[1], float(bar[RADIUS]))
         if link in slots:
             write(int(sizes[FRAMES]) + FRAME_SIZE * slots[link], *p, *x, *y, *z)
 
@@ -177,7 +184,7 @@ def chain_source(rows: Any) -> str:
         start = p
         p = [source.total((1.0, p[k]), (float(row[A]), x[k])) for k in range(3)]
         if row[RADIUS_A] != NO_BAR:
-            write_offset(start, float(row[RADIUS_A]))
+            write_offset(start, float(row[A]), float(row[RADIUS_A]))
         ca, sa = _snapped(float(row[COS_ALPHA])), _snapped(float(row[SIN_ALPHA]))
         m = [source.total((ca, y[k]), (sa, z[k])) for k in range(3)]
         z = [source.total((ca, z[k]), (-sa, y[k])) for k in range(3)]
@@ -209,7 +216,7 @@ def chain_source(rows: Any) -> str:
         start = p
         p = [source.total((1.0, p[k]), (d, z[k])) for k in range(3)]
         if row[RADIUS_D] != NO_BAR:
-            write_offset(start, float(row[RADIUS_D]))
+            write_offset(start, d, float(row[RADIUS_D]))
         if not is_last:
             write_link(i + 1)
     # Whole vectors of the machine, the rest of the last one filled with zeros.
