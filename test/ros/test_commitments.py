@@ -217,6 +217,48 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
+@pytest.mark.parametrize('has_moved', [True, False])
+def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
+    separated, has_moved
+):
+    arm, hand = beside(separated, 0.3, 30 if has_moved else 0)
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    place, n = arm.commanded(arm.now)[0], 0
+    # It was too late for all that came since, none of which is remembered.
+    while arm.monitor.running is not None:
+        arm.now += FRAME
+        arm.read(place, np.zeros(4))
+        arm.see(hand)
+        n += 1
+        assert n * FRAME < 2.0
+    assert n > commitments.REMEMBERED
+    stop = arm.monitor.take_stops()[-1]
+    assert stop.is_replanned == has_moved
+    assert 'does not follow it' in arm.monitor.stop_reason
+    assert arm.monitor._state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
+    arm.begin()
+    assert arm.monitor.running is not None
+
+
+def test_an_arm_that_sags_or_rests_where_it_is_commanded_is_followed(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.monitor.take_stops()
+    for k in range(1200):
+        arm.now += FRAME
+        q, v = arm.commanded(arm.now)[:2]
+        arm.read(q + 0.03, v)
+        if k < 60 or k > 120:
+            # In between no body comes, and the arm stops on its way.
+            arm.see(hand)
+        if k > 120 and arm.is_over:
+            break
+    assert not arm.monitor.take_stops()
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
 def test_a_body_that_is_stale_ends_in_a_protective_stop(separated):
     arm, hand = beside(separated, 0.2)
     arm.frames(40, sees=False)
