@@ -551,9 +551,7 @@ class ExecutionMonitor:
         assert running is not None
         self.stop_reason, self.n_stops = why, self.n_stops + 1
         sentence = f'{why}: motion given up'
-        self._set_state(
-            MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence
-        )
+        self._set_state(MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence)
         self._node.get_logger().warning(sentence)
         self._record_stop(running.trajectory, None, is_replanned)
 
