@@ -49,9 +49,9 @@ def ask(plan, note=lambda: None):
 
 @contextmanager
 def spinning(*nodes):
-    """Spin nodes in a thread of their own while the block runs."""
+    """Spin nodes, all of one context, in a thread of their own while the block runs."""
     executors = pytest.importorskip('rclpy.executors')
-    executor = executors.SingleThreadedExecutor()
+    executor = executors.SingleThreadedExecutor(context=nodes[0].context)
     for node in nodes:
         executor.add_node(node)
     thread = threading.Thread(target=executor.spin, daemon=True)
