@@ -10,8 +10,10 @@ import sys
 import numpy as np
 import pytest
 
-pytest.importorskip('rclpy')
+rclpy = pytest.importorskip('rclpy')
 image = pytest.importorskip('matplotlib.image')
+
+from rrth_planner.cli import demo  # noqa: E402
 
 # Cold, the planner is compiled first [s].
 LONGEST_RUN = 400.0
@@ -80,6 +82,25 @@ def test_an_interrupted_demo_ends_its_processes(tmp_path, number):
     assert words == 'demo interrupted\n'
 
 
+@pytest.fixture
+def call(monkeypatch, capfd):
+    """Give what runs a demo in this process, and returns how it ended."""
+    # The handlers of the tests stay.
+    monkeypatch.setattr(signal, 'signal', lambda *_: None)
+    # One that another module has left behind would be in the way.
+    rclpy.utilities.get_default_context(shutting_down=True).try_shutdown()
+
+    def ended(*arguments):
+        try:
+            code = demo.main([*map(str, arguments)])
+        except SystemExit as end:
+            code = end.code
+        assert not rclpy.ok()
+        return subprocess.CompletedProcess(arguments, code, *capfd.readouterr())
+
+    return ended
+
+
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
@@ -88,15 +109,15 @@ def test_an_interrupted_demo_ends_its_processes(tmp_path, number):
         (['--seed', '-5'], 'seed'),
     ],
 )
-def test_what_is_wrong_is_said_in_one_sentence(tmp_path, arguments, words):
-    ended = run('--output', tmp_path / 'motions.png', *arguments)
+def test_what_is_wrong_is_said_in_one_sentence(tmp_path, call, arguments, words):
+    ended = call('--output', tmp_path / 'motions.png', *arguments)
     assert ended.returncode == 1
     assert ended.stderr.startswith('demo failed: ')
     assert len(ended.stderr.splitlines()) == 1
     assert words in ended.stderr
 
 
-def test_no_timeout_at_all_is_rejected(tmp_path):
-    ended = run('--output', tmp_path / 'motions.png', '--timeout', '0')
+def test_no_timeout_at_all_is_rejected(tmp_path, call):
+    ended = call('--output', tmp_path / 'motions.png', '--timeout', '0')
     assert ended.returncode == 2
     assert '--timeout: 0, expected a number > 0' in ended.stderr
