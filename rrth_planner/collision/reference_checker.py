@@ -184,19 +184,19 @@ def first_contact(
     """
     ends = bars(arm, q, ray_length)
     begins = np.arange(0, len(q), STRETCH)
-    lows = np.minimum.reduceat(ends.min(axis=2), begins)
-    highs = np.maximum.reduceat(ends.max(axis=2), begins)
+    lows = np.minimum.reduceat(np.minimum(ends[:, :, 0], ends[:, :, 1]), begins)
+    highs = np.maximum.reduceat(np.maximum(ends[:, :, 0], ends[:, :, 1]), begins)
     found: Contact | None = None
     for box in scene.boxes:
-        for k, radius in enumerate(bar_radii(arm)):
-            half = 0.5 * box.size + margin + radius
-            # Not where all of a stretch is to one side of the whole box.
-            reach = np.abs(box.rotation) @ np.abs(half) + ROUNDING
-            is_near = (lows[:, k] <= box.center + reach) & (highs[:, k] >= box.center - reach)
-            rows = np.flatnonzero(np.repeat(is_near.all(axis=1), STRETCH)[: len(q)])
-            hit = rows[bar_box_contact(ends[rows, k], box.center, box.rotation, half)]
+        halves = 0.5 * box.size + margin + bar_radii(arm)[:, None]
+        # Not where all of a stretch is to one side of the whole box.
+        reach = np.abs(halves) @ np.abs(box.rotation).T + ROUNDING
+        is_near = ((lows <= box.center + reach) & (highs >= box.center - reach)).all(axis=2)
+        for k in np.flatnonzero(is_near.any(axis=0)):
+            rows = np.flatnonzero(np.repeat(is_near[:, k], STRETCH)[: len(q)])
+            hit = rows[bar_box_contact(ends[rows, k], box.center, box.rotation, halves[k])]
             if len(hit) and (found is None or hit[0] < found.index):
-                found = Contact(int(hit[0]), k, box.name)
+                found = Contact(int(hit[0]), int(k), box.name)
     return found
 
 
