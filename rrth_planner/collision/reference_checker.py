@@ -191,7 +191,8 @@ def first_contact(
         halves = 0.5 * box.size + margin + bar_radii(arm)[:, None]
         # Not where all of a stretch is to one side of the whole box.
         reach = np.abs(halves) @ np.abs(box.rotation).T + ROUNDING
-        is_near = ((lows <= box.center + reach) & (highs >= box.center - reach)).all(axis=2)
+        overlaps = (lows <= box.center + reach) & (highs >= box.center - reach)
+        is_near = np.logical_and.reduce(overlaps, axis=2)
         for k in np.flatnonzero(is_near.any(axis=0)):
             rows = np.flatnonzero(np.repeat(is_near[:, k], STRETCH)[: len(q)])
             hit = rows[bar_box_contact(ends[rows, k], box.center, box.rotation, halves[k])]

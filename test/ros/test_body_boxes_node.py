@@ -498,15 +498,25 @@ def test_where_the_tracker_reports_in_the_base_frame_boxes_are_in_its_own(start,
         ),
     ],
 )
-def test_a_start_that_cannot_be_is_one_sentence(arguments, words, capfd):
+def test_a_start_that_cannot_be_is_one_sentence(arguments, words, call):
     options = [word for argument in arguments for word in ('-p', argument)]
-    ended = subprocess.run(
-        [*MODULE, '--ros-args', *options], capture_output=True, text=True, timeout=120
-    )
+    ended = call(body_boxes_node.main, '--ros-args', *options)
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
     assert 'cannot start: ' in ended.stderr
     assert words in ended.stderr
+
+
+def test_a_start_that_cannot_be_ends_the_process():
+    ended = subprocess.run(
+        [*MODULE, '--ros-args', '-p', 'skeleton:=none'],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert ended.returncode == 1
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr
+    assert 'cannot start: ' in ended.stderr
 
 
 def test_without_tf_the_input_tf_says_so(monkeypatch):

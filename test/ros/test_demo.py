@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-rclpy = pytest.importorskip('rclpy')
+pytest.importorskip('rclpy')
 image = pytest.importorskip('matplotlib.image')
 
 from rrth_planner.cli import demo  # noqa: E402
@@ -82,25 +82,6 @@ def test_an_interrupted_demo_ends_its_processes(tmp_path, number):
     assert words == 'demo interrupted\n'
 
 
-@pytest.fixture
-def call(monkeypatch, capfd):
-    """Give what runs a demo in this process, and returns how it ended."""
-    # The handlers of the tests stay.
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    # One that another module has left behind would be in the way.
-    rclpy.utilities.get_default_context(shutting_down=True).try_shutdown()
-
-    def ended(*arguments):
-        try:
-            code = demo.main([*map(str, arguments)])
-        except SystemExit as end:
-            code = end.code
-        assert not rclpy.ok()
-        return subprocess.CompletedProcess(arguments, code, *capfd.readouterr())
-
-    return ended
-
-
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
@@ -110,7 +91,7 @@ def call(monkeypatch, capfd):
     ],
 )
 def test_what_is_wrong_is_said_in_one_sentence(tmp_path, call, arguments, words):
-    ended = call('--output', tmp_path / 'motions.png', *arguments)
+    ended = call(demo.main, '--output', tmp_path / 'motions.png', *arguments)
     assert ended.returncode == 1
     assert ended.stderr.startswith('demo failed: ')
     assert len(ended.stderr.splitlines()) == 1
@@ -118,6 +99,6 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, call, arguments, words)
 
 
 def test_no_timeout_at_all_is_rejected(tmp_path, call):
-    ended = call('--output', tmp_path / 'motions.png', '--timeout', '0')
+    ended = call(demo.main, '--output', tmp_path / 'motions.png', '--timeout', '0')
     assert ended.returncode == 2
     assert '--timeout: 0, expected a number > 0' in ended.stderr

@@ -3,10 +3,10 @@
 """
 The command point_at from outside: beside real nodes, beside half of them, and alone.
 
-Most runs are calls of its `main`, as a process takes seconds to load what this one has. They have
-ROS's default context for themselves; nodes of the tests have another one.
+Most runs are calls of its `main`, as a process takes seconds to load what this one has.
 """
 
+from functools import partial
 import json
 import os
 import signal
@@ -22,8 +22,6 @@ pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 pytest.importorskip('tqdm')
 
-import rclpy  # noqa: E402
-from rclpy.context import Context  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.cli import point_at  # noqa: E402
@@ -64,24 +62,10 @@ def run(*arguments):
     )
 
 
-@pytest.fixture
-def call(monkeypatch, capfd):
-    """Give what `run` does, but in this process, which has all that the command loads."""
-    # The handlers of the tests stay.
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    # One that another module has left behind would be in the way.
-    rclpy.utilities.get_default_context(shutting_down=True).try_shutdown()
-
-    def ended(*arguments):
-        capfd.readouterr()
-        try:
-            code = point_at.main([*map(str, arguments)])
-        except SystemExit as end:
-            code = end.code
-        assert not rclpy.ok()
-        return subprocess.CompletedProcess(arguments, code, *capfd.readouterr())
-
-    return ended
+@pytest.fixture(name='call')
+def _call(call):
+    """Give what does as `run` does, but in this process."""
+    return partial(call, point_at.main)
 
 
 def report_of(how, *arguments):
@@ -107,9 +91,9 @@ def impatient(patch, owner, name, timeout):
 class Bystander(Node):
     """Receives inputs and outputs of the planner, and stands in for an arm."""
 
-    def __init__(self, context):
+    def __init__(self):
         """Subscribe."""
-        super().__init__('bystander', context=context)
+        super().__init__('bystander')
         self.motions, self.bodies = [], []
         # Not latched: what an earlier test has the planner publish is none of this one's.
         self.create_subscription(JointTrajectory, 'joint_trajectory', self.motions.append, 10)
@@ -122,7 +106,7 @@ class Bystander(Node):
 
 
 @pytest.fixture(scope='module')
-def planner():
+def planner(ros_context):
     """Have a planner running as a process."""
     with ChildProcess(
         'rrth_planner.ros.planner_node',
@@ -132,19 +116,10 @@ def planner():
         yield child
 
 
-@pytest.fixture(scope='module')
-def context():
-    """Have a context besides the default one."""
-    context = Context()
-    rclpy.init(context=context)
-    yield context
-    context.try_shutdown()
-
-
 @pytest.fixture
-def bystander(context, spinning):
+def bystander(ros_context, spinning):
     """Give a node that subscribes."""
-    node = Bystander(context)
+    node = Bystander()
     with spinning(node):
         yield node
     node.destroy_node()
@@ -158,7 +133,7 @@ def arm(planner):
 
 
 @pytest.mark.slow
-def test_with_separation_the_body_of_a_file_stands_there_until_the_arm_has_arrived(call):
+def test_with_separation_the_body_of_a_file_stands_there_until_the_arm_has_arrived(ros_context):
     separated = ['--ros-args', '-r', '__ns:=/separated']
     settings = ['-p', 'separation:=true', '-p', 'seed:=3']
     with (
@@ -166,7 +141,7 @@ def test_with_separation_the_body_of_a_file_stands_there_until_the_arm_has_arriv
         ChildProcess('rrth_planner.ros.playback_node', separated, lambda _: None),
     ):
         words = ('--body', BOXES, '--timeout', START, *separated, '--')
-        report = report_of(call, 1.5, 0.1, 0.3, *words)
+        report = report_of(run, 1.5, 0.1, 0.3, *words)
     assert report['exit_code'] == 0, report
     assert report['arrived'] is True
     assert report['pointing_error'] < 1e-3
@@ -329,14 +304,11 @@ def test_the_help_names_every_exit_code(call):
 
 
 @pytest.fixture
-def client():
+def client(ros_context):
     """Give a client without a planner."""
-    rclpy.utilities.get_default_context(shutting_down=True).try_shutdown()
-    rclpy.init()
     client = PlannerClient('point_at', 0.5)
     yield client
     client.destroy_node()
-    rclpy.try_shutdown()
 
 
 def test_an_interrupt_in_mid_step_leaves_no_other_words(client, monkeypatch):
