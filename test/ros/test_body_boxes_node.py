@@ -29,6 +29,7 @@ from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros import body_boxes_node  # noqa: E402
 from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
+from rrth_planner.ros.interface import tracker_reporter  # noqa: E402
 from rrth_planner.ros.interface.posture_inputs import points_of  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
@@ -215,8 +216,10 @@ class Tracker(Node):
 
 
 @pytest.fixture
-def start():
+def start(monkeypatch):
     """Return a function that starts a node and its tracker, which run until the test ends."""
+    # Each test that waits for diagnostics would wait for a second.
+    monkeypatch.setattr(tracker_reporter, 'PERIOD', 0.1)
     running = []
 
     def started(*arguments, **parameters):

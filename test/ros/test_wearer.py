@@ -30,7 +30,7 @@ from rrth_planner.wearer.tracker import measurement, Tracker  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 MODULE = [sys.executable, '-m', 'rrth_planner.cli.wearer']
-FPS, LATENCY = 50.0, 0.2
+FPS, LATENCY = 100.0, 0.2
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 pytestmark = pytest.mark.usefixtures('ros_context')
