@@ -42,6 +42,7 @@ from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
+from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
@@ -1315,9 +1316,17 @@ def _framed():
         ('max_jerk:=[1.0, 2.0]', 'max_jerk: [1.0, 2.0], expected 4 values'),
     ],
 )
-def test_a_bad_parameter_ends_the_start_with_one_line(process, argument, sentence):
-    running = process('--ros-args', '-p', argument)
+def test_a_bad_parameter_ends_the_start_with_one_line(call, argument, sentence):
+    ended = call(planner_module.run, '--ros-args', '-p', argument)
+    assert ended.returncode == 1
+    (line,) = ended.stderr.strip().splitlines()
+    assert sentence in line
+
+
+def test_a_start_that_fails_ends_the_process_and_its_planning_process(process):
+    running = process('--ros-args', '-p', 'margin:=3.0')
+    # The pipe closes when both have ended.
     _, errors = running.communicate(timeout=60)
     assert running.returncode == 1
     (line,) = errors.strip().splitlines()
-    assert sentence in line
+    assert 'margin: 3.0, expected a number from 0 to 1 [m]' in line
