@@ -120,13 +120,13 @@ for line in sys.stdin:
 WARM = 'numba.njit(lambda x: 2.0 * x)(1.0)'
 
 
-def in_process(code, folder, tmp_path):
+def in_process(code, folder, tmp_path, **variables):
     """Return the lines that a script writes to stderr; it lies in a file, as numba asks."""
     script = tmp_path / 'script.py'
     script.write_text(code, encoding='utf-8')
     ended = subprocess.run(
         [sys.executable, str(script)],
-        env=environment() | {'RRTH_CACHE_DIR': str(folder)},
+        env=environment() | {'RRTH_CACHE_DIR': str(folder)} | variables,
         capture_output=True,
         text=True,
         timeout=120,
@@ -398,7 +398,8 @@ def test_an_edited_kernel_is_compiled_anew(tmp_path, run, filled):
 
 
 def test_code_that_checks_bounds_is_other_code(tmp_path, filled):
-    in_process(f"import os; os.environ['NUMBA_BOUNDSCHECK'] = '1'{COMPILE}", filled, tmp_path)
+    # The script is the same.
+    in_process(COMPILE, filled, tmp_path, NUMBA_BOUNDSCHECK='1')
     assert len(code_in(filled)) == 4
 
 
