@@ -110,19 +110,25 @@ def _clock(monkeypatch):
     return clock
 
 
-@pytest.fixture(name='separated')
-def _separated():
-    nodes = []
+@pytest.fixture(name='separated', scope='module')
+def _separated(ros_context):
+    # Monitors do not change their node, which is never spun.
+    node, known = Node('commitments'), {}
 
-    def make(**values):
+    def parameters(values):
         given = [Parameter('separation', value=True)]
         given += [Parameter(name, value=value) for name, value in values.items()]
-        nodes.append(Node('rrth_planner', parameter_overrides=given))
-        return Separated(nodes[-1], declare_parameters(nodes[-1]))
+        declared = Node('rrth_planner', parameter_overrides=given)
+        known[repr(values)] = declare_parameters(declared)
+        declared.destroy_node()
+
+    def make(**values):
+        if repr(values) not in known:
+            parameters(values)
+        return Separated(node, known[repr(values)])
 
     yield make
-    for node in nodes:
-        node.destroy_node()
+    node.destroy_node()
 
 
 def near(clearance):
