@@ -123,7 +123,7 @@ def nodes_of(
         assert server.stdout.readline() == 'ready\n'
 
         def start(arguments: list[str], on_line: Callable[[str], None]) -> ForkedProcess:
-            words = folder / f'{modules[0]}-{next(numbers)}'
+            words = folder / f'words-{os.getpid()}-{next(numbers)}'
             os.mkfifo(words)
             print(json.dumps([arguments, str(words)]), file=server.stdin, flush=True)
             return ForkedProcess(int(server.stdout.readline()), words, on_line)
