@@ -153,21 +153,3 @@ def _ask() -> Callable[..., object]:
 def _spinning() -> Callable[..., object]:
     """Give `spinning` to tests."""
     return spinning
-
-
-@pytest.fixture(scope='session')
-def forked_planner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., object]]:
-    """Give what starts a planner as a process, from arguments and what takes its lines."""
-    from forked import nodes_of, PLANNER
-
-    with nodes_of(tmp_path_factory.mktemp('planner'), PLANNER) as start:
-        yield start
-
-
-@pytest.fixture(scope='session')
-def forked_playback(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., object]]:
-    """Give what starts a playback so."""
-    from forked import nodes_of, PLAIN, PLAYBACK
-
-    with nodes_of(tmp_path_factory.mktemp('playback'), PLAYBACK, **PLAIN) as start:
-        yield start

@@ -18,6 +18,7 @@ from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -68,18 +69,19 @@ def body(*more):
 
 
 @pytest.fixture
-def scene_of_a_motion(forked_planner, forked_playback, wait_until, send, spinning):
+def scene_of_a_motion(wait_until, send, spinning):
     """Have an arm in motion to a target; give the client."""
 
     def begin(*settings):
         client = Client()
+        planner, playback = (f'rrth_planner.ros.{n}_node' for n in ('planner', 'playback'))
         # So slow that a busy machine has time to stop the arm.
         ros = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
         ros += ['-p', 'max_velocity:=[0.5, 0.5, 0.5, 0.5]']
         for setting in settings:
             ros += ['-p', setting]
-        stack.enter_context(forked_planner(ros, said.append))
-        stack.enter_context(forked_playback([], said.append))
+        stack.enter_context(ChildProcess(planner, ros, said.append))
+        stack.enter_context(ChildProcess(playback, [], said.append))
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')

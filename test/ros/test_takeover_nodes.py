@@ -15,6 +15,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
+from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
@@ -61,15 +62,14 @@ def _body():
 
 
 @pytest.mark.parametrize('settings', [{}, {'rate': 500.0, 'time_scale': 0.5}], ids=str)
-def test_handovers_to_new_targets_are_without_a_jump(
-    forked_planner, forked_playback, wait_until, send, ask, spinning, settings
-):
+def test_handovers_to_new_targets_are_without_a_jump(wait_until, send, ask, spinning, settings):
     client, said, answers = Client(), [], []
+    planner, playback = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
     ros = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
     options = [part for name, value in settings.items() for part in ('-p', f'{name}:={value}')]
     with (
-        forked_planner(ros, lambda _: None) as one,
-        forked_playback(['--ros-args', *options], said.append) as other,
+        ChildProcess(planner, ros, lambda _: None) as one,
+        ChildProcess(playback, ['--ros-args', *options], said.append) as other,
         spinning(client),
     ):
         wait_until(client.plan.service_is_ready, 120.0)
