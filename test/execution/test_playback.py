@@ -405,7 +405,7 @@ def test_an_hour_of_motions_replaced_stopped_and_scaled_does_not_drift():
             else:
                 n_turns += 1
         # Each state lies on the motion, at the time that has passed.
-        times = np.sort(rng.uniform(playback.start_time, playback.end_time, 8))
+        times = np.sort(rng.uniform(playback.start_time, playback.end_time, 4))
         passed = playback.time_scale * (times - playback.start_time)
         expected = sample(playback.trajectory, passed)[0]
         np.testing.assert_allclose(states_at(playback, times)[0], expected, atol=1e-9)
