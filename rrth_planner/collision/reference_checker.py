@@ -151,7 +151,10 @@ def bar_distances(one: Array, other: Array) -> Array:
 
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> NDArray[np.bool_]:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
-    local = (ends - center) @ rotation
+    local = ends - center
+    # For one box a single product of two matrices, not one for each bar.
+    flat = local.reshape(-1, 3) if rotation.ndim == 2 else local
+    local = (flat @ rotation).reshape(local.shape)
     a, b, half = np.broadcast_arrays(local[..., 0, :], local[..., 1, :], half)
     result = np.ones(a.shape[:-1], dtype=np.bool_)
     for i in range(3):
@@ -159,6 +162,8 @@ def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) ->
         result &= (np.minimum(a[..., i], b[..., i]) <= half[..., i]) & (
             np.maximum(a[..., i], b[..., i]) >= -half[..., i]
         )
+    if not result.any():
+        return result
     a, b, half = a[result], b[result], half[result]
     step = b - a
     with np.errstate(divide='ignore', invalid='ignore'):
