@@ -38,6 +38,7 @@ from rrth_planner.model.arm import (  # noqa: E402
     pointing_error,
     tool_pose,
 )
+from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -779,13 +780,17 @@ def test_a_busy_node_publishes_no_motion(start, monkeypatch):
     assert not stranger.received['joint_trajectory']
 
 
-def stop_for(planner):
-    """Have a stop of the arm, which was moving to the target, replanned; it is over."""
+def stop_for(planner, scene=None):
+    """
+    Have a stop of the arm, which was moving to the target, replanned; it is over.
+
+    scene: the wearer that it was proven free of, if it was.
+    """
     goal, parameters = inputs_of(planner).target.value, planner._reporter.parameters
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
-    monitor._stops.append(Stop(over, goal, parameters, None, True, monitor.n_motions))
+    monitor._stops.append(Stop(over, goal, parameters, scene, True, monitor.n_motions))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -802,6 +807,39 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
     assert not any(msg.points[0].velocities)
     error = pointing_error(load_arm(), np.array(msg.points[-1].positions), [1.5, 0.1, 0.3])
     assert error < 1e-6
+
+
+@pytest.mark.parametrize('is_free', [True, False])
+def test_from_a_stop_that_is_proven_free_it_plans_before_the_arm_rests_and_once_it_does(
+    start, monkeypatch, is_free
+):
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
+    queue, work, tried = planner._queue, planner._queue._work, []
+
+    def work_in_vain(*arguments):
+        tried.append(bool(inputs_of(planner).joints.value.velocities.any()))
+        return work(*arguments)
+
+    monkeypatch.setattr(queue, '_work', work_in_vain)
+    monkeypatch.setattr(
+        request_queue,
+        'plan_request',
+        lambda *_: PlanOutcome(ErrorCode.PLANNING_FAILED, 'of the test'),
+    )
+    monkeypatch.setattr(queue, '_check_stop', lambda stop: None)
+    stop_for(planner, Scene(()) if is_free else None)
+    if is_free:
+        stranger.wait_until(lambda: tried)
+    time.sleep(0.2)
+    assert tried == [True] * is_free
+    # The arm holds only where it rests.
+    assert stranger.value('monitor') != 'holding'
+    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
+    stranger.wait_until(lambda: len(tried) > is_free)
+    assert not tried[is_free]
+    stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
 
 
 def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
