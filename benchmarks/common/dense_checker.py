@@ -121,6 +121,7 @@ def colliding_edges(
     return flags
 
 
+# Loops, not expressions of whole arrays: those take many times as long to compile.
 @njit(nogil=True, cache=True)
 def _check(
     dh, T, frames, ends, radii, bodies, pairs, reach, centers, rotations, halves, q0, q1, spacing,
@@ -128,12 +129,17 @@ def _check(
 ):  # fmt: skip
     stack = np.empty((128, 2), np.int64)
     placed, speeds = np.empty((frames.shape[0], 2, 3)), np.empty(dh.shape[0])
+    dof = q0.shape[1]
+    step, q, room = np.empty(dof), np.empty(dof), np.empty((3, 3, 3))
     for e in range(q0.shape[0]):
-        step = q1[e] - q0[e]
-        n = max(1, int(np.ceil(np.sqrt((step * step).sum()) / spacing)))
+        square = 0.0
+        for i in range(dof):
+            step[i] = q1[e, i] - q0[e, i]
+            square += step[i] * step[i]
+        n = max(1, int(np.ceil(np.sqrt(square) / spacing)))
         # No point moves faster than the farthest one would round every axis below it at once.
         speeds[0] = 0.0
-        for i in range(step.shape[0]):
+        for i in range(dof):
             speeds[i + 1] = speeds[i] + reach * abs(step[i]) / n
         size, stack[0, 0], stack[0, 1] = 1, 0, n
         while size > 0 and not flags[e]:
@@ -141,7 +147,9 @@ def _check(
             first, last = stack[size, 0], stack[size, 1]
             middle = (first + last) // 2
             length = max(last - middle, middle - first)
-            _place(dh, T, frames, ends, q0[e] + middle / n * step, placed)
+            for i in range(dof):
+                q[i] = q0[e, i] + middle / n * step[i]
+            _place(dh, T, frames, ends, q, placed, room)
             is_free = True
             for k in range(frames.shape[0]):
                 # What no joint moves is worn.
@@ -171,9 +179,13 @@ def _check(
 
 
 @njit(nogil=True, cache=True)
-def _place(dh, T, frames, ends, q, placed):
+def _place(dh, T, frames, ends, q, placed, room):
     dof = q.shape[0]
-    R, p, turned = T[:3, :3].copy(), T[:3, 3].copy(), np.empty((3, 3))
+    R, turned, p = room[0], room[1], room[2, 0]
+    for r in range(3):
+        p[r] = T[r, 3]
+        for c in range(3):
+            R[r, c] = T[r, c]
     for i in range(dof + 2):
         for k in range(frames.shape[0]):
             if frames[k] == i:
@@ -193,7 +205,9 @@ def _place(dh, T, frames, ends, q, placed):
             p[r] += a * R[r, 0] + d * z
             turned[r, 0], turned[r, 1] = ct * R[r, 0] + st * y, ct * y - st * R[r, 0]
             turned[r, 2] = z
-        R[:] = turned
+        for r in range(3):
+            for c in range(3):
+                R[r, c] = turned[r, c]
 
 
 @njit(nogil=True, cache=True)

@@ -24,6 +24,8 @@ ROUNDING = 1e-9
 TINY = 1e-30
 # A part of a bar is looked at in so many places, and once more in so many round the nearest one.
 PLACES, ROUNDS = 33, 2
+# Bounds are made for so many instants together.
+STRETCH = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,10 @@ def bar_distances(one: Array, other: Array) -> Array:
 
 def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) -> NDArray[np.bool_]:
     """Return which bars, (..., 2, 3), meet a closed box: clipping against its slabs."""
-    local = (ends - center) @ rotation
+    local = ends - center
+    # For one box a single product of two matrices, not one for each bar.
+    flat = local.reshape(-1, 3) if rotation.ndim == 2 else local
+    local = (flat @ rotation).reshape(local.shape)
     a, b, half = np.broadcast_arrays(local[..., 0, :], local[..., 1, :], half)
     result = np.ones(a.shape[:-1], dtype=np.bool_)
     for i in range(3):
@@ -157,6 +162,8 @@ def bar_box_contact(ends: Array, center: Array, rotation: Array, half: Array) ->
         result &= (np.minimum(a[..., i], b[..., i]) <= half[..., i]) & (
             np.maximum(a[..., i], b[..., i]) >= -half[..., i]
         )
+    if not result.any():
+        return result
     a, b, half = a[result], b[result], half[result]
     step = b - a
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -181,13 +188,21 @@ def first_contact(
     arm [m]. Each box grows on every side; the bars' own radii come on top.
     """
     ends = bars(arm, q, ray_length)
+    begins = np.arange(0, len(q), STRETCH)
+    lows = np.minimum.reduceat(np.minimum(ends[:, :, 0], ends[:, :, 1]), begins)
+    highs = np.maximum.reduceat(np.maximum(ends[:, :, 0], ends[:, :, 1]), begins)
     found: Contact | None = None
     for box in scene.boxes:
-        for k, radius in enumerate(bar_radii(arm)):
-            half = 0.5 * box.size + margin + radius
-            hit = np.flatnonzero(bar_box_contact(ends[:, k], box.center, box.rotation, half))
+        halves = 0.5 * box.size + margin + bar_radii(arm)[:, None]
+        # Not where all of a stretch is to one side of the whole box.
+        reach = np.abs(halves) @ np.abs(box.rotation).T + ROUNDING
+        overlaps = (lows <= box.center + reach) & (highs >= box.center - reach)
+        is_near = np.logical_and.reduce(overlaps, axis=2)
+        for k in np.flatnonzero(is_near.any(axis=0)):
+            rows = np.flatnonzero(np.repeat(is_near[:, k], STRETCH)[: len(q)])
+            hit = rows[bar_box_contact(ends[rows, k], box.center, box.rotation, halves[k])]
             if len(hit) and (found is None or hit[0] < found.index):
-                found = Contact(int(hit[0]), k, box.name)
+                found = Contact(int(hit[0]), int(k), box.name)
     return found
 
 
@@ -213,9 +228,17 @@ def clearances(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Arra
     """
     ends = bars(arm, q, ray_length)
     radii = bar_radii(arm)
-    least = np.full(len(q), np.inf)
+    middles, lengths = ends.mean(axis=2), np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1)
+    least, of_middles = np.full(len(q), np.inf), []
     for box in scene.boxes:
-        local = (ends - box.center) @ box.rotation
+        place = (middles - box.center) @ box.rotation
+        gaps = np.linalg.norm(place - np.clip(place, -0.5 * box.size, 0.5 * box.size), axis=-1)
+        of_middles.append(gaps - radii)
+        least = np.minimum(least, of_middles[-1].min(axis=1))
+    for box, bounds in zip(scene.boxes, of_middles, strict=True):
+        # No point of a bar is further from its middle than half its length.
+        rows, some = np.nonzero(bounds - 0.5 * lengths <= least[:, None] + ROUNDING)
+        local = (ends[rows, some] - box.center) @ box.rotation
         a, step = local[..., 0, :], local[..., 1, :] - local[..., 0, :]
         half = 0.5 * box.size
 
@@ -241,7 +264,7 @@ def clearances(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> Arra
         share = np.clip(-s0 / np.where(s1 > s0, s1 - s0, 1.0), 0.0, 1.0)
         nearest = np.concatenate([t0 + share * (t1 - t0), ends_of_bar], axis=-1)
         gaps = np.linalg.norm(excess(nearest), axis=-1).min(axis=-1)
-        least = np.minimum(least, (gaps - radii).min(axis=1))
+        np.minimum.at(least, rows, gaps - radii[some])
     return least
 
 

@@ -179,9 +179,11 @@ def sample(trajectory: Trajectory, times: ArrayLike) -> tuple[Array, Array, Arra
         held = np.repeat(trajectory.positions, len(t), axis=0)
         return held, np.zeros_like(held), np.zeros_like(held)
     i, u, width = _locate(trajectory, t)
-    is_outside = ((t < 0.0) | (t > trajectory.times[-1]))[:, None]
+    is_outside = (t < 0.0) | (t > trajectory.times[-1])
     q, v, a = _state(piece_coefficients(trajectory)[i], u, width)
-    return q, np.where(is_outside, 0.0, v), np.where(is_outside, 0.0, a)
+    if is_outside.any():
+        v[is_outside] = a[is_outside] = 0.0
+    return q, v, a
 
 
 def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:

@@ -3,6 +3,7 @@
 """The judge of timed motions finds what is planted, and passes what is right."""
 
 from dataclasses import replace
+import os
 
 import pytest
 
@@ -233,13 +234,15 @@ def test_the_command_names_what_is_missing(capsys):
 
 
 @pytest.mark.slow
-def test_a_short_run_writes_the_report_and_pictures(tmp_path, capsys):
+def test_a_short_run_writes_the_report_and_pictures(tmp_path, capsys, monkeypatch):
     for name in ('pyarrow', 'tqdm', 'matplotlib', 'toppra'):
         pytest.importorskip(name)
     from benchmarks.motions.__main__ import main
     from benchmarks.motions.rows import read_motions
     from benchmarks.motions.table import FAULTS
 
+    # One process besides this one judges so few motions before another one has begun.
+    monkeypatch.setattr(os, 'cpu_count', lambda: 1)
     data = tmp_path / 'rows.parquet'
     where = ['--output', str(tmp_path), '--data', str(data)]
     assert main(['--queries', '2', '--bent', '1', *where]) == 0

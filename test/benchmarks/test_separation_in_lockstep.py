@@ -38,8 +38,9 @@ def test_a_part_that_keeps_its_speed_meets_no_faster_place_of_the_arm(trial, n):
 
 @pytest.mark.parametrize('what', [name for name in trials() if name.startswith('power')][::3])
 def test_the_test_finds_contacts_where_the_wearer_is_faster_or_separation_is_off(what):
-    hands = chain_of_hands(trials()[what], 5, 0).hands
-    assert [hand for hand in hands if hand.word == FAST]
+    # Mostly the first hand is enough.
+    chains = (chain_of_hands(trials()[what], n, 0) for n in (1, 5))
+    assert any(hand.word == FAST for chain in chains for hand in chain.hands)
 
 
 def test_commitments_pass_the_reference_checker():

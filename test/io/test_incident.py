@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Records of incidents: exact to the bit, a hundred a folder, rejected in one sentence."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 import os
 from types import MappingProxyType
 
@@ -38,12 +40,15 @@ LINES = st.text(st.characters().filter(str.isprintable))
 NAMES = st.text(st.characters().filter(str.isprintable), min_size=1)
 
 
+# Strategies are made once: a new one is looked through before anything is drawn from it.
+@cache
 def rows(n, element=ANY):
     """Return a strategy of arrays of n rows for the four joints."""
     row = st.lists(element, min_size=4, max_size=4)
     return st.lists(row, min_size=n, max_size=n).map(np.array)
 
 
+@cache
 @st.composite
 def trajectories(draw):
     n = draw(st.integers(1, 4))
@@ -56,6 +61,7 @@ def trajectories(draw):
     )
 
 
+@cache
 @st.composite
 def boxes(draw):
     return Box(
@@ -66,6 +72,7 @@ def boxes(draw):
     )
 
 
+@cache
 @st.composite
 def rules(draw):
     speed = st.floats(0.0, 100.0)
@@ -77,18 +84,22 @@ def rules(draw):
     )
 
 
+SCENES = st.lists(boxes(), max_size=3).map(lambda found: Scene(tuple(found)))
+SOME_SCENES, SOME_RULES = st.none() | SCENES, st.none() | rules()
+SOME_TRAJECTORIES = st.none() | trajectories()
+
+
 @st.composite
 def incidents(draw):
     state = MotionState(
         positions=draw(rows(1))[0], velocities=draw(rows(1))[0], accelerations=draw(rows(1))[0]
     )
     moving = StartState(
-        state=state, running=draw(st.none() | trajectories()), time=draw(st.floats(0.0, 9.0))
+        state=state, running=draw(SOME_TRAJECTORIES), time=draw(st.floats(0.0, 9.0))
     )
-    scenes = st.lists(boxes(), max_size=3).map(lambda found: Scene(tuple(found)))
     question = PlanQuestion(
         arm=table_1_arm(),
-        scene=draw(scenes),
+        scene=draw(SCENES),
         q_start=draw(rows(1))[0],
         goal=PointingGoal(draw(st.tuples(NEAR, NEAR, NEAR))),
         limits=MotionLimits(
@@ -104,7 +115,7 @@ def incidents(draw):
         seed=draw(st.integers(0, 2**63)),
         moving=draw(st.sampled_from([None, moving])),
         escape_depth=draw(st.floats(0.0, 1.0)),
-        rules=draw(st.none() | rules()),
+        rules=draw(SOME_RULES),
         stop_limits=draw(st.sampled_from([None, limits()])),
         body_age=draw(st.floats(0.0, 1e4)),
     )
@@ -117,7 +128,7 @@ def incidents(draw):
         question=question,
         trajectory=draw(trajectories()) if is_disagreement else None,
         violation=touch if is_disagreement else None,
-        present=draw(st.none() | scenes),
+        present=draw(SOME_SCENES),
         escape_time=draw(st.floats(0.0, 9.0)),
         error=draw(LINES),
         traceback=draw(st.text()),
@@ -218,9 +229,15 @@ def as_mapping(incident):
     return parse_yaml(incident_to_yaml(incident), 'incident')
 
 
+@cache
+def as_written():
+    """Return what the file of a record holds."""
+    return as_mapping(disagreement())
+
+
 def changed(path, value):
     """Return the mapping of an incident with one entry replaced; `del`: left out."""
-    data = as_mapping(disagreement())
+    data = deepcopy(as_written())
     inner = data
     for key in path[:-1]:
         inner = inner[key]
@@ -297,7 +314,7 @@ def paths_in(data, path=()):
             yield from paths_in(value, (*path, key))
 
 
-PATHS = list(paths_in(as_mapping(disagreement())))
+PATHS = list(paths_in(as_written()))
 
 
 @examples(400)

@@ -26,11 +26,11 @@ WORLD = arm_world(ARM, WEARER, MARGIN, RAY)
 
 
 @functools.cache
-def paths_without_room(n):
-    """Return n paths round the body, shortcut in the very world in which they are timed."""
+def paths_without_room():
+    """Return paths round the body, shortcut in the very world in which they are timed."""
     rng, found = np.random.default_rng(8), []
     options = RRTHOptions(time_limit=60.0, improve_time=60.0, club_attempts=0)
-    while len(found) < n:
+    while len(found) < 100:
         goal = free_configuration(rng, WORLD)
         if WORLD.is_edge_valid(FOLDED, goal):
             continue
@@ -62,7 +62,7 @@ def timed(path):
 def test_a_corner_without_room_is_a_stop_and_no_failure():
     n_sharp = 0
     # One in twenty has such a corner.
-    for path in paths_without_room(100):
+    for path in paths_without_room():
         blends = round_corners(path, grown(WORLD, HAIR), limits())
         sharp = [blend.corner for blend in blends if blend.half_length == 0.0]
         motion = timed(path)
@@ -91,7 +91,7 @@ def test_a_motion_that_is_not_proven_with_rounded_corners_stops_at_each(monkeypa
         return replace(found, is_proven=False) if len(asked) == 1 else found
 
     monkeypatch.setattr(path_timing, 'certify', reject_the_first)
-    for path in paths_without_room(20):
+    for path in paths_without_room()[:20]:
         asked.clear()
         motion = timed(path)
         assert isinstance(motion, Trajectory)

@@ -3,6 +3,7 @@
 """The examples run, from anywhere, and tell what they found."""
 
 from pathlib import Path
+import runpy
 import subprocess
 import sys
 
@@ -20,7 +21,7 @@ TOLD = {
 
 
 def run(example, folder, *arguments, is_refused=False):
-    """Return what an example prints, or what it says where it refuses."""
+    """Return what an example prints, or what it says where it refuses, in a process of its own."""
     code = f'import runpy, sys; sys.path.insert(0, {str(ROOT)!r}); sys.argv[1:] = {arguments!r}; '
     code += f"runpy.run_path({str(example)!r}, run_name='__main__')"
     done = subprocess.run(
@@ -54,9 +55,22 @@ def test_the_first_example_plans_on_a_map_of_ones_own(tmp_path):
         ('start: [5, 20\n', 'expected a readable YAML file'),
     ],
 )
-def test_a_bad_map_is_refused_by_the_examples_in_one_sentence(text, told, tmp_path):
+def test_a_bad_map_is_refused_by_the_examples_in_one_sentence(text, told, tmp_path, monkeypatch):
     (tmp_path / 'gate.yaml').write_text(text, encoding='utf-8')
+    monkeypatch.chdir(tmp_path)
     for example in (EXAMPLES[0], EXAMPLES[2]):
-        said = run(example, tmp_path, 'gate.yaml', is_refused=True)
+        monkeypatch.setattr(sys, 'argv', [str(example), 'gate.yaml'])
+        with pytest.raises(SystemExit) as refusal:
+            runpy.run_path(str(example), run_name='__main__')
+        # Python prints such a code to standard error, and ends with 1.
+        said = refusal.value.code
+        assert isinstance(said, str)
         assert told in said
         assert len(said.splitlines()) == 1
+
+
+def test_a_bad_map_is_refused_without_a_traceback(tmp_path):
+    (tmp_path / 'gate.yaml').write_text('walls: []\n', encoding='utf-8')
+    said = run(EXAMPLES[0], tmp_path, 'gate.yaml', is_refused=True)
+    assert 'map "gate": ' in said
+    assert len(said.splitlines()) == 1

@@ -12,6 +12,7 @@ pytest.importorskip('tqdm')
 pytest.importorskip('matplotlib')
 pytest.importorskip('distributed')
 
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from rrth_planner.cli.reproduce import main
 from rrth_planner.reproduction import path_club, run
@@ -90,7 +91,11 @@ def test_a_second_time_runs_nothing_and_writes_the_same(output, monkeypatch):
     monkeypatch.setattr(
         path_club, 'search', lambda *a, f=path_club.search, **k: grown.append(a) or f(*a, **k)
     )
+    # Pictures are made again; that they can be written the first time has shown.
+    written = []
+    monkeypatch.setattr(Figure, 'savefig', lambda _, path, **__: written.append(path.name))
     assert main([*TINY, 'low_left', '--output', str(output)]) == 0
+    assert written == [f'figure_{name}.png' for name in PICTURES]
     assert 0 < len(grown) <= 16
     assert report.read_text(encoding='utf-8') == before
     assert data.read_bytes() == rows

@@ -4,6 +4,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+import signal
+import subprocess
 import sys
 import threading
 import time
@@ -72,6 +74,33 @@ def ros_context() -> Iterator[None]:
     rclpy.init()
     yield
     rclpy.try_shutdown()
+
+
+@pytest.fixture(name='call')
+def _call(monkeypatch: pytest.MonkeyPatch, capfd) -> Callable[..., subprocess.CompletedProcess]:
+    """
+    Give what runs a `main` with some arguments in this process, and returns how it ended.
+
+    Its own process would take seconds to load what this one has. It has a default context of ROS
+    for itself, so that it may begin and end with one as processes do.
+    """
+    utilities = pytest.importorskip('rclpy.utilities')
+
+    def ended(main: Callable[..., int], *arguments: object) -> subprocess.CompletedProcess:
+        capfd.readouterr()
+        with monkeypatch.context() as patch:
+            # The handlers of the tests stay.
+            patch.setattr(signal, 'signal', lambda *_: None)
+            patch.setattr(utilities, 'g_default_context', None)
+            try:
+                code = main([*map(str, arguments)])
+            except SystemExit as end:
+                code = end.code
+            # It leaves nothing behind.
+            assert not utilities.ok()
+        return subprocess.CompletedProcess(arguments, code, *capfd.readouterr())
+
+    return ended
 
 
 @pytest.fixture(autouse=True)

@@ -29,6 +29,7 @@ from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros import body_boxes_node  # noqa: E402
 from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
+from rrth_planner.ros.interface import tracker_reporter  # noqa: E402
 from rrth_planner.ros.interface.posture_inputs import points_of  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
@@ -215,8 +216,10 @@ class Tracker(Node):
 
 
 @pytest.fixture
-def start():
+def start(monkeypatch):
     """Return a function that starts a node and its tracker, which run until the test ends."""
+    # Each test that waits for diagnostics would wait for a second.
+    monkeypatch.setattr(tracker_reporter, 'PERIOD', 0.1)
     running = []
 
     def started(*arguments, **parameters):
@@ -498,15 +501,25 @@ def test_where_the_tracker_reports_in_the_base_frame_boxes_are_in_its_own(start,
         ),
     ],
 )
-def test_a_start_that_cannot_be_is_one_sentence(arguments, words, capfd):
+def test_a_start_that_cannot_be_is_one_sentence(arguments, words, call):
     options = [word for argument in arguments for word in ('-p', argument)]
-    ended = subprocess.run(
-        [*MODULE, '--ros-args', *options], capture_output=True, text=True, timeout=120
-    )
+    ended = call(body_boxes_node.main, '--ros-args', *options)
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
     assert 'cannot start: ' in ended.stderr
     assert words in ended.stderr
+
+
+def test_a_start_that_cannot_be_ends_the_process():
+    ended = subprocess.run(
+        [*MODULE, '--ros-args', '-p', 'skeleton:=none'],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert ended.returncode == 1
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr
+    assert 'cannot start: ' in ended.stderr
 
 
 def test_without_tf_the_input_tf_says_so(monkeypatch):

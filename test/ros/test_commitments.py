@@ -110,19 +110,25 @@ def _clock(monkeypatch):
     return clock
 
 
-@pytest.fixture(name='separated')
-def _separated():
-    nodes = []
+@pytest.fixture(name='separated', scope='module')
+def _separated(ros_context):
+    # Monitors do not change their node, which is never spun.
+    node, known = Node('commitments'), {}
 
-    def make(**values):
+    def parameters(values):
         given = [Parameter('separation', value=True)]
         given += [Parameter(name, value=value) for name, value in values.items()]
-        nodes.append(Node('rrth_planner', parameter_overrides=given))
-        return Separated(nodes[-1], declare_parameters(nodes[-1]))
+        declared = Node('rrth_planner', parameter_overrides=given)
+        known[repr(values)] = declare_parameters(declared)
+        declared.destroy_node()
+
+    def make(**values):
+        if repr(values) not in known:
+            parameters(values)
+        return Separated(node, known[repr(values)])
 
     yield make
-    for node in nodes:
-        node.destroy_node()
+    node.destroy_node()
 
 
 def near(clearance):
@@ -214,6 +220,48 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
     assert arm.published[n][1] >= begin + trajectory.duration
     assert arm.statuses[-1].state is SeparationState.SLOWED
     arm.frames(900, hand)
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
+@pytest.mark.parametrize('has_moved', [True, False])
+def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
+    separated, has_moved
+):
+    arm, hand = beside(separated, 0.3, 30 if has_moved else 0)
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    place, n = arm.commanded(arm.now)[0], 0
+    # It was too late for all that came since, none of which is remembered.
+    while arm.monitor.running is not None:
+        arm.now += FRAME
+        arm.read(place, np.zeros(4))
+        arm.see(hand)
+        n += 1
+        assert n * FRAME < 2.0
+    assert n > commitments.REMEMBERED
+    stop = arm.monitor.take_stops()[-1]
+    assert stop.is_replanned == has_moved
+    assert 'does not follow it' in arm.monitor.stop_reason
+    assert arm.monitor._state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
+    arm.begin()
+    assert arm.monitor.running is not None
+
+
+def test_an_arm_that_sags_or_rests_where_it_is_commanded_is_followed(separated):
+    arm = separated()
+    hand = near(0.2)
+    arm.see(hand)
+    arm.begin()
+    arm.monitor.take_stops()
+    for k in range(1200):
+        arm.now += FRAME
+        q, v = arm.commanded(arm.now)[:2]
+        arm.read(q + 0.03, v)
+        if k < 60 or k > 120:
+            # In between no body comes, and the arm stops on its way.
+            arm.see(hand)
+        if k > 120 and arm.is_over:
+            break
+    assert not arm.monitor.take_stops()
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 

@@ -13,6 +13,8 @@ import pytest
 pytest.importorskip('rclpy')
 image = pytest.importorskip('matplotlib.image')
 
+from rrth_planner.cli import demo  # noqa: E402
+
 # Cold, the planner is compiled first [s].
 LONGEST_RUN = 400.0
 MODULE = [sys.executable, '-m', 'rrth_planner.cli.demo']
@@ -88,15 +90,15 @@ def test_an_interrupted_demo_ends_its_processes(tmp_path, number):
         (['--seed', '-5'], 'seed'),
     ],
 )
-def test_what_is_wrong_is_said_in_one_sentence(tmp_path, arguments, words):
-    ended = run('--output', tmp_path / 'motions.png', *arguments)
+def test_what_is_wrong_is_said_in_one_sentence(tmp_path, call, arguments, words):
+    ended = call(demo.main, '--output', tmp_path / 'motions.png', *arguments)
     assert ended.returncode == 1
     assert ended.stderr.startswith('demo failed: ')
     assert len(ended.stderr.splitlines()) == 1
     assert words in ended.stderr
 
 
-def test_no_timeout_at_all_is_rejected(tmp_path):
-    ended = run('--output', tmp_path / 'motions.png', '--timeout', '0')
+def test_no_timeout_at_all_is_rejected(tmp_path, call):
+    ended = call(demo.main, '--output', tmp_path / 'motions.png', '--timeout', '0')
     assert ended.returncode == 2
     assert '--timeout: 0, expected a number > 0' in ended.stderr

@@ -81,9 +81,10 @@ class Injector:
         sys.setprofile(None)
 
 
-@pytest.fixture
-def monitored():
+@pytest.fixture(scope='module')
+def monitored(ros_context):
     """Give what makes a monitor of a motion that has just begun."""
+    # Monitors do not change their node, which is never spun.
     node = Node('fail_closed')
     parameters = without_separation(node)
     yield lambda: Monitored(node, parameters)

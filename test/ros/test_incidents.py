@@ -16,6 +16,7 @@ pytest.importorskip('fcl')
 
 from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
+from rrth_planner.cli import replay  # noqa: E402
 from rrth_planner.collision import trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.incident import IncidentKind  # noqa: E402
@@ -45,8 +46,17 @@ SENTENCE = (
 LEVELS = {10: 'debug', 20: 'info', 30: 'warning', 40: 'error'}
 
 
-def replayed(file):
-    """Replay a file in a process of its own; return its exit code and the last line."""
+def replayed(file, capsys):
+    """Replay a file; return the exit code and what is printed."""
+    capsys.readouterr()
+    code = replay.main([str(file)])
+    out, err = capsys.readouterr()
+    assert err == ''
+    return code, out
+
+
+def replayed_elsewhere(file, _):
+    """Do so in a process of its own."""
     paths = os.pathsep.join(filter(None, [str(ROOT), os.environ.get('PYTHONPATH', '')]))
     found = subprocess.run(
         [sys.executable, '-m', 'rrth_planner.cli.replay', str(file)],
@@ -69,9 +79,13 @@ def nothing_published(stranger):
     return not any(stranger.received[topic] for topic in topics)
 
 
-@pytest.mark.parametrize('velocity', [None, [0.3, 0.0, 0.0, -0.2]], ids=['at rest', 'moving'])
+@pytest.mark.parametrize(
+    ('velocity', 'replayed'),
+    [(None, replayed), ([0.3, 0.0, 0.0, -0.2], replayed_elsewhere)],
+    ids=['at rest', 'moving'],
+)
 def test_a_disagreement_is_answered_and_kept_to_be_replayed(
-    start, monkeypatch, tmp_path, velocity
+    start, monkeypatch, tmp_path, capsys, velocity, replayed
 ):
     planner, stranger = start(
         incident_folder=str(tmp_path), seed=5, margin=0.02, algorithm='rrt_star', max_samples=500
@@ -106,7 +120,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
         np.testing.assert_array_equal(incident.trajectory.velocities[0], velocity)
 
     # Without the patch they agree, and the node lives on.
-    code, out = replayed(file)
+    code, out = replayed(file, capsys)
     assert code == 1
     assert 'motion identical to the bit: yes' in out
     assert out.splitlines()[-1] == (
@@ -119,7 +133,7 @@ def test_a_disagreement_is_answered_and_kept_to_be_replayed(
 
 
 def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
-    start, monkeypatch, tmp_path
+    start, monkeypatch, tmp_path, capsys
 ):
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
     say_all(planner, stranger)
@@ -147,7 +161,7 @@ def test_a_stop_that_violates_for_the_second_checker_is_kept_to_be_replayed(
     incident = read_incident(file)
     assert incident.violation == VIOLATION
     np.testing.assert_array_equal(incident.trajectory.positions, stop.positions)
-    assert replayed(file)[0] == 1
+    assert replayed(file, capsys)[0] == 1
 
 
 def test_a_folder_that_cannot_be_written_does_not_break_the_answer(start, monkeypatch, tmp_path):
@@ -193,7 +207,7 @@ def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
     assert stranger.answer().success
 
 
-def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp_path):
+def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp_path, capsys):
     planner, stranger = start(incident_folder=str(tmp_path), seed=5)
     say_all(planner, stranger)
 
@@ -212,7 +226,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
     assert (incident.kind, incident.error) == (IncidentKind.ERROR, 'OSError')
     assert "raise OSError('no publisher')" in incident.traceback
     assert incident.trajectory is not None
-    code, out = replayed(file)
+    code, out = replayed(file, capsys)
     assert code == 1
     assert out.splitlines()[-1] == (
         'not reproduced: the OSError occurred after the motion had been planned'

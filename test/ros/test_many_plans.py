@@ -22,6 +22,7 @@ from rrth_planner.kernels.kinematics import pan_tilt_ik  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.planning.pointing_goals import target_in_mount  # noqa: E402
+from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 import samples  # noqa: E402
@@ -35,7 +36,6 @@ pytestmark = pytest.mark.usefixtures('ros_context')
 # Targets all round the wearer, then some so near that most of them are blocked.
 N_BODIES, N_TARGETS, N_NEAR, MARGIN, RAY = 20, 10, 3, 0.02, 1.0
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-RESPONSE = 'request to trajectory [ms]'
 
 
 class Client(Node):
@@ -85,11 +85,9 @@ def _is_blocked_by_reference(rng, arm, scene, target):
     world = arm_world(arm, scene, MARGIN, RAY)
     in_mount = target_in_mount(arm, PointingGoal(target))
     configurations, rays = [], []
-    for _ in range(4000):
-        q = rng.uniform(*arm.bounds)
-        reach = pan_tilt_ik.aim(
-            world.robot, arm.bounds, in_mount, q.copy(), int(rng.integers(2)), q
-        )
+    draws = zip(rng.uniform(*arm.bounds, (4000, arm.dof)), rng.integers(2, size=4000), strict=True)
+    for q, branch in draws:
+        reach = pan_tilt_ik.aim(world.robot, arm.bounds, in_mount, q.copy(), int(branch), q)
         if reach >= 0.0:
             configurations.append(q)
             rays.append([max(RAY, reach)])
@@ -108,7 +106,7 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
     rng = np.random.default_rng(2024)
     arm, limits = worlds.table_1_arm(), worlds.limits()
     client = Client()
-    codes, times, lines = {}, [], []
+    codes, times, lines, moved = {}, [], [], -np.inf
     module = 'rrth_planner.ros.planner_node'
     arguments = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
     with ChildProcess(module, arguments, lines.append) as child, spinning(client):
@@ -117,7 +115,7 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
             scene = worlds.varied_body(rng)
             q = _free_start(rng, arm, scene)
             # The last motion is found not to be executed: another body does not stop it.
-            time.sleep(0.4)
+            time.sleep(max(0.0, moved + 0.5 - time.monotonic()))
             send(client, client.joints, samples.joints(q.tolist()))
             time.sleep(0.05)
             send(client, client.body, _body_message(scene))
@@ -127,7 +125,7 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
                 target = length * direction / np.linalg.norm(direction)
                 send(client, client.joints, samples.joints(q.tolist()))
                 send(client, client.target, samples.target(*target))
-                n_before, n_asked = len(client.motions), sum(codes.values())
+                n_before = len(client.motions)
                 future = client.plan.call_async(Trigger.Request())
                 wait_until(future.done)
                 answer = future.result()
@@ -141,9 +139,9 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
                     assert _is_blocked_by_reference(rng, arm, scene, target), answer.message
                     assert len(client.motions) == n_before
                     continue
+                times.append(answer_from_text(answer.message).figures['planning_time_ms'])
                 wait_until(lambda n=n_before: len(client.motions) == n + 1)
-                wait_until(lambda n=n_asked: int(client.figures.get('requests', 0)) > n)
-                times.append(float(client.figures[RESPONSE]))
+                moved = time.monotonic()
                 motion = joint_trajectory_from_msg(client.motions[-1], arm.joint_names)
                 # Raises where the motion violates at 0.5 ms sampling, or misses by 1 mm.
                 inspect_motion(
@@ -157,7 +155,10 @@ def test_two_hundred_motions_round_twenty_bodies_have_no_contact(wait_until, sen
                     ray_guard_length=RAY,
                 )
                 q = motion.positions[-1]
-    print(codes, 'request to trajectory, ms: p50, p90, p99', np.percentile(times, (50, 90, 99)))
+            # Diagnostics come ten times a second only.
+            n_asked = sum(codes.values())
+            wait_until(lambda n=n_asked: int(client.figures.get('requests', 0)) == n)
+    print(codes, 'planning time, ms: p50, p90, p99', np.percentile(times, (50, 90, 99)))
     assert codes['SUCCESS'] >= N_BODIES * N_TARGETS
     assert codes['GOAL_IN_COLLISION'] > N_BODIES
     client.destroy_node()

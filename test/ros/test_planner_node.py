@@ -38,10 +38,12 @@ from rrth_planner.model.arm import (  # noqa: E402
     pointing_error,
     tool_pose,
 )
+from rrth_planner.model.scene import Scene  # noqa: E402
 from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
+from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
@@ -739,20 +741,22 @@ def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch)
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, publishers = inputs_of(planner), planner._queue._publishers
-    publish, known = publishers.publish, []
+    publish, known, planned = publishers.publish, [], []
 
     def publish_slowly(msg):
         body = inputs.body.value
         stranger.publishers['body_boxes'].publish(fenced())
         time.sleep(0.3)
         known.append(inputs.body.value is body)
+        planned.append(msg)
         publish(msg)
 
     monkeypatch.setattr(publishers, 'publish', publish_slowly)
     assert stranger.answer().success
     assert known[0]
-    # Then it is, and the monitor stops the arm.
-    stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
+    # Then it is, and the monitor stops the arm. Of messages that quick only the last may arrive.
+    (motion,), received = planned, stranger.received['joint_trajectory']
+    stranger.wait_until(lambda: received and received[-1].points[-1] != motion.points[-1])
 
 
 def test_a_busy_node_publishes_no_motion(start, monkeypatch):
@@ -776,13 +780,17 @@ def test_a_busy_node_publishes_no_motion(start, monkeypatch):
     assert not stranger.received['joint_trajectory']
 
 
-def stop_for(planner):
-    """Have a stop of the arm, which was moving to the target, replanned; it is over."""
+def stop_for(planner, scene=None):
+    """
+    Have a stop of the arm, which was moving to the target, replanned; it is over.
+
+    scene: the wearer that it was proven free of, if it was.
+    """
     goal, parameters = inputs_of(planner).target.value, planner._reporter.parameters
     still = np.zeros((1, 4))
     over = Trajectory(times=[0.0], positions=[FOLDED], velocities=still, accelerations=still)
     monitor = planner._monitor
-    monitor._stops.append(Stop(over, goal, parameters, None, True, monitor.n_motions))
+    monitor._stops.append(Stop(over, goal, parameters, scene, True, monitor.n_motions))
 
 
 def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, monkeypatch):
@@ -799,6 +807,39 @@ def test_after_a_stop_it_plans_again_from_where_the_arm_has_come_to_rest(start, 
     assert not any(msg.points[0].velocities)
     error = pointing_error(load_arm(), np.array(msg.points[-1].positions), [1.5, 0.1, 0.3])
     assert error < 1e-6
+
+
+@pytest.mark.parametrize('is_free', [True, False])
+def test_from_a_stop_that_is_proven_free_it_plans_before_the_arm_rests_and_once_it_does(
+    start, monkeypatch, is_free
+):
+    monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints(velocity=[0.0, 0.3, 0.0, 0.0]))
+    queue, work, tried = planner._queue, planner._queue._work, []
+
+    def work_in_vain(*arguments):
+        tried.append(bool(inputs_of(planner).joints.value.velocities.any()))
+        return work(*arguments)
+
+    monkeypatch.setattr(queue, '_work', work_in_vain)
+    monkeypatch.setattr(
+        request_queue,
+        'plan_request',
+        lambda *_: PlanOutcome(ErrorCode.PLANNING_FAILED, 'of the test'),
+    )
+    monkeypatch.setattr(queue, '_check_stop', lambda stop: None)
+    stop_for(planner, Scene(()) if is_free else None)
+    if is_free:
+        stranger.wait_until(lambda: tried)
+    time.sleep(0.2)
+    assert tried == [True] * is_free
+    # The arm holds only where it rests.
+    assert stranger.value('monitor') != 'holding'
+    stranger.publishers['joint_states'].publish(joints([0.1, *FOLDED[1:]]))
+    stranger.wait_until(lambda: len(tried) > is_free)
+    assert not tried[is_free]
+    stranger.wait_until(lambda: stranger.value('monitor') == 'holding')
 
 
 def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
@@ -1313,9 +1354,17 @@ def _framed():
         ('max_jerk:=[1.0, 2.0]', 'max_jerk: [1.0, 2.0], expected 4 values'),
     ],
 )
-def test_a_bad_parameter_ends_the_start_with_one_line(process, argument, sentence):
-    running = process('--ros-args', '-p', argument)
+def test_a_bad_parameter_ends_the_start_with_one_line(call, argument, sentence):
+    ended = call(planner_module.run, '--ros-args', '-p', argument)
+    assert ended.returncode == 1
+    (line,) = ended.stderr.strip().splitlines()
+    assert sentence in line
+
+
+def test_a_start_that_fails_ends_the_process_and_its_planning_process(process):
+    running = process('--ros-args', '-p', 'margin:=3.0')
+    # The pipe closes when both have ended.
     _, errors = running.communicate(timeout=60)
     assert running.returncode == 1
     (line,) = errors.strip().splitlines()
-    assert sentence in line
+    assert 'margin: 3.0, expected a number from 0 to 1 [m]' in line

@@ -26,7 +26,7 @@ from rrth_planner.model.rotation import rotation_matrix  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.interface.playback_parameters import SETTINGS  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
-from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from rrth_planner.ros.playback_node import main, PlaybackNode  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
@@ -282,7 +282,7 @@ def test_a_motion_from_the_present_state_replaces_the_running_one(playback, obse
     observer.motions.publish(motion(FOLDED, FOLDED - 0.4, 4.0))
     wait_until(lambda: (np.abs(observer.v) > 0.05).all())
     elsewhere = FOLDED - [0.5, 0.5, -0.5, -0.5]
-    observer.motions.publish(motion(observer.q, elsewhere, 2.0, observer.v))
+    observer.motions.publish(motion(observer.q, elsewhere, 1.2, observer.v))
     wait_until(lambda: observer.is_still_at(elsewhere))
 
 
@@ -290,8 +290,8 @@ def test_a_motion_from_the_present_state_replaces_the_running_one(playback, obse
 def test_a_stop_is_on_the_path_and_the_next_motion_begins_there(playback, observer, scale):
     playback(time_scale=scale)
     way = np.array([-1.0, -1.0, 0.5, 0.5])
-    observer.motions.publish(motion(FOLDED, FOLDED + way, 3.0))
-    wait_until(lambda: np.abs(observer.v).max() > 0.4 * scale)
+    observer.motions.publish(motion(FOLDED, FOLDED + way, 2.0))
+    wait_until(lambda: np.abs(observer.v).max() > 0.5 * scale)
     answer = observer.stop.call(Trigger.Request(), timeout_sec=LONGEST_WAIT)
     assert answer.success
     assert 'at rest in' in answer.message
@@ -307,7 +307,7 @@ def test_a_stop_is_on_the_path_and_the_next_motion_begins_there(playback, observ
     answer = observer.stop.call(Trigger.Request(), timeout_sec=LONGEST_WAIT)
     assert answer.success
     assert 'already' in answer.message
-    observer.motions.publish(motion(stopped_at, FOLDED, 2.0))
+    observer.motions.publish(motion(stopped_at, FOLDED, 1.4))
     wait_until(lambda: observer.is_still_at(FOLDED))
 
 
@@ -359,16 +359,29 @@ def test_a_signal_ends_the_process_with_code_0_and_no_traceback(observer, number
         'tiem_scale:=0.5',
     ],
 )
-def test_a_bad_parameter_ends_the_process_with_one_line_that_names_it(setting):
+def test_a_bad_parameter_ends_the_command_with_one_line_that_names_it(monkeypatch, capfd, setting):
+    def spin(_):
+        raise AssertionError(f'the node runs with {setting}')
+
+    monkeypatch.setattr(rclpy, 'spin', spin)
+    # Both belong to the tests before, too: the command has its own.
+    monkeypatch.setattr(rclpy.utilities, 'g_default_context', None)
+    monkeypatch.setenv('NUMBA_DISABLE_JIT', '0')
+    assert main(['--ros-args', '-p', setting]) == 1
+    (line,) = capfd.readouterr().err.splitlines()
+    assert setting.split(':')[0] in line
+
+
+def test_a_bad_parameter_ends_the_process_with_one_line_that_names_it():
     ended = subprocess.run(
-        [*MODULE, '--ros-args', '-p', setting],
+        [*MODULE, '--ros-args', '-p', 'max_jerk:=[40.0, 40.0]'],
         capture_output=True,
         text=True,
         timeout=LONGEST_WAIT,
     )
     assert ended.returncode == 1
     assert len(ended.stderr.splitlines()) == 1, ended.stderr
-    assert setting.split(':')[0] in ended.stderr
+    assert 'max_jerk' in ended.stderr
 
 
 def test_the_packaged_file_holds_every_parameter_with_its_default():

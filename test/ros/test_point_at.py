@@ -1,7 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command point_at from outside: beside real nodes, beside half of them, and alone."""
+"""
+The command point_at from outside: beside real nodes, beside half of them, and alone.
 
+Most runs are calls of its `main`, as a process takes seconds to load what this one has.
+"""
+
+from functools import partial
 import json
 import os
 import signal
@@ -26,6 +31,7 @@ from rrth_planner.io.wearer_file import load_body  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.ros.client import dry_run, follow_motion  # noqa: E402
 from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
 from rrth_planner.ros.client.follow_motion import announced_motion, follow  # noqa: E402
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
@@ -50,19 +56,36 @@ COMMAND = [sys.executable, '-m', 'rrth_planner.cli.point_at']
 
 
 def run(*arguments):
-    """Return how the command ended."""
+    """Return how the command ended, as a process."""
     return subprocess.run(
         [*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=LONGEST_RUN
     )
 
 
-def report_of(*arguments):
-    """Return the output of the command with --json, its exit code included."""
-    ended = run(*arguments, '--json')
+@pytest.fixture(name='call')
+def _call(call):
+    """Give what does as `run` does, but in this process."""
+    return partial(call, point_at.main)
+
+
+def report_of(how, *arguments):
+    """Return the output of the command with --json, its exit code included; `run` or `call` it."""
+    ended = how(*arguments, '--json')
     (line,) = ended.stdout.splitlines()
     report = json.loads(line)
     assert report['exit_code'] == ended.returncode, ended.stderr
     return report
+
+
+def impatient(patch, owner, name, timeout):
+    """Shorten the timeout of the command to a time [s] from the call of a function on."""
+    function = getattr(owner, name)
+
+    def hurried(client, *arguments):
+        client.timeout = timeout
+        return function(client, *arguments)
+
+    patch.setattr(owner, name, hurried)
 
 
 class Bystander(Node):
@@ -117,19 +140,20 @@ def test_with_separation_the_body_of_a_file_stands_there_until_the_arm_has_arriv
         ChildProcess('rrth_planner.ros.planner_node', [*separated, *settings], lambda _: None),
         ChildProcess('rrth_planner.ros.playback_node', separated, lambda _: None),
     ):
-        report = report_of(*(1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START, *separated, '--'))
+        words = ('--body', BOXES, '--timeout', START, *separated, '--')
+        report = report_of(run, 1.5, 0.1, 0.3, *words)
     assert report['exit_code'] == 0, report
     assert report['arrived'] is True
     assert report['pointing_error'] < 1e-3
 
 
 @pytest.mark.slow
-def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
+def test_the_arm_points_at_the_requested_target(arm, bystander, call, wait_until):
     # Volatile subscribers must be known to the planner before it publishes.
     wait_until(lambda: bystander.count_publishers('joint_trajectory'), START)
     wait_until(lambda: bystander.count_subscribers('joint_trajectory') > 1, START)
     time.sleep(1.0)
-    report = report_of(1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START)
+    report = report_of(run, 1.5, 0.1, 0.3, '--body', BOXES, '--timeout', START)
     assert report['exit_code'] == 0, report
     assert (report['code'], report['name'], report['arrived']) == (1, 'SUCCESS', True)
     assert report['pointing_error'] < 1e-3
@@ -144,18 +168,18 @@ def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
     )
 
     # The body stays; without --json the figures are those of the answer.
-    ended = run(0.3, 1.3, 0.2)
+    ended = call(0.3, 1.3, 0.2)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith('SUCCESS (1): ')
     assert 'the ray misses the target by' in ended.stdout
     wait_until(lambda: len(bystander.motions) == 2)
 
     # A target that the planner rejects moves nothing.
-    report = report_of(0, 0, 0)
+    report = report_of(call, 0, 0, 0)
     assert (report['exit_code'], report['name']) == (1, 'GOAL_IN_COLLISION')
     assert 'inside box' in report['sentence']
     assert report['arrived'] is False
-    ended = run(1.5, 0.1, 0.3, '--frame', 'nowhere')
+    ended = call(1.5, 0.1, 0.3, '--frame', 'nowhere')
     assert ended.returncode == 1
     assert ended.stderr.startswith('FRAME_TRANSFORM_FAILURE (-21): ')
     assert len(bystander.motions) == 2
@@ -163,53 +187,57 @@ def test_the_arm_points_at_the_requested_target(arm, bystander, wait_until):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('body', [BOXES, MARKERS])
-def test_planning_without_moving_publishes_nothing(planner, bystander, body):
+def test_planning_without_moving_publishes_nothing(planner, bystander, call, body):
     bystander.stand()
-    report = report_of(1.5, 0.1, 0.3, '--no-move', '--body', body, '--timeout', START)
+    report = report_of(call, 1.5, 0.1, 0.3, '--no-move', '--body', body, '--timeout', START)
     assert (report['exit_code'], report['name'], report['arrived']) == (0, 'SUCCESS', None)
     # The planner's own seed and limits, so that this is the motion that it would make.
     assert report['figures']['seed'] == 3
     assert report['figures']['duration'] > 0.5
     assert report['pointing_error'] < 1e-6
-    rejected = report_of(0, 0, 0, '--no-move', '--body', body)
+    rejected = report_of(call, 0, 0, 0, '--no-move', '--body', body)
     assert (rejected['exit_code'], rejected['name']) == (1, 'GOAL_IN_COLLISION')
     assert not bystander.motions
     assert not bystander.bodies
 
 
 @pytest.mark.slow
-def test_a_dry_run_plans_round_the_received_body(planner, bystander):
+def test_a_dry_run_plans_round_the_received_body(planner, bystander, call, monkeypatch):
     bystander.stand()
-    silent = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', '5')
+    with monkeypatch.context() as patch:
+        impatient(patch, dry_run, 'plan_without_moving', 2.0)
+        silent = report_of(call, 1.5, 0.1, 0.3, '--no-move', '--timeout', START)
     assert silent['exit_code'] == 3
     assert '/body_boxes' in silent['sentence']
     latched = bystander.create_publisher(MarkerArray, 'body_boxes', LATCHED)
     latched.publish(body_to_msg(load_body(), 'torso'))
-    received = report_of(1.5, 0.1, 0.3, '--no-move', '--timeout', START)
+    received = report_of(call, 1.5, 0.1, 0.3, '--no-move', '--timeout', START)
     assert received['exit_code'] == 0, received
     assert not bystander.motions
 
 
 @pytest.mark.slow
-def test_an_arm_that_does_not_follow_has_not_arrived(planner, bystander):
+def test_an_arm_that_does_not_follow_has_not_arrived(planner, bystander, call, monkeypatch):
     bystander.stand()
-    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '10')
+    impatient(monkeypatch, follow_motion, 'follow', 0.5)
+    report = report_of(call, 1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', START)
     assert (report['exit_code'], report['name'], report['arrived']) == (4, 'SUCCESS', False)
     assert 'from the end of its motion' in report['sentence']
     assert report['pointing_error'] > 0.1
 
 
 @pytest.mark.slow
-def test_without_joint_positions_nothing_is_asked_for(planner, bystander):
-    report = report_of(1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', '5')
+def test_without_joint_positions_nothing_is_asked_for(planner, bystander, call, monkeypatch):
+    impatient(monkeypatch, PlannerClient, 'wait_for_state', 0.5)
+    report = report_of(call, 1.5, 0.1, 0.3, '--body', MARKERS, '--timeout', START)
     assert report['exit_code'] == 3
     assert '/joint_states of joint_1' in report['sentence']
     assert not bystander.bodies
 
 
-def test_without_a_planner_it_says_so_in_time():
+def test_without_a_planner_it_says_so_in_time(call):
     begin = time.monotonic()
-    ended = run(1.5, 0.1, 0.3, '--timeout', '0.5', '--ros-args', '-r', '__ns:=/alone')
+    ended = call(1.5, 0.1, 0.3, '--timeout', '0.5', '--ros-args', '-r', '__ns:=/alone')
     assert ended.returncode == 3
     assert ended.stdout == ''
     assert len(ended.stderr.splitlines()) == 1
@@ -248,15 +276,10 @@ def test_it_can_be_interrupted(bystander, wait_until):
         (['1', '2', '3', '--ros-args', '-r', 'nonsense'], '--ros-args'),
     ],
 )
-def test_wrong_usage_is_said_before_anything_is_waited_for(arguments, words, monkeypatch, capsys):
-    # The handlers of the tests stay.
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    try:
-        code = point_at.main(arguments)
-    except SystemExit as end:
-        code = end.code
-    assert code == 2
-    assert words in capsys.readouterr().err
+def test_wrong_usage_is_said_before_anything_is_waited_for(arguments, words, call):
+    ended = call(*arguments)
+    assert ended.returncode == 2
+    assert words in ended.stderr
 
 
 def test_wrong_words_for_ros_are_wrong_usage():
@@ -266,12 +289,10 @@ def test_wrong_words_for_ros_are_wrong_usage():
     assert len(ended.stderr.splitlines()) == 1
 
 
-def test_the_help_names_every_exit_code(monkeypatch, capsys):
-    monkeypatch.setattr(signal, 'signal', lambda *_: None)
-    with pytest.raises(SystemExit) as end:
-        point_at.main(['--help'])
-    assert end.value.code == 0
-    codes = capsys.readouterr().out.split('exit codes:')[1].split('--json')[0].split('\n')
+def test_the_help_names_every_exit_code(call):
+    ended = call('--help')
+    assert ended.returncode == 0
+    codes = ended.stdout.split('exit codes:')[1].split('--json')[0].split('\n')
     assert [line.split()[0] for line in codes if line[2:3].isdigit()] == [
         '0',
         '1',

@@ -24,6 +24,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy  # noqa: E402
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores  # noqa: E402
+from rrth_planner.cli import record  # noqa: E402
 from rrth_planner.cli.plot import main as plot  # noqa: E402
 from rrth_planner.cli.ros_parsers import TOPICS  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
@@ -276,22 +277,21 @@ def test_names_follow_namespace_and_remaps_and_types_are_looked_up(tmp_path, spi
     assert x == sorted(set(x))
 
 
-def rejection(*arguments, **options):
-    """Return the one sentence of a recorder that ends with code 1."""
-    ended = subprocess.run(
-        [*MODULE, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=LONGEST_WAIT,
-        **options,
-    )
-    assert ended.returncode == 1, ended.stderr
-    assert ended.stderr.startswith('record: ')
-    assert len(ended.stderr.splitlines()) == 1, ended.stderr
-    return ended.stderr
+@pytest.fixture(name='rejection')
+def _rejection(call):
+    """Give what returns the one sentence of a recorder that ends with code 1."""
+
+    def sentence(*arguments):
+        ended = call(record.main, *arguments)
+        assert ended.returncode == 1, ended.stderr
+        assert ended.stderr.startswith('record: ')
+        assert len(ended.stderr.splitlines()) == 1, ended.stderr
+        return ended.stderr
+
+    return sentence
 
 
-def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path):
+def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path, rejection):
     path = tmp_path / 'run.mcap'
     said = rejection('-o', path, '--duration', 0.5, '--topics', 'target', 'nobody_says_this')
     assert 'no message received' in said
@@ -299,14 +299,14 @@ def test_a_recorder_without_messages_reports_that_and_leaves_no_file(tmp_path):
     assert not path.exists()
 
 
-def test_a_file_is_never_overwritten(tmp_path):
+def test_a_file_is_never_overwritten(tmp_path, rejection):
     path = tmp_path / 'run.mcap'
     path.write_text('precious')
     assert 'exists already' in rejection('-o', path, '--duration', 0.5)
     assert path.read_text() == 'precious'
 
 
-def test_a_folder_that_is_missing_is_named(tmp_path):
+def test_a_folder_that_is_missing_is_named(tmp_path, rejection):
     said = rejection('-o', tmp_path / 'nowhere' / 'run.mcap', '--duration', 0.5)
     assert 'No such file or directory' in said
 
@@ -318,7 +318,7 @@ def test_a_folder_that_is_missing_is_named(tmp_path):
         (['--ros-args', '-r', 'nonsense'], 'nonsense'),
     ],
 )
-def test_names_that_are_none_are_rejected(tmp_path, arguments, words):
+def test_names_that_are_none_are_rejected(tmp_path, rejection, arguments, words):
     path = tmp_path / 'run.mcap'
     said = rejection('-o', path, '--duration', 0.5, *arguments)
     assert words in said
@@ -327,12 +327,22 @@ def test_names_that_are_none_are_rejected(tmp_path, arguments, words):
 
 
 @pytest.mark.parametrize('value', ['0', '-1', 'nan', 'soon'])
-def test_a_bad_duration_is_rejected(value):
-    ended = subprocess.run(
-        [*MODULE, f'--duration={value}'], capture_output=True, text=True, timeout=LONGEST_WAIT
-    )
+def test_a_bad_duration_is_rejected(value, call):
+    ended = call(record.main, f'--duration={value}')
     assert ended.returncode == 2
     assert '--duration' in ended.stderr.splitlines()[-1]
+
+
+def test_a_recording_that_cannot_begin_ends_the_process(tmp_path):
+    ended = subprocess.run(
+        [*MODULE, '-o', str(tmp_path / 'nowhere' / 'run.mcap'), '--duration', '0.5'],
+        capture_output=True,
+        text=True,
+        timeout=LONGEST_WAIT,
+    )
+    assert ended.returncode == 1, ended.stderr
+    assert ended.stderr.startswith('record: ')
+    assert len(ended.stderr.splitlines()) == 1, ended.stderr
 
 
 FULL = """

@@ -16,6 +16,7 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
+from rrth_planner.cli import wearer as wearer_command  # noqa: E402
 from rrth_planner.io.motion_capture_file import load_person  # noqa: E402
 from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.ros.client.person_publisher import FORMS, PersonPublisher  # noqa: E402
@@ -29,7 +30,7 @@ from rrth_planner.wearer.tracker import measurement, Tracker  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 MODULE = [sys.executable, '-m', 'rrth_planner.cli.wearer']
-FPS, LATENCY = 50.0, 0.2
+FPS, LATENCY = 100.0, 0.2
 BEST_EFFORT = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -209,10 +210,17 @@ def test_a_person_without_a_base_frame_is_not_published(wait_until, spinning):
         (['--skeleton', 'mediapipe'], '--skeleton mediapipe: base: '),
     ],
 )
-def test_what_is_wrong_is_said_in_one_sentence(arguments, words):
-    ended = subprocess.run([*MODULE, *arguments], capture_output=True, text=True, timeout=120)
+def test_what_is_wrong_is_said_in_one_sentence(arguments, words, call):
+    ended = call(wearer_command.main, *arguments)
     assert ended.returncode == 1
     assert ended.stderr.startswith('wearer: ')
     assert len(ended.stderr.splitlines()) == 1
     assert words in ended.stderr
     assert not ended.stdout
+
+
+def test_what_is_wrong_ends_the_process():
+    ended = subprocess.run([*MODULE, 'none.bvh'], capture_output=True, text=True, timeout=120)
+    assert ended.returncode == 1
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith('wearer: file none.bvh: No such file or directory')

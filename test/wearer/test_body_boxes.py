@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Boxes contain the flesh of people, as each tracker reports them, and are not absurdly large."""
 
+from functools import cache
+
 from fleshed_person import make_person, SEEN, seen_by, turn
 from hypothesis import given, strategies as st
 import numpy as np
@@ -39,6 +41,12 @@ CLOTHES = {'xsens': 0.01, 'cmu_bvh': 0.01}
 OFF_UPRIGHT, OFF = (6.0, 0.06), {'azure_kinect': (13.0, 0.04), 'mediapipe': (32.0, 0.15)}
 
 
+@cache
+def person_of(seed, is_upright=False):
+    """Return a person; all trackers see the same ones."""
+    return make_person(np.random.default_rng(seed), is_upright)
+
+
 def outside(points, box, T):
     """Return how far points of the tracker's frame are outside a box, the furthest [m]."""
     in_box = ((points - T[:3, 3]) @ T[:3, :3] - box.center) @ box.rotation
@@ -59,7 +67,7 @@ def flesh_of(tracker, person):
 def test_all_flesh_and_clothes_are_inside_the_box_of_its_part(tracker):
     skeleton, ratios = load_skeleton(tracker), []
     for seed in range(N_PEOPLE):
-        person = make_person(np.random.default_rng(seed))
+        person = person_of(seed)
         posture = seen_by(tracker, person)
         scene, missing = body_boxes(skeleton, posture)
         assert missing == ()
@@ -80,7 +88,7 @@ def test_the_base_frame_is_in_the_chest(tracker):
     skeleton = load_skeleton(tracker)
 
     def off(seed, is_upright):
-        person = make_person(np.random.default_rng(seed), is_upright)
+        person = person_of(seed, is_upright)
         T = base_pose(skeleton, seen_by(tracker, person))
         rotation, origin = person.frames['base']
         cosine = (np.trace(T[:3, :3].T @ rotation) - 1) / 2
@@ -97,7 +105,7 @@ def test_the_base_frame_is_in_the_chest(tracker):
 
 
 def test_an_upright_wearer_has_his_parts_where_the_body_of_the_examples_has_them():
-    posture = seen_by('xsens', make_person(np.random.default_rng(3), is_upright=True))
+    posture = seen_by('xsens', person_of(3, is_upright=True))
     boxes = {box.name: box for box in body_boxes(load_skeleton('xsens'), posture)[0].boxes}
     # x forward, y left, z up, origin at the centre of the chest.
     assert boxes['head'].center[2] > 0.3
@@ -126,7 +134,7 @@ def test_the_folded_arm_keeps_its_margin_from_a_wearer_who_stands(tracker):
     ends = zip(corners, [*corners[1:], ray], strict=True)
     line = np.concatenate([start + share * (end - start) for start, end in ends])
     for seed in range(50):
-        person = make_person(np.random.default_rng(seed), is_upright=True)
+        person = person_of(seed, is_upright=True)
         for box in body_boxes(skeleton, seen_by(tracker, person))[0].boxes:
             gaps = np.maximum(np.abs((line - box.center) @ box.rotation) - box.size / 2, 0.0)
             assert np.linalg.norm(gaps, axis=1).min() > settings.margin, box.name
@@ -134,7 +142,7 @@ def test_the_folded_arm_keeps_its_margin_from_a_wearer_who_stands(tracker):
 
 @pytest.mark.parametrize('tracker', SEEN)
 def test_boxes_are_boxes(tracker):
-    posture = seen_by(tracker, make_person(np.random.default_rng(5)))
+    posture = seen_by(tracker, person_of(5))
     for box in body_boxes(load_skeleton(tracker), posture)[0].boxes:
         # Made anew, it is validated.
         again = Box(box.name, box.center, box.size, box.rotation)
@@ -152,7 +160,7 @@ def replaced(posture, name, position):
 @pytest.mark.parametrize('position', [np.nan, np.inf, 1e300, -2e3])
 def test_parts_of_a_lost_point_are_missing_and_all_others_are_there(position):
     skeleton = load_skeleton('azure_kinect')
-    posture = seen_by('azure_kinect', make_person(np.random.default_rng(7)))
+    posture = seen_by('azure_kinect', person_of(7))
     scene, missing = body_boxes(skeleton, replaced(posture, 'ELBOW_LEFT', position))
     assert missing == ('left upper arm', 'left forearm')
     whole = {box.name: box for box in body_boxes(skeleton, posture)[0].boxes}
@@ -163,7 +171,7 @@ def test_parts_of_a_lost_point_are_missing_and_all_others_are_there(position):
 
 def test_a_point_that_the_tracker_does_not_report_is_lost():
     skeleton = load_skeleton('xsens')
-    posture = seen_by('xsens', make_person(np.random.default_rng(7)))
+    posture = seen_by('xsens', person_of(7))
     keep = [k for k, name in enumerate(posture.names) if name != 'RightToe']
     posture = Posture(
         names=tuple(posture.names[k] for k in keep),
@@ -175,7 +183,7 @@ def test_a_point_that_the_tracker_does_not_report_is_lost():
 
 def test_a_lost_rotation_loses_what_is_placed_by_it():
     skeleton = load_skeleton('xsens')
-    posture = seen_by('xsens', make_person(np.random.default_rng(7)))
+    posture = seen_by('xsens', person_of(7))
     rotations = posture.rotations.copy()
     rotations[posture.names.index('Head')] = np.nan
     posture = Posture(names=posture.names, positions=posture.positions, rotations=rotations)
@@ -188,14 +196,14 @@ def test_a_lost_rotation_loses_what_is_placed_by_it():
     [('azure_kinect', 'NECK'), ('azure_kinect', 'SHOULDER_LEFT'), ('xsens', 'T8')],
 )
 def test_without_the_base_frame_there_are_no_boxes(tracker, name):
-    posture = seen_by(tracker, make_person(np.random.default_rng(7)))
+    posture = seen_by(tracker, person_of(7))
     for call in (body_boxes, base_pose):
         with pytest.raises(SceneError, match='^base: .* lost, expected both$'):
             call(load_skeleton(tracker), replaced(posture, name, np.nan))
 
 
 def test_a_base_frame_without_a_rotation_is_named():
-    posture = seen_by('xsens', make_person(np.random.default_rng(7)))
+    posture = seen_by('xsens', person_of(7))
     points = Posture(names=posture.names, positions=posture.positions)
     with pytest.raises(SceneError, match='base: no frame "T8" with a rotation'):
         body_boxes(load_skeleton('xsens'), points)

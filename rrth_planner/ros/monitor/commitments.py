@@ -19,6 +19,7 @@ from rrth_planner.execution.commitment import (
     path_state,
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import part_of, positions_at
 from rrth_planner.ros.interface.inputs import RequestError
@@ -46,6 +47,9 @@ REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
+# An arm that has rested for so long [s], while it was commanded further than this [rad], does not
+# follow: its controller rejects what it is given. It has moved before where it went so far [rad].
+LEFT_AFTER, LEFT_WAY, MOVED = 0.3, 0.02, 1e-3
 # A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
 # long the controller has one that is published [s].
 LATEST, ARRIVAL = 0.02, 0.005
@@ -71,6 +75,8 @@ class Commitments:
         self.present: Commitment | None = None
         # The last ones, in their order: a controller may have rejected one.
         self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
+        # Since when the arm rests [s], and what was commanded then.
+        self._rest: tuple[float, Array] | None = None
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
@@ -150,6 +156,7 @@ class Commitments:
         # The controller may reject what replaces a running motion.
         replaced = [] if self.present is None else [self.present]
         self._recent = deque([*replaced, found], maxlen=REMEMBERED)
+        self._rest = None
         self._replaced = self.planned
         self.planned, self.present, self._parameters = planned, found, parameters
         with suppress(Exception):
@@ -175,6 +182,29 @@ class Commitments:
         if present is None or present.is_whole:
             return True
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
+
+    def is_left(self, reading: JointReading | None) -> bool:
+        """Return whether the arm rests while it is commanded to move on."""
+        if reading is None or not self.is_active:
+            return False
+        if reading.is_moving(reading.taken):
+            self._rest = None
+            return False
+        place = self._commanded(reading.taken)
+        since, then = self._rest or (reading.taken, place)
+        self._rest = since, then
+        return (
+            reading.taken - since > LEFT_AFTER
+            and float(np.abs(place - then).max()) > LEFT_WAY
+            and float(np.abs(place - reading.positions).max()) > ASIDE
+        )
+
+    def has_moved(self, reading: JointReading | None) -> bool:
+        """Return whether the arm is elsewhere than where its motion begins."""
+        if reading is None or self.planned is None:
+            return False
+        way = reading.positions - self.planned.trajectory.positions[0]
+        return float(np.abs(way).max()) > MOVED
 
     def waits_for_reset(self, now: float) -> bool:
         """Return whether the motion is on its way, and a stop there lasts until `reset`."""
@@ -299,6 +329,14 @@ class Commitments:
             # It is of the motion before that.
             self.planned, self._replaced = self._replaced, None
         return True
+
+    def _commanded(self, time: float) -> Array:
+        """Return the positions that were commanded for a time [s], (dof,) [rad]."""
+        recent = self._recent
+        commitment = next((c for c in reversed(recent) if c.start_time <= time), recent[0])
+        elapsed = min(max(time - commitment.start_time, 0.0), commitment.trajectory.duration)
+        place: Array = positions_at(commitment.trajectory, [elapsed])[0]
+        return place
 
     def is_separate(self, motion: ExecutingMotion, now: float) -> bool:
         """Return whether what is left of a motion now [s] is proven separate from the wearer."""

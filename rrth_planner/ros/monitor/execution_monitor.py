@@ -48,6 +48,9 @@ LONGEST_WAIT = 0.05
 OFF_TRAJECTORY = (
     f'arm is > {MAX_DEVIATION:g} rad from the commanded trajectory: monitoring suspended'
 )
+# Why a motion is given up.
+TOO_NEAR = 'the wearer is too near for the motion to go on'
+NOT_FOLLOWED = 'the arm rests beside its motion, and does not follow it'
 # By whether the arm follows the last commanded motion.
 SWITCHED = {
     False: 'arm ignored the last commanded motion: monitoring the previous one, which it follows',
@@ -299,10 +302,15 @@ class ExecutionMonitor:
         """
         if self._commitments.is_active and not self.pending_stop:
             planned = self._commitments.planned
-            motion = self._commitments.extend(now, begin, self._inputs.joints.value)
+            reading = self._inputs.joints.value
+            motion = self._commitments.extend(now, begin, reading)
             if motion is not None:
                 self._tracker.replace(motion)
-            if self._commitments.planned is not planned:
+            if self._commitments.is_left(reading):
+                # An arm that has never moved would not follow the next motion either.
+                self._give_up_motion(NOT_FOLLOWED, self._commitments.has_moved(reading))
+                self._end_motion()
+            elif self._commitments.planned is not planned:
                 self._node.get_logger().error(SWITCHED[False])
                 self._set_state(MonitorState.MONITORING, SWITCHED[False])
 
@@ -398,14 +406,8 @@ class ExecutionMonitor:
         )
         if self._tracker.is_over(now) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
-                self._give_up_motion()
-            self._tracker.forget()
-            self._commitments.end()
-            self.pending_stop = ''
-            if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
-                self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
-            elif self._state is not MonitorState.HOLDING:
-                self._set_state(MonitorState.IDLE, '')
+                self._give_up_motion(TOO_NEAR)
+            self._end_motion()
             return None
         phase = self._tracker.phase(now)
         is_lost = phase is None and self._tracker.is_lost(now)
@@ -543,15 +545,25 @@ class ExecutionMonitor:
                 self._node.get_logger().error(traceback.format_exc())
             return False
 
-    def _give_up_motion(self) -> None:
+    def _give_up_motion(self, why: str, is_replanned: bool = True) -> None:
         """Have a motion planned again that came to rest on its way, and could not go on."""
         running = self.running
         assert running is not None
-        self._state = MonitorState.STOPPING
-        self.stop_reason = 'the wearer is too near for the motion to go on'
-        self.n_stops += 1
-        self._report_stop(running.trajectory)
-        self._record_stop(running.trajectory, None)
+        self.stop_reason, self.n_stops = why, self.n_stops + 1
+        sentence = f'{why}: motion given up'
+        self._set_state(MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence)
+        self._node.get_logger().warning(sentence)
+        self._record_stop(running.trajectory, None, is_replanned)
+
+    def _end_motion(self) -> None:
+        """Monitor a motion no longer that has ended, or was given up."""
+        self._tracker.forget()
+        self._commitments.end()
+        self.pending_stop = ''
+        if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
+            self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
+        elif self._state is not MonitorState.HOLDING:
+            self._set_state(MonitorState.IDLE, '')
 
     def _report_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
         """Report in log and diagnostics why the arm stops."""

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Localization of the arm on the commanded motion, or on the one before."""
 
+import functools
+
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, phase_of
 from rrth_planner.execution.remaining_motion import with_lead_in
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.trajectory import REST_SPEED, sample
+from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
 
@@ -59,8 +61,15 @@ def has_missed_stop(reading: JointReading, before: ExecutingMotion, stop: Execut
     if np.abs(passed - reading.positions).max(axis=1).min() <= ASIDE:
         return False
     here = phase_of(reading.positions, reading.velocities, before.trajectory)
-    begin = phase_of(passed[0], stop.trajectory.velocities[0], before.trajectory)
-    return here is not None and (begin is None or here[0] > begin[0])
+    begin = _begin_of_stop(before.trajectory, stop.trajectory)
+    return here is not None and (begin is None or here[0] > begin)
+
+
+@functools.lru_cache(maxsize=4)
+def _begin_of_stop(before: Trajectory, stop: Trajectory) -> float | None:
+    """Return when the motion before a stop passes the begin of that [s]; None: never."""
+    begin = phase_of(stop.positions[0], stop.velocities[0], before)
+    return None if begin is None else begin[0]
 
 
 def is_on_other(reading: JointReading, motion: ExecutingMotion, other: ExecutingMotion) -> bool:
