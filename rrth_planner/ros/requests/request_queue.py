@@ -99,7 +99,7 @@ class _Resumption:
     is_first: bool = True
 
     def is_due(self, joints: JointReading | None) -> bool:
-        """Return whether the arm rests by a reading after its stop, if it has to, or time is up."""
+        """Return whether the arm rests by a reading after its stop, or need not, or time is up."""
         if self.is_during_stop or time.monotonic() >= self.latest:
             return True
         return (
