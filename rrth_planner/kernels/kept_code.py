@@ -162,8 +162,8 @@ class SlimLibrary(JITCodeLibrary):
     The code of a kernel that is loaded, and its module once others are compiled against it.
 
     numba itself unpacks the module of each kernel that it loads, looks through all its symbols,
-    and keeps it: a second of the start of a process that plans, and 45 of its 235 MB, and it never
-    compiles anything.
+    and keeps it. A process that plans and never compiles anything would spend a second of its
+    start on that, and 45 of 235 MB.
     """
 
     _bitcode: bytes | None = None

@@ -30,7 +30,8 @@ MAX_CLASSES = 50
 # Then a row for each pair of bars that must not collide: the inner and the outer one, where among
 # the frames that of the inner one's link is, and how many joints move that link.
 INNER, OUTER, FRAME, BODY = range(4)
-# Room in `points` for a bar (start, half its length, end, radius), and for a frame (origin, then its axes).
+# Room in `points` for a bar (start, half its length, end, radius), and for a frame (origin, then
+# its axes).
 BAR_SIZE, FRAME_SIZE = 8, 12
 # Most pairs of an arm's bars, and most links whose frames they need.
 MAX_PAIRS, MAX_FRAMES = 2048, 64

@@ -14,7 +14,7 @@ from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.collision.world import arm_world, FINEST, robot_rows
 from rrth_planner.kernels import layout, scratch
-from rrth_planner.kernels.collision import arm_validity, edge_contacts
+from rrth_planner.kernels.collision import arm_validity, bar_bar, edge_contacts
 from rrth_planner.kernels.kinematics import pan_tilt_ik
 from rrth_planner.kernels.kinematics.generated_fk import chain_source
 from rrth_planner.kernels.layout import BOX_ROWS, LANES
@@ -71,6 +71,7 @@ NAMED = {
     'BARS_ROOM': JOINTS,
     'ENDS_ROOM': JOINTS,
     'BOWS_ROOM': ('test_sizes_that_follow_from_others_do',),
+    'SPEEDS_ROOM': ('test_sizes_that_follow_from_others_do',),
     'SEEN_ROOM': ROWS,
     'MAX_GROUPS': BOXES,
     'MAX_NODES': PROOF,
@@ -170,6 +171,8 @@ def test_sizes_that_follow_from_others_do():
     # Each bar with each other one, and no more frames than links.
     assert layout.MAX_BARS * (layout.MAX_BARS - 1) // 2 <= layout.MAX_PAIRS
     assert layout.MAX_DOF <= layout.MAX_FRAMES
+    # Each bar seen from each link, the mount among them.
+    assert layout.MAX_BARS * (layout.MAX_DOF + 1) <= bar_bar.SPEEDS_ROOM
     # A group is replaced by those below it, on each level but the last.
     n_waiting = 1 + (LANES - 1) * (tree_depth(layout.MAX_BOXES) - 1)
     assert n_waiting <= arm_validity.MAX_GROUPS

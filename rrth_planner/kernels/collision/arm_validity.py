@@ -237,8 +237,8 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     width^2 / 8 times the bound of the second derivative, is apart from each box, and the hulls of
     two bars that must not collide are apart. Otherwise it is bisected, breadth first, and the
     halves test only what is still open, bars on short intervals part by part, until an interval is
-    shorter than `resolution` [rad] (`docs/algorithms.md`, section 3). The ends of an interval belong
-    to it: at them only pairs that are open need to be looked at.
+    shorter than `resolution` [rad] (`docs/algorithms.md`, section 3). The ends of an interval
+    belong to it: at them only pairs that are open need to be looked at.
     """
     length = extent = 0.0
     for k in range(curve.shape[1]):

@@ -166,9 +166,7 @@ def pair_bounds(robot, speed, bows):
         n, body = BOW_SIZE * (row - first), int64(robot[row, BODY])
         inner, outer = int64(robot[row, INNER]), int64(robot[row, OUTER])
         bows[n] = -1.0
-        bows[n + SPEED] = (
-            fastest[(dof + 1) * inner + body] + fastest[(dof + 1) * outer + body]
-        )
+        bows[n + SPEED] = fastest[(dof + 1) * inner + body] + fastest[(dof + 1) * outer + body]
 
 
 @kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64))
@@ -223,11 +221,11 @@ def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
 
     points[a], points[b]: the arm at both; width: of the interval of the curve's parameter; row:
     that of the pair in `robot`; speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint;
-    n: where those of the pair are in `bows`. Apart are: bars that do not move to each other and are
-    not in contact, those too far away from each other to meet within the interval, and those whose hulls at both
-    instants, thickened by width^2 / 8 times the second derivative and seen from the link of the
-    inner bar, are separated by the direction in which they are nearest at one of the instants
-    (`docs/algorithms.md`, section 3).
+    n: where those of the pair are in `bows`. Apart are: bars that do not move to each other and
+    are not in contact, those too far away from each other to meet within the interval, and those
+    whose hulls at both instants, thickened by width^2 / 8 times the second derivative and seen
+    from the link of the inner bar, are separated by the direction in which they are nearest at one
+    of the instants (`docs/algorithms.md`, section 3).
     """
     if bows[n + SPEED] == 0.0:
         return is_pair_in_contact(points, a, row, robot)

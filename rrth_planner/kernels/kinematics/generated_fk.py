@@ -126,9 +126,10 @@ def chain_source(rows: Any) -> str:
 
     rows: `robot` as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta) Tz(d) each.
     The kernel `chain(q, ray_length, points, at)` writes BAR_SIZE numbers a bar from points[at] on,
-    in the order of their rows: its start in the arm's base frame, half its length, its end, and its
-    radius [m]; then FRAME_SIZE numbers for each link whose frame a pair of bars needs: its origin [m] and
-    its axes. It returns the number of bars that are checked against boxes.
+    in the order of their rows: its start in the arm's base frame, half its length where there are
+    pairs, else 0, its end, and its radius [m]; then FRAME_SIZE numbers for each link whose frame a
+    pair of bars needs: its origin [m] and its axes. It returns the number of bars that are checked
+    against boxes.
     """
     source = _Source()
     dof = (rows.shape[1] - REACH) // 2
