@@ -41,8 +41,8 @@ N_QUIET, N_FLOODED, N_STILL = 100, 25, 2
 # 160 times. By a clock, or in messages of the flood, it would be the machine that is tested, and
 # what it does besides.
 MEAN, WORST = 15.0, 40.0
-# Where other processes leave the node too little of a processor, all it has goes to the flood for a
-# while: it has to answer in time in one of so many rounds.
+# Where other processes leave the node too little of a processor, all it has goes to the flood for
+# a while: it has to answer in time in one of so many rounds.
 N_ROUNDS = 4
 
 
