@@ -47,9 +47,9 @@ REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
-# An arm that has rested for so long [s], while it was commanded further than this [rad], does not
-# follow: its controller rejects what it is given. It has moved before where it went so far [rad].
-LEFT_AFTER, LEFT_WAY, MOVED = 0.3, 0.02, 1e-3
+# An arm that has rested for so long [s], while it was commanded further than this [rad], ignores
+# its motion: its controller rejects what it is given. It has moved where it went so far [rad].
+IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
 # A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
 # long the controller has one that is published [s].
 LATEST, ARRIVAL = 0.02, 0.005
@@ -183,8 +183,8 @@ class Commitments:
             return True
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
-    def is_left(self, reading: JointReading | None) -> bool:
-        """Return whether the arm rests while it is commanded to move on."""
+    def is_ignored(self, reading: JointReading | None) -> bool:
+        """Take note of where the arm is; return whether it rests while it is to move on."""
         if reading is None or not self.is_active:
             return False
         if reading.is_moving(reading.taken):
@@ -194,8 +194,8 @@ class Commitments:
         since, then = self._rest or (reading.taken, place)
         self._rest = since, then
         return (
-            reading.taken - since > LEFT_AFTER
-            and float(np.abs(place - then).max()) > LEFT_WAY
+            reading.taken - since > IGNORED_AFTER
+            and float(np.abs(place - then).max()) > IGNORED_WAY
             and float(np.abs(place - reading.positions).max()) > ASIDE
         )
 

@@ -306,7 +306,7 @@ class ExecutionMonitor:
             motion = self._commitments.extend(now, begin, reading)
             if motion is not None:
                 self._tracker.replace(motion)
-            if self._commitments.is_left(reading):
+            if self._commitments.is_ignored(reading):
                 # An arm that has never moved would not follow the next motion either.
                 self._give_up_motion(NOT_FOLLOWED, self._commitments.has_moved(reading))
                 self._end_motion()

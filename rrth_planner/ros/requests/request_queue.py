@@ -82,7 +82,7 @@ class _Resumption:
     """
     A plan for the goal of a motion that was stopped, to be made once the arm rests.
 
-    The first one, from the stop that the arm executes, saves most of the time that it takes.
+    It is tried at once where the stop is proven free of the wearer, as a handover from the stop.
     """
 
     ticket: _Ticket
@@ -99,7 +99,11 @@ class _Resumption:
     is_first: bool = True
 
     def is_due(self, joints: JointReading | None) -> bool:
-        """Return whether the arm rests by a reading after its stop, or need not, or time is up."""
+        """
+        Return whether to try now: during the stop, or once a reading after it has the arm at rest.
+
+        Also once the time to wait for that is up.
+        """
         if self.is_during_stop or time.monotonic() >= self.latest:
             return True
         return (
@@ -420,7 +424,6 @@ class PlanQueue:
                     self._now() + duration,
                     time.monotonic() + duration + LONGEST_SETTLING,
                     time.monotonic() + duration + PATIENCE,
-                    # A stop that nothing is known to be in the way of.
                     is_during_stop=stop.scene is not None,
                 )
                 self._open.add(self._resumption.ticket)
