@@ -462,8 +462,9 @@ def test_a_frame_that_tf_has_not_heard_of_for_long_is_lost_and_delays_no_other(s
     expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
     without = moved(posture, 'RightHand', np.nan)
     known = [name for name in posture.names if name != 'RightHand']
-    # A little later it may still come.
-    FakeBuffer.times.update(dict.fromkeys(known, NOW + 50_000_000))
+    # A little later it may still come. The node may be looking: what it sees then of both times is
+    # not so far apart that frames of the first one count as lost.
+    FakeBuffer.times.update(dict.fromkeys(known, NOW + 90_000_000))
     FakeBuffer.times.update(dict.fromkeys(known, NOW + 150_000_000))
     msg = tracker.wait_for(NOW + 150_000_000)
     expect(msg, tracker.skeleton, without)
