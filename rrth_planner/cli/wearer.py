@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 import signal
 import sys
-from threading import Event
 import time
 
 import rclpy
@@ -22,6 +21,9 @@ from rrth_planner.ros.client.person_publisher import PersonPublisher
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import excerpt, posture_at, RecordedPerson
 from rrth_planner.wearer.tracker import measurement, newest_number, publishing_time, Tracker
+
+# A signal does not end a sleep: it is seen after this long at most [s].
+LONGEST_SLEEP = 0.1
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -51,9 +53,10 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
             raise OptionsError(f'--skeleton {options.skeleton}: {problem}') from problem
         if missing:
             say('wearer', f'no {", ".join(missing)}: their points are not in the recording')
-    stopped = Event()
+    signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: stopped.set())
+        # Only stored: an Event that is waited for would be locked against its own handler.
+        signal.signal(number, lambda number, _: signals.append(number))
     with ExitStack() as stack:
         rclpy.init(args=list(given), signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
@@ -64,15 +67,19 @@ def _publish(options: argparse.Namespace, given: Sequence[str]) -> None:
             f'{node.publisher.topic_name}; Ctrl-C ends it',
             flush=True,
         )
-        _publish_until(stopped, node, tracker, person)
+        _publish_until(signals, node, tracker, person)
 
 
 def _publish_until(
-    stopped: Event, node: PersonPublisher, tracker: Tracker, person: RecordedPerson
+    signals: Sequence[int], node: PersonPublisher, tracker: Tracker, person: RecordedPerson
 ) -> None:
     """Publish each measurement when it is due; a busy machine skips those that are outdated."""
     begin, number = time.monotonic(), -1
-    while not stopped.wait(publishing_time(tracker, number + 1) - (time.monotonic() - begin)):
+    while not signals:
+        left = publishing_time(tracker, number + 1) - (time.monotonic() - begin)
+        if left > 0.0:
+            time.sleep(min(left, LONGEST_SLEEP))
+            continue
         number = newest_number(tracker, time.monotonic() - begin)
         posture = measurement(tracker, person, number) if number >= 0 else None
         if posture is not None:

@@ -3,7 +3,6 @@
 """The planner as a ROS 2 node: its services, start and shutdown."""
 
 import signal
-from threading import Event
 import time
 from typing import Any, TYPE_CHECKING
 
@@ -208,12 +207,13 @@ def run(args: list[str] | None = None, worker: WorkerProcess | None = None) -> i
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = PlannerNode(worker=worker)
         settle_interpreter()
-        is_shutting_down = Event()
+        signals: list[int] = []
         # Not ROS's own handlers, which end the context: an arm in motion must still be stopped.
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: is_shutting_down.set())
+            # Only stored: a lock, as of an Event, could be held by what a signal interrupts.
+            signal.signal(number, lambda number, _: signals.append(number))
         # The timers of the node wake it up often enough to see the signal.
-        spin(node, node.fail, is_shutting_down.is_set)
+        spin(node, node.fail, lambda: bool(signals))
     except KeyboardInterrupt:
         pass
     except (RrthError, ParameterException, RuntimeError) as problem:

@@ -38,13 +38,15 @@ pytestmark = pytest.mark.usefixtures('ros_context')
 
 @contextmanager
 def wearer(*arguments):
-    """Run the command until the block is left, then end it by Ctrl-C; it must end well."""
+    """Run the command until the block is left, then press Ctrl-C repeatedly; it must end well."""
     process = subprocess.Popen(
         [*MODULE, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     try:
         yield process
-        process.send_signal(signal.SIGINT)
+        # Many, so that one comes while another is handled, and while the command waits.
+        for _ in range(30):
+            process.send_signal(signal.SIGINT)
         _, words = process.communicate(timeout=60.0)
         assert (process.returncode, words) == (0, '')
     finally:
