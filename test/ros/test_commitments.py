@@ -17,7 +17,7 @@ from rrth_planner.collision import reference_checker, separation  # noqa: E402
 from rrth_planner.collision.reference_checker import separation_violations  # noqa: E402
 from rrth_planner.execution.body_motion import body_at  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
-from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
+from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
 from rrth_planner.model.scene import Box  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
@@ -27,7 +27,7 @@ from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
 from rrth_planner.ros.monitor import commitments, execution_monitor  # noqa: E402
-from rrth_planner.ros.monitor.execution_monitor import MonitorState  # noqa: E402
+from rrth_planner.ros.monitor.execution_monitor import MonitorState, MOST_IGNORED  # noqa: E402
 import worlds  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -223,24 +223,42 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
 
 
-@pytest.mark.parametrize('has_moved', [True, False])
-def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
-    separated, has_moved
-):
-    arm, hand = beside(separated, 0.3, 30 if has_moved else 0)
-    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
-    place, n = arm.commanded(arm.now)[0], 0
-    # It was too late for all that came since, none of which is remembered.
+def frames_until_given_up(arm, place, hand):
+    """Let the arm rest at a place until its motion is given up; return after how many frames."""
+    n = 0
     while arm.monitor.running is not None:
         arm.now += FRAME
         arm.read(place, np.zeros(4))
         arm.see(hand)
+        arm.monitor._on_timer()
         n += 1
         assert n * FRAME < 2.0
-    assert n > commitments.REMEMBERED
-    stop = arm.monitor.take_stops()[-1]
-    assert stop.is_replanned == has_moved
-    assert 'does not follow it' in arm.monitor.stop_reason
+    return n
+
+
+@pytest.mark.parametrize('has_moved', [True, False])
+@pytest.mark.parametrize('clearance', [0.3, 0.5])
+def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
+    separated, has_moved, clearance
+):
+    arm, hand = beside(separated, clearance, 30 if has_moved else 0)
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    place = arm.commanded(arm.now)[0]
+    # It was too late for all that came since, none of which is remembered.
+    assert frames_until_given_up(arm, place, hand) > commitments.REMEMBERED
+    # With the more distant hand the commitments soon begin too far ahead to find the arm on them.
+    ahead = np.abs(arm.published[-1][0].positions[0] - place).max()
+    assert ahead > MAX_DEVIATION or not (has_moved and clearance > 0.4)
+    for _ in range(MOST_IGNORED - 1):
+        assert arm.monitor.take_stops()[-1].is_replanned
+        assert 'does not follow it' in arm.monitor.stop_reason
+        assert arm.monitor._state is MonitorState.IDLE
+        arm.begin()
+        if has_moved:
+            arm.frames(30, hand)
+        frames_until_given_up(arm, arm.commanded(arm.now)[0], hand)
+    # One that never moves is not asked for ever.
+    assert arm.monitor.take_stops()[-1].is_replanned == has_moved
     assert arm.monitor._state is (MonitorState.IDLE if has_moved else MonitorState.HOLDING)
     arm.begin()
     assert arm.monitor.running is not None
@@ -256,9 +274,10 @@ def test_an_arm_that_sags_or_rests_where_it_is_commanded_is_followed(separated):
         arm.now += FRAME
         q, v = arm.commanded(arm.now)[:2]
         arm.read(q + 0.03, v)
-        if k < 60 or k > 120:
+        if k < 60 or k > 78:
             # In between no body comes, and the arm stops on its way.
             arm.see(hand)
+        arm.monitor._on_timer()
         if k > 120 and arm.is_over:
             break
     assert not arm.monitor.take_stops()

@@ -51,6 +51,8 @@ OFF_TRAJECTORY = (
 # Why a motion is given up.
 TOO_NEAR = 'the wearer is too near for the motion to go on'
 NOT_FOLLOWED = 'the arm rests beside its motion, and does not follow it'
+# So many motions one after the other that an arm ignores from their begin on are the last ones.
+MOST_IGNORED = 3
 # By whether the arm follows the last commanded motion.
 SWITCHED = {
     False: 'arm ignored the last commanded motion: monitoring the previous one, which it follows',
@@ -122,6 +124,8 @@ class ExecutionMonitor:
         # when [s], and whether to plan again after it.
         self.stop_reason = self.pending_stop = ''
         self._pending_since, self._is_replanned = 0.0, True
+        # How many motions the arm has ignored from their begin on, one after the other.
+        self._n_ignored = 0
         # Of the plan: a margin that is changed later does not apply to its motion.
         self._parameters = reporter.parameters
         # A stop that was not published, since the commitment that comes to rest by itself is
@@ -302,15 +306,10 @@ class ExecutionMonitor:
         """
         if self._commitments.is_active and not self.pending_stop:
             planned = self._commitments.planned
-            reading = self._inputs.joints.value
-            motion = self._commitments.extend(now, begin, reading)
+            motion = self._commitments.extend(now, begin, self._inputs.joints.value)
             if motion is not None:
                 self._tracker.replace(motion)
-            if self._commitments.is_ignored(reading):
-                # An arm that has never moved would not follow the next motion either.
-                self._give_up_motion(NOT_FOLLOWED, self._commitments.has_moved(reading))
-                self._end_motion()
-            elif self._commitments.planned is not planned:
+            if self._commitments.planned is not planned:
                 self._node.get_logger().error(SWITCHED[False])
                 self._set_state(MonitorState.MONITORING, SWITCHED[False])
 
@@ -358,6 +357,7 @@ class ExecutionMonitor:
         now = self._now()
         self._repeat_stop(now)
         self._check_previous_motion()
+        self._check_ignored_motion()
         self._monitored_phase(now)
 
     def _monitored_phase(self, now: float) -> float | None:
@@ -398,6 +398,15 @@ class ExecutionMonitor:
             self._node.get_logger().error(SWITCHED[self._tracker.is_latest])
             self._set_state(MonitorState.MONITORING, SWITCHED[self._tracker.is_latest])
             self._check_remaining_motion(self._inputs.body.value, time.time_ns())
+
+    def _check_ignored_motion(self) -> None:
+        """Give up a motion that the arm ignores, wherever it rests, also far from it."""
+        reading = self._inputs.joints.value
+        if self._state is MonitorState.MONITORING and self._commitments.is_ignored(reading):
+            # An arm that ignores one motion after the other, as with its drives off, holds.
+            self._n_ignored = 0 if self._commitments.has_moved(reading) else self._n_ignored + 1
+            self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
+            self._end_motion()
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
@@ -560,6 +569,8 @@ class ExecutionMonitor:
         self._tracker.forget()
         self._commitments.end()
         self.pending_stop = ''
+        if self._state is MonitorState.MONITORING:
+            self._n_ignored = 0
         if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
             self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
         elif self._state is not MonitorState.HOLDING:
