@@ -42,7 +42,7 @@ class TreeOptions:
     goal_bias: float = _option(0.05, 0.0, 1.0, '-', 'probability of sampling a goal configuration')
     is_bidirectional: bool = _option(True, 0, 1, '-', 'also grow a tree from the goals')
     max_samples: int = _option(20000, 1, 10**7, '-', 'samples after which a growth fails')
-    time_limit: float = _option(2.0, 1e-3, 3600.0, 's', 'planning fails after this time')
+    time_limit: float = _option(4.0, 1e-3, 3600.0, 's', 'planning fails after this time')
 
     def __post_init__(self) -> None:
         """Validate each field against its own metadata."""
