@@ -41,7 +41,7 @@ LONGEST_SETTLING = 1.0
 # A request that the wearer was in the way of is planned again after this time [s].
 AGAIN = 0.01
 # A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
-RAY_PATIENCE = 1.0
+RAY_PATIENCE = 2.0
 # After a stop the same goal is tried for so long, so often [s].
 PATIENCE, RESUME_PERIOD = 5.0, 0.05
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
@@ -311,7 +311,7 @@ class PlanQueue:
 
         Whatever the arm did, its ray would sweep over the hand first.
         """
-        end = time.monotonic() + RAY_PATIENCE
+        end = time.monotonic() + min(RAY_PATIENCE, parameters.options.time_limit)
         while (
             self._inputs.is_wearer_moving()
             and self._is_ray_crossed(parameters)
