@@ -10,11 +10,13 @@ import sys
 from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
-from rrth_planner.cli.program import add_files, add_target, command_parser, joint_values, run, say
+from rrth_planner.cli.joint_values import joint_values
+from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
-from rrth_planner.io.wearer_file import load_body, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
@@ -25,35 +27,11 @@ if TYPE_CHECKING:
 
 SOLVED, REJECTED, WRONG = 0, 1, 2
 SEEDS = 2**31
-DESCRIPTION = """\
-Plan one motion after which the arm's pointing ray meets a target, and which keeps the margin from
-the wearer throughout. Reads files and needs no ROS; the motion is planned and checked as by the
-node: certificate and second checker.
-Lengths in metres, angles in radians, in the wearer's base frame: x forward, y left, z up.
-"""
-EPILOG = """\
-exit codes: 0  solved: figures on standard output, the motion in the file of --output
-            1  rejected: the reason, in one sentence on standard error
-            2  wrong usage or input: the error on standard error
-          130  interrupted
-
-`ray from` is the origin of the pointing ray, that of the arm's `tool` row; the tool itself may be
-further out on the same line (`read_urdf` reports where).
-
-A motion is a list of points: time [s], and position, velocity and acceleration of each joint.
-Between two points each joint follows the quintic polynomial that fits both. A .csv file has a
-header and one line per point; a .yaml file holds the same data. Without --period the file has the
-fewest points that define the motion exactly.
-
-example:    %(prog)s --target 1.5 0.8 0.6 --output motion.csv --period 0.01
-            %(prog)s --arm config/examples/chest_arm.yaml \\
-                --body config/examples/seated_body.yaml --target 1 0.5 0 --json
-"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Plan a motion, print its figures, write it, and return the exit code."""
-    options = _parser().parse_args(arguments)
+    options = plain_parsers.plan().parse_args(arguments)
     return run('plan', lambda: _plan(options), WRONG)
 
 
@@ -145,22 +123,6 @@ def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:
 
 def _listed(numbers: Any) -> str:
     return ' '.join(f'{number:.4f}' for number in np.round(numbers, 4) + 0.0)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser('plan', DESCRIPTION, EPILOG)
-    add_target(parser, 'target of the pointing ray [m]')
-    add_files(parser, arm='the arm (config/arm.yaml)', body=WEARER_HELP)
-    add = parser.add_argument
-    start = 'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)'
-    add('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
-    add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
-    add('--margin', type=float, metavar='M', help='clearance demanded from every box [m]')
-    add('--seed', type=int, metavar='N', help='random seed; -1: a new one each time')
-    add_files(parser, output='file of the motion, .yaml or .csv')
-    add('--period', type=float, metavar='S', help='time between two points in that file [s]')
-    add('--json', action='store_true', help='print the figures as JSON')
-    return parser
 
 
 if __name__ == '__main__':

@@ -3,17 +3,18 @@
 """The command `plot`: pictures of plans and of recorded runs."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
-from rrth_planner.cli.program import add_files, add_target, command_parser, run, say
+from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
-from rrth_planner.io.wearer_file import load_body, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import one_line, OptionsError, RrthError
@@ -24,19 +25,15 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 110
 KINDS = ('.png', '.svg', '.pdf')
 TOOLS = (ROS, 'mcap', 'mcap_ros2')
-EXAMPLES = """\
-examples:   %(prog)s plan --target 0.3 1.4 0.4 -o plan.png
-            %(prog)s recording run.mcap -o run.svg --begin 20 --end 30
-"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw a picture and return the exit code."""
-    options = _parser().parse_args(arguments)
-    return run('plot', lambda: _draw(options.draw, options), 1)
+    options = plain_parsers.plot().parse_args(arguments)
+    return run('plot', lambda: _draw(options), 1)
 
 
-def _draw(draw: Callable[[argparse.Namespace], 'Figure'], options: argparse.Namespace) -> None:
+def _draw(options: argparse.Namespace) -> None:
     # Before anything that takes time.
     output: Path = options.output
     if output.suffix.lower() not in KINDS:
@@ -44,7 +41,7 @@ def _draw(draw: Callable[[argparse.Namespace], 'Figure'], options: argparse.Name
     if not output.absolute().parent.is_dir():
         raise OptionsError(f'-o {output}: its folder does not exist, expected one that does')
     require('tools', 'matplotlib')
-    figure = draw(options)
+    figure = _draw_plan(options) if options.what == 'plan' else _draw_recording(options)
     try:
         figure.savefig(output, dpi=DOTS_PER_INCH)
     except OSError as problem:
@@ -115,42 +112,6 @@ def _start(arm: ArmModel, given: Sequence[float] | None) -> Array:
             f'{", ".join(arm.joint_names)} [rad]'
         )
     return np.array(q, dtype=np.float64)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser(
-        'plot',
-        'Draw a plan or a recorded run as PNG, SVG or PDF, chosen by the file name.',
-        EXAMPLES,
-    )
-    commands = parser.add_subparsers(required=True, metavar='plan | recording')
-    plan = commands.add_parser('plan', help='plan a motion and draw it; needs no ROS')
-    plan.set_defaults(draw=_draw_plan)
-    add_target(plan, 'target of the pointing ray, in the base frame [m]')
-    add_files(plan, body=WEARER_HELP)
-    start = 'joint positions at the start [rad] (as in config/playback.yaml)'
-    plan.add_argument('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
-    plan.add_argument('--seed', type=int, help='random seed; -1: a new one (as in the settings)')
-    recording = commands.add_parser('recording', help='draw a run recorded by `record`')
-    recording.set_defaults(draw=_draw_recording)
-    add = recording.add_argument
-    add('file', type=Path, metavar='FILE', help='MCAP')
-    for name in ('begin', 'end'):
-        what = f'{name} of the drawn interval [s]; < 0: relative to the end of the run'
-        add(f'--{name}', type=float, metavar='S', help=what)
-    add('--namespace', metavar='NAME', help='namespace, if there are several')
-    frame = 'base frame of the planner (%(default)s)'
-    add('--base-frame', default='torso', metavar='NAME', help=frame)
-    for command in (plan, recording):
-        command.add_argument(
-            '-o', '--output', type=Path, required=True, metavar='FILE', help='.png, .svg or .pdf'
-        )
-        add_files(
-            command,
-            arm='the arm (config/arm.yaml)',
-            settings="the planner's parameters (config/planner.yaml)",
-        )
-    return parser
 
 
 if __name__ == '__main__':

@@ -3,15 +3,14 @@
 """What commands have in common: name, arguments, output, and how they end."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 import os
 from pathlib import Path
 import signal
 import sys
 from typing import NoReturn
 
-from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import one_line, OptionsError, RrthError
+from rrth_planner.model.errors import one_line, RrthError
 
 INTERRUPTED = 130
 # As a shell reports a program that SIGPIPE has ended.
@@ -50,17 +49,6 @@ def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True
     """Add the option of a target, with its help."""
     xyz = ('X', 'Y', 'Z')
     parser.add_argument('--target', type=float, nargs=3, required=required, metavar=xyz, help=text)
-
-
-def joint_values(given: Sequence[float], option: str, joint_names: Sequence[str]) -> Array:
-    """Return an option's value for each joint, (dof,) [rad or m], or raise OptionsError."""
-    n = len(joint_names)
-    if len(given) != n:
-        raise OptionsError(
-            f'{option}: {len(given)} values, expected {n}, one for each of {list(joint_names)} '
-            '[rad or m]'
-        )
-    return frozen_array(given, (n,), option, 'rad or m', OptionsError)
 
 
 def run(name: str, action: Callable[[], int | None], failed: int) -> int:

@@ -5,11 +5,12 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 import sys
 
 import numpy as np
-from rrth_planner.cli.program import command_parser, joint_values, run
+from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.joint_values import joint_values
+from rrth_planner.cli.program import run
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping, arm_to_yaml
 from rrth_planner.io.urdf.allowed_pairs import colliding_pairs, disabled_pairs
 from rrth_planner.io.urdf.chain import RAYS, read_chain
@@ -27,28 +28,6 @@ from rrth_planner.model.rotation import pose_matrix
 
 # Bars this much longer than all links together are no links.
 LONG = 2.0
-DESCRIPTION = """\
-Read the joints between two links of a URDF and write them as an arm of the planner, laid out as
-config/arm.yaml: modified Denavit-Hartenberg rows, limits, mount and tool, and the shape of the
-links. The collision geometry of each link, meshes included, is enclosed in a few slim capsules.
-Where there is none at all, or with --geometry bars, every link is a bar from joint to joint, with
-the radius given here.
-"""
-EPILOG = """\
-The conversion is exact for any chain of revolute, continuous, prismatic and fixed joints. The
-result is compared with the URDF at many configurations, and the difference is printed. Continuous
-joints get limits of +-pi. Links beside the chain belong to the arm where they are fixed to it;
-those that joints beside it move, such as fingers, are left out and named, or enclosed in all their
-positions. Every triangle of a mesh is proven to lie in the capsules. Parts that collide
-in the middle of the joint ranges and nearly everywhere are written as pairs that may meet.
-
-exit codes: 0  the file has been written
-            2  wrong usage, or a URDF without such a chain (the reason is printed)
-          130  interrupted
-
-example:    %(prog)s config/examples/chest_arm.urdf --ray +x --radius 0.025 \\
-                --output my_arm.yaml --check 0 -0.5 1 0 0.3 0
-"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for k in range(len(given) - 1, 0, -1):
         if given[k - 1] == '--ray' and given[k] in RAYS:
             given[k - 1 : k + 1] = [f'--ray={given[k]}']
-    options = _parser().parse_args(given)
+    options = plain_parsers.read_urdf().parse_args(given)
     return run('read_urdf', lambda: _import(options), 2)
 
 
@@ -197,48 +176,6 @@ def _report_ray(found: ImportedArm, q: Array) -> list[str]:
         )
         lines.append(f'  {what + ":":6} tool at {position} m, ray along {ray}')
     return lines
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser('read_urdf', DESCRIPTION, EPILOG)
-    add = parser.add_argument
-    add('file', type=Path, metavar='FILE', help='the URDF file')
-    add('--base', metavar='LINK', help='first link of the chain (the root)')
-    add('--tool', metavar='LINK', help='last link (the one that ends the chain)')
-    add(
-        '--ray',
-        default='+z',
-        metavar='AXIS',
-        help='axis of the tool link that is the pointing ray: +x -x +y -y +z -z (%(default)s)',
-    )
-    add(
-        '--mount',
-        type=float,
-        nargs=7,
-        metavar=('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW'),
-        help="pose of the first link in the wearer's base frame [m] (the same frame)",
-    )
-    add(
-        '--geometry',
-        choices=('collision', 'bars'),
-        default='collision',
-        help='shape of the links: their collision geometry, if any, or bars (%(default)s)',
-    )
-    radius = 'radius of links that are bars [m] (%(default)s)'
-    add('--radius', type=float, default=0.03, metavar='M', help=radius)
-    radius = 'radius of the pointing ray [m] (0; that of the links where these are bars)'
-    add('--ray-radius', type=float, metavar='M', help=radius)
-    add(
-        '--include-branches',
-        action='store_true',
-        help='enclose links that joints beside the chain move, as fingers, in all positions',
-    )
-    srdf = 'SRDF whose disable_collisions name pairs of links that may meet'
-    add('--srdf', type=Path, metavar='FILE', help=srdf)
-    add('--output', type=Path, required=True, metavar='FILE', help='arm file to write')
-    check = 'print the tool pose at these joint positions [rad or m]'
-    add('--check', type=float, nargs='+', metavar='Q', help=check)
-    return parser
 
 
 if __name__ == '__main__':

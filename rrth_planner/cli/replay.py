@@ -3,14 +3,14 @@
 """Replay an incident: plan again from the same inputs, and compare all collision checkers."""
 
 from collections.abc import Sequence
-from pathlib import Path
 import sys
 import traceback
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import plan_of
-from rrth_planner.cli.program import command_parser, run
+from rrth_planner.cli.program import run
 from rrth_planner.io.incident import Incident, IncidentKind, versions
 from rrth_planner.io.incident_file import read_incident
 from rrth_planner.model.trajectory import Trajectory
@@ -19,31 +19,10 @@ if TYPE_CHECKING:
     from rrth_planner.collision.checker_comparison import MotionComparison
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
-DESCRIPTION = """\
-Replay an incident of the planner: a certified motion in which the second checker found a clearance
-violation, or an unexpected error. Neither is ever published; the node answers FAILURE and names
-the file that this command reads. The command plans again from the same inputs with the same seed,
-reports whether the motion is identical to the bit, and checks each piece of the recorded motion
-by three collision checkers: the certificate, the second checker (python-fcl or coal), and the
-reference checker, which is plain numpy and shares nothing with the others. It needs no ROS.
-"""
-EPILOG = """\
-exit codes: 0  reproduced as recorded
-            1  not reproduced (the difference is printed)
-            2  the file is not an incident (the reason is printed)
-
-A plan that reached a time limit (time_limit, improve_time) may differ on another machine, and
-other versions of the libraries may round differently; differing versions are printed.
-
-example:    %(prog)s ~/.ros/log/rrth_planner/incident-20261121T213655123456-1f0c2a.yaml
-"""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Replay the incident of a file and return the exit code."""
-    parser = command_parser('replay', DESCRIPTION, EPILOG)
-    parser.add_argument('file', type=Path, metavar='FILE', help='YAML file of the incident')
-    options = parser.parse_args(arguments)
+    options = plain_parsers.replay().parse_args(arguments)
     return run('replay', lambda: replay(read_incident(options.file)), 2)
 
 

@@ -12,7 +12,8 @@ import platform
 import sys
 from typing import TYPE_CHECKING
 
-from rrth_planner.cli.program import command_parser, INTERRUPTED, say
+from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.program import INTERRUPTED, say
 from rrth_planner.io.extras import require
 from rrth_planner.model.errors import OptionsError, RrthError
 
@@ -25,7 +26,7 @@ LIBRARIES = ('distributed', 'pyarrow', 'tqdm', 'matplotlib')
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the campaign, then write the report and its pictures."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    options = _parser().parse_args(arguments)
+    options = plain_parsers.reproduce().parse_args(arguments)
     try:
         require('campaign', *LIBRARIES)
         # Not for --help: loading the planner takes seconds, and compiling it, once, minutes.
@@ -99,36 +100,6 @@ def _extent(options: argparse.Namespace) -> 'Extent':
         maps=tuple(options.maps or extent.maps),
         targets=tuple(options.targets or extent.targets),
     )
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = command_parser('reproduce', __doc__)
-    add = parser.add_argument
-    add('--quick', action='store_true', help='few runs: a minute or two')
-    output = 'folder of reproduction.md and its pictures (docs; --quick: build/reproduction)'
-    add('--output', type=Path, help=output)
-    data = 'Parquet file of the runs (reproduction.parquet in the output)'
-    add('--data', type=Path, help=data)
-    runs = 'timed runs per planner and map; the fewest and most are reported (10 100)'
-    add('--runs', type=_positive, nargs='+', metavar='N', help=runs)
-    seeds = 'runs for each share and number of draws (1000)'
-    add('--seeds', type=_positive, metavar='N', help=seeds)
-    add('--maps', nargs='+', metavar='NAME', help='only these maps')
-    add('--targets', nargs='+', metavar='NAME', help='only these targets of the arm')
-    add_where = parser.add_mutually_exclusive_group().add_argument
-    add_where(
-        '--scheduler',
-        metavar='tcp://HOST:PORT',
-        help='address of a dask scheduler (default: a local cluster)',
-    )
-    add_where('--serial', action='store_true', help='run all in this process, one by one')
-    return parser
-
-
-def _positive(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f'{text}, expected a number of runs of 1 or more')
-    return int(text)
 
 
 def _portable(arguments: Sequence[str]) -> list[str]:

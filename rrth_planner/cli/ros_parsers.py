@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parsers of the commands whose modules import ROS, kept apart so that --help works without it."""
+"""Parsers of the commands that need ROS; with the standard library alone they print --help."""
 
 import argparse
 import math

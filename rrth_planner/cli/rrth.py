@@ -5,17 +5,20 @@
 import argparse
 from collections.abc import Sequence
 from importlib import import_module
+from itertools import takewhile
 import sys
 from typing import Any, NamedTuple
 
 from rrth_planner import __version__
-from rrth_planner.cli import ros_parsers
+from rrth_planner.cli import plain_parsers, ros_parsers
 from rrth_planner.cli.program import command_parser, say
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.resources import resource_path
 from rrth_planner.model.errors import NotInstalledError
 
 HELP = ('-h', '--help')
+# What follows is no option of a command.
+ENDS = ('--ros-args', '--')
 WRONG = 2
 NODE_HELP = """\
 Arguments after --ros-args are passed to ROS: parameters (-p seed:=1, --params-file FILE), remaps,
@@ -28,7 +31,8 @@ class Command(NamedTuple):
     """A command: what it does, for the list of all, and what it requires."""
 
     summary: str
-    # With its `main`; where it needs ROS, its parser is in `cli.ros_parsers`.
+    # With its `main`; its parser is in `cli.ros_parsers` where it needs ROS, else in
+    # `cli.plain_parsers`.
     module: str
     # Libraries that it requires before it is loaded, and the extras that install them.
     needs: tuple[str, ...] = ()
@@ -89,10 +93,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _parser().parse_args(given[:1] or ['--help'])
     name, rest = given[0], given[1:]
     command = COMMANDS[name]
-    own = rest[: rest.index('--ros-args')] if '--ros-args' in rest else rest
-    if ROS in command.needs and not set(own).isdisjoint(HELP):
-        _parser_of(name).print_help()
-        return 0
+    own = list(takewhile(lambda word: word not in ENDS, rest))
+    if not set(own).isdisjoint(HELP):
+        # Exits here, and nothing beyond the standard library has been loaded.
+        _parser_of(name).parse_args(own)
     try:
         require(command.extras, *command.needs)
     except NotInstalledError as problem:
@@ -103,11 +107,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser_of(name: str) -> argparse.ArgumentParser:
-    """Return the parser of a command that needs ROS, without loading ROS."""
+    """Return the parser of a command, without loading what the command needs."""
     command = COMMANDS[name]
     parser: argparse.ArgumentParser
     if not command.settings:
-        parser = getattr(ros_parsers, name)()
+        parsers = ros_parsers if ROS in command.needs else plain_parsers
+        parser = getattr(parsers, name)()
         return parser
     help_of_node = NODE_HELP.format(resource_path(command.settings))
     parser = command_parser(

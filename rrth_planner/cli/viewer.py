@@ -8,14 +8,14 @@ from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from io import StringIO
 import os
-from pathlib import Path
 import socket
 import sys
 from typing import Any
 import webbrowser
 
+from rrth_planner.cli import plain_parsers
 from rrth_planner.cli.file_question import question_of
-from rrth_planner.cli.program import add_files, add_target, interrupt_on_signals, program, say
+from rrth_planner.cli.program import interrupt_on_signals, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require, ROS
 from rrth_planner.io.motion_capture_file import load_person
@@ -23,7 +23,7 @@ from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.text_file import parse_yaml
 from rrth_planner.io.urdf.placed_robot import place_robot, PlacedRobot
-from rrth_planner.io.wearer_file import load_body, WEARER_HELP
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.errors import OptionsError, RrthError
 from rrth_planner.pipeline.request import PlanQuestion
@@ -34,7 +34,6 @@ from rrth_planner.wearer.recorded_person import posture_at, RecordedPerson
 from rrth_planner.wearer.skeleton import Skeleton
 
 ROS_ARGS = '--ros-args'
-PORT = 8081
 # A picture is taken after so long beside a person [s].
 SHOWN = 4.0
 
@@ -43,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Serve the page until it is interrupted; return the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     at = given.index(ROS_ARGS) if ROS_ARGS in given else len(given)
-    options, ros_args = _parse(given[:at]), given[at:]
+    options, ros_args = plain_parsers.viewer().parse_args(given[:at]), given[at:]
     interrupt_on_signals()
     try:
         if ros_args and not options.live:
@@ -59,62 +58,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         pass
     return 0
-
-
-def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog=program('viewer'),
-        description='Show the planner in the browser; it replans when the target is dragged. '
-        'Ctrl-C ends it.',
-        epilog=f'With --live, arguments after {ROS_ARGS} are passed to ROS: remaps, parameters.',
-    )
-    add_files(
-        parser,
-        arm='the arm, as config/arm.yaml',
-        body=WEARER_HELP,
-        settings='parameters, laid out as config/planner.yaml',
-    )
-    add_target(parser, 'initially [m] (1.5 0.1 0.3)', required=False)
-    add = parser.add_argument
-    add(
-        '--set',
-        action='append',
-        default=[],
-        metavar='NAME=VALUE',
-        help='a parameter of config/planner.yaml, e.g. seed=3; may be repeated',
-    )
-    add('--host', default='127.0.0.1', help='address to listen on (%(default)s)')
-    port = 'port to listen on; 0: any free one (%(default)s)'
-    add('--port', type=int, default=PORT, help=port)
-    add(
-        '--open',
-        action=argparse.BooleanOptionalAction,
-        default=None,
-        help='open the page in the browser (default: if there is a display)',
-    )
-    add(
-        '--person',
-        nargs='?',
-        const='',
-        metavar='FILE',
-        help='the wearer moves as a recorded person (.bvh, .c3d, .csv), and the arm plans round '
-        'him; without FILE one who comes along',
-    )
-    add(
-        '--skeleton',
-        default='cmu_bvh',
-        metavar='NAME',
-        help='what makes boxes of that recording (%(default)s)',
-    )
-    add(
-        '--urdf',
-        type=Path,
-        metavar='FILE',
-        help='the URDF that the arm was read from: its meshes are shown beside the capsules',
-    )
-    add('--live', action='store_true', help='show the running nodes instead of planning')
-    add_files(parser, screenshot='save a picture of the page with the arm at the goal, and exit')
-    return parser.parse_args(arguments)
 
 
 def _run_planning(options: argparse.Namespace) -> None:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from rrth_planner.cli.program import add_files, command_parser, run
+from rrth_planner.cli import plain_parsers
+from rrth_planner.cli.program import run
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings
@@ -15,36 +16,10 @@ from rrth_planner.io.text_file import load_yaml
 from rrth_planner.io.urdf.export import arm_to_urdf
 from rrth_planner.model.errors import ModelError
 
-DESCRIPTION = """\
-Write an arm as a URDF, from the DH rows that the planner uses: a link for each frame,
-joints with their limits, bars and capsules as cylinders and spheres, and a link "tool" whose +z
-axis is the pointing ray. Capsules are collision geometry, too. It needs no ROS.
-"""
-EPILOG = """\
-The velocities are max_velocity of the settings. URDF also requires an effort, which neither file
-gives: it is written as 0, and must be filled in to simulate forces.
-
-exit codes: 0  written
-            2  not written (the reason is printed)
-
-example:    %(prog)s --arm my_arm.yaml --output my_arm.urdf
-"""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the URDF and return the exit code."""
-    parser = command_parser('write_urdf', DESCRIPTION, EPILOG)
-    add_files(
-        parser,
-        arm='the arm, as config/arm.yaml (default: that one)',
-        settings='parameters of the node, as config/planner.yaml (default: those)',
-        output='file to write (default: standard output)',
-    )
-    radius = 'radius of bars that have none of their own [m] (default: %(default)s)'
-    parser.add_argument('--radius', type=float, default=0.015, metavar='M', help=radius)
-    frame = 'link that the arm is mounted on, as base_frame of the node (default: %(default)s)'
-    parser.add_argument('--base-frame', default='torso', metavar='NAME', help=frame)
-    options = parser.parse_args(arguments)
+    options = plain_parsers.write_urdf().parse_args(arguments)
     return run('write_urdf', lambda: _export(options), 2)
 
 

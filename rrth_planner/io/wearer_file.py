@@ -19,7 +19,6 @@ UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 # Shorter quaternions are none.
 SHORTEST = 1e-6
 
-WEARER_HELP = 'the wearer, laid out as config/body.yaml, the default, or as msg_examples/body.yaml'
 # The frame of the example messages; there is no TF that knows another one.
 BASE_FRAME = 'torso'
 # Of visualization_msgs/msg/Marker: the types that are boxes, and what may be done with them.
