@@ -84,6 +84,12 @@ CANDIDATES = types.FunctionType(
     int64(MAT, MAT, VEC, VEC, VEC, int64, int64, float64, OUT_MAT, OUT_VEC)
 )
 
+# Only kernels of these types are called through addresses, which takes code of its own.
+SEAMS = [
+    seam.signature
+    for seam in (CHAIN, EDGE_CHECK, FREE_RADIUS, CONTACTS, SHORTEN, SLIDE, CANDIDATES)
+]
+
 # Entries of `functions`, by which a world hands its seams to the kernels that Python calls: to
 # hand over the functions themselves takes 4 us each, a great part of a plan.
 EDGE_CHECK_AT, CHAIN_AT, FREE_RADIUS_AT, CONTACTS_AT = range(4)
@@ -196,6 +202,7 @@ def kernel(
         'error_model': 'numpy',
         'inline': inline,
         'fastmath': {'contract', 'arcp', 'nsz'},
+        'no_cfunc_wrapper': signature not in SEAMS,
     }
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -242,7 +249,7 @@ class FirstClass:
 
 
 def first_class(compiled: Any) -> Any:
-    """Return a kernel in the form in which it is handed to other kernels."""
+    """Return a kernel, of the type of a seam, in the form in which others are handed it."""
     return compiled if config.DISABLE_JIT else FirstClass(compiled)
 
 

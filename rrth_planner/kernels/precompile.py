@@ -10,22 +10,26 @@ import sys
 
 from rrth_planner.kernels.jit import cache_folder, compiling_notice, is_compiled
 
-# What each of the two processes compiles: equal shares, and nothing that the other one needs soon.
+# What each of the two processes compiles: all that a node or a command with the default planner
+# needs, in equal shares, and nothing that the other one needs soon.
 SHARES = (
     (
-        'search.elastic_band',
+        'vectors',
         'collision.arm_clearance',
         'kinematics.generated_fk',
         'collision.trajectory_check',
-        'kinematics.goal_selection',
+        'collision.separation',
+        'search.elastic_band',
     ),
     (
-        'trajectory.fast_stop',
         'trajectory.quintics',
-        'trajectory.speed_profile',
+        'trajectory.fast_stop',
         'search.shortcut',
+        'trajectory.speed_profile',
+        'trajectory.rate_profile',
         'search.rrt',
         'search.rrt_h',
+        'kinematics.goal_selection',
     ),
 )
 

@@ -20,6 +20,7 @@ from rrth_planner.kernels.trajectory.stop_trajectory import (
     stop_times,
     TICK,
 )
+from rrth_planner.kernels.vectors import copy
 
 # First window of the search, in durations of a stop on a line; its growth; greatest length of a
 # cell [s], and greatest number of cells, which has priority.
@@ -109,7 +110,9 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     """
     dof, phases = curves.shape[2], np.empty((3, 5))
     limits = np.empty((3, dof))
-    limits[0], limits[1], limits[2] = velocity, acceleration, jerk
+    copy(velocity, limits[0])
+    copy(acceleration, limits[1])
+    copy(jerk, limits[2])
     rest = first_rest(curves, times, now)
     end, begin = times[rest], avoid_points(times, now + lead)
     window = 0.0

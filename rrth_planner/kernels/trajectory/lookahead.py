@@ -7,6 +7,7 @@ import math
 from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBES, OUT_INTS, OUT_MAT, OUT_VEC, VEC
+from rrth_planner.kernels.vectors import copy
 
 # Columns of `rows`, one for the begin of each cell and one for the end of the last: time within
 # the motion [s], path parameter s [-], s_dot and s_ddot [1/s, 1/s^2].
@@ -136,7 +137,8 @@ def look_ahead(curves, times, now, begin, end, step, limits, rows, pieces, geome
             for order in range(3):
                 for k in range(dof):
                     most[order, k] = max(most[order, k], abs(states[order + 1, k]))
-        geometry[n, MOST] = most
+        for order in range(3):
+            copy(most[order], geometry[n, MOST, order])
         rows[n, S] = s
         s += s_between(curves, times, piece, time, until, limits)
         rows[n + 1, S] = s

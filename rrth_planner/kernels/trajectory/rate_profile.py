@@ -15,6 +15,7 @@ from rrth_planner.kernels.trajectory.stop_trajectory import (
     is_within,
     TICK,
 )
+from rrth_planner.kernels.vectors import copy
 
 # A rate profile: three phases of constant second derivative of the rate, then a constant rate.
 # `profile` (3, 5), a row for each phase: its duration [s]; at its begin the time within the motion
@@ -209,7 +210,9 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
     the motion allows there; less, where that exceeds the limits.
     """
     limits, found, piece = np.empty((3, velocity.shape[0])), np.empty((4, velocity.shape[0])), 0
-    limits[0], limits[1], limits[2] = velocity, acceleration, jerk
+    copy(velocity, limits[0])
+    copy(acceleration, limits[1])
+    copy(jerk, limits[2])
     while piece < curves.shape[0] - 1 and times[piece + 1] <= state[0]:
         piece += 1
     derivatives_on(curves, times, piece, state[0], found)

@@ -13,6 +13,7 @@ import numpy as np
 from rrth_planner.kernels.jit import CUBES, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS
 from rrth_planner.kernels.trajectory import lookahead
 from rrth_planner.kernels.trajectory.lookahead import BEGIN, END, MOST, S, S_DDOT, S_DOT, TIME
+from rrth_planner.kernels.vectors import copy
 
 # Columns of `phases`, (3, 5): duration [s]; s, s_dot and s_ddot at the begin [-, 1/s, 1/s^2], and
 # s_dddot [1/s^3].
@@ -138,7 +139,8 @@ def try_stop(
         return
     if keeps_limits(tried, rows, geometry, pieces, row, n, reserve):
         best[ENDS], best[ROW], best[DECELERATION], best[JERK] = end, row, deceleration, jerk
-        phases[:] = tried
+        for k in range(3):
+            copy(tried[k], phases[k])
 
 
 @kernel(int64(MAT, CUBES, READ_INTS, int64, int64, MAT, float64, float64, OUT_MAT))
