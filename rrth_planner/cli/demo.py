@@ -70,6 +70,8 @@ SIMULATION = 'arm_simulation'
 # The servos of config/simulation.yaml are at most so late: 11.4 ms, a step of 2 ms, and what comes
 # late to them [s].
 SERVO_DELAY = 0.02
+# They come to their goals so long after they are slow [s].
+SETTLING = 0.5
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -143,8 +145,8 @@ def _run(options: argparse.Namespace) -> None:
         first.enter_context(planner('false'))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        still = REST_SPEED if options.physics else STILL
-        client = DemoClient(arm, options.timeout, check, still)
+        rest = (REST_SPEED, SETTLING) if options.physics else (STILL, 0.0)
+        client = DemoClient(arm, options.timeout, check, *rest)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
         client.publish(body)

@@ -4,7 +4,7 @@
 
 import argparse
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from functools import partial
 import math
 import os
@@ -119,12 +119,16 @@ def _run(options: argparse.Namespace) -> None:
         # A run without an end would fill the memory with what is seen.
         if options.video:
             client.see_separation()
-        with suppress(_RunOver, *([KeyboardInterrupt] if not options.video else [])):
+        try:
             _point(client, frame, report, targets, keeps=bool(options.video))
-        with suppress(_RunOver):
+        except _RunOver:
             # The report of the last second.
             end = math.inf
             report.wait(client)
+        except KeyboardInterrupt:
+            # Its nodes may have got the signal, too.
+            if options.video:
+                raise
     print(report.sentence(), flush=True)
     if options.video:
         _film(options, client, frame, targets)

@@ -203,15 +203,20 @@ class DemoClient(PlannerClient):
     """The demo's client: it publishes body and target, requests motions, and follows the arm."""
 
     def __init__(
-        self, arm: ArmModel, timeout: float, check: Callable[[], None], still: float = STILL
+        self,
+        arm: ArmModel,
+        timeout: float,
+        check: Callable[[], None],
+        still: float = STILL,
+        settling: float = 0.0,
     ) -> None:
         """
         Create publishers, subscriptions and the client of the planner.
 
-        The arm is at rest at a speed of at most `still` [rad/s].
+        The arm is at rest at a speed of at most `still` [rad/s]; its servos settle in a time [s].
         """
         super().__init__('rrth_demo', timeout, check)
-        self.arm, self._still = arm, still
+        self.arm, self._still, self._settling = arm, still, settling
         # As `see_separation` keeps them; statuses with the time when they were sent [s].
         self.bodies: list[bytes] = []
         self.commitments: list[JointTrajectory] = []
@@ -244,6 +249,7 @@ class DemoClient(PlannerClient):
             f'the arm at the end of its motion of {trajectory.duration:.2f} s',
             trajectory.duration + self.timeout,
         )
+        self.receive_for(self._settling)
 
     def withdraw_body(self) -> None:
         """Withdraw the body that was published: a planner that starts does not receive it."""
