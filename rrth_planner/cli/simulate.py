@@ -33,7 +33,7 @@ from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.joint_state import configuration_from_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess
-from rrth_planner.simulation.servo import top_tool_speed
+from rrth_planner.simulation.tool_speed import top_tool_speed
 from visualization_msgs.msg import MarkerArray
 
 # The ray misses a target that was reached by no more [m].

@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import numpy as np
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
@@ -82,7 +83,11 @@ class SimulationNode(Node):
         )
         self._bodies, self._body_period = None, np.inf
         if self._wearer is not None and value['body_rate'] > 0.0:
-            self._bodies = self.create_publisher(MarkerArray, 'body_boxes', QoSProfile(depth=1))
+            # A reader that wants latched bodies as well has a second subscription for these.
+            quietly = PublisherEventCallbacks(use_default_callbacks=False)
+            self._bodies = self.create_publisher(
+                MarkerArray, 'body_boxes', QoSProfile(depth=1), event_callbacks=quietly
+            )
             self._body_period = 1.0 / value['body_rate']
             names = {box.name for box in self._wearer.scene_at(0.0).boxes}
             self._parts = PartMarkers([*self._wearer.body.names, *names], LIFETIME)
@@ -129,6 +134,9 @@ class SimulationNode(Node):
         if abs(behind) > MOST_BEHIND:
             # Or a simulated clock was set back.
             self._left_out += behind
+            self.get_logger().warning(
+                f'{behind:.3f} s behind the clock: left out', throttle_duration_sec=REPORT_PERIOD
+            )
         while not self._is_over.is_set():
             with self._lock:
                 time = self._simulation.time

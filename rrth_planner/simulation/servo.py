@@ -3,20 +3,18 @@
 """Position servos of limited torque, and which gains have a wished lag."""
 
 from dataclasses import dataclass
-import itertools
 
 import numpy as np
-from rrth_planner.model.arm import ArmModel, forward_kinematics
+from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.simulation.arm_dynamics import ArmDynamics
 from rrth_planner.simulation.mechanics import Mechanics
+from rrth_planner.simulation.tool_speed import random_postures, top_tool_speed
 
 # A servo without feedforward and damped just so that it does not swing lags so many times the
 # inverse of its bandwidth.
 CRITICAL = 2.0
-# Of so many random postures the inertia and the speed of the tool are looked at.
-POSTURES = 256
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -86,21 +84,6 @@ def servo_effort(
     return effort
 
 
-def top_tool_speed(arm: ArmModel, max_velocity: Array) -> float:
-    """
-    Return how fast the tool gets when every joint moves at its limit [m/s].
-
-    It is the greatest of many random postures, the same ones each time.
-    """
-    q = _postures(arm)
-    poses = forward_kinematics(arm, q)
-    axes, tool = poses[:, :-1, :3, 2], poses[:, -1:, :3, 3]
-    turns = np.cross(axes, tool - poses[:, :-1, :3, 3])
-    columns = np.where(np.array(arm.is_prismatic)[:, None], axes, turns) * max_velocity[:, None]
-    signs = np.array([(1.0, *rest) for rest in itertools.product((1.0, -1.0), repeat=arm.dof - 1)])
-    return float(np.linalg.norm(signs @ columns, axis=-1).max())
-
-
 def servo_for_lag(
     arm: ArmModel,
     mechanics: Mechanics,
@@ -160,11 +143,5 @@ def servo_for_lag(
 def greatest_inertia(arm: ArmModel, mechanics: Mechanics) -> Array:
     """Return the greatest inertia of each joint, all others held, (dof,) [kg m^2 or kg]."""
     dynamics = ArmDynamics(arm, mechanics)
-    found: Array = np.max([dynamics.inertia(q).diagonal() for q in _postures(arm)], axis=0)
+    found: Array = np.max([dynamics.inertia(q).diagonal() for q in random_postures(arm)], axis=0)
     return found
-
-
-def _postures(arm: ArmModel) -> Array:
-    share = np.random.default_rng(0).random((POSTURES, arm.dof))
-    postures: Array = arm.bounds[0] + share * (arm.bounds[1] - arm.bounds[0])
-    return postures

@@ -12,8 +12,9 @@ from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.mechanics import usual_mechanics
 from rrth_planner.simulation.moving_body import body_of_scenes, standing_body
-from rrth_planner.simulation.servo import servo_for_lag, top_tool_speed
+from rrth_planner.simulation.servo import servo_for_lag
 from rrth_planner.simulation.simulated_arm import Imperfections, PERIOD
+from rrth_planner.simulation.tool_speed import top_tool_speed
 from rrth_planner.simulation.trajectory_controller import Tolerances
 from simulation_samples import motion_between, points_of, simulated, stepped, TOP
 from worlds import FOLDED, table_1_arm
