@@ -47,6 +47,8 @@ PATIENCE, LONGEST_START = 10.0, 300.0
 TRANSPORT = 0.009
 FPS = 20.0
 SIMULATION = 'arm_simulation'
+# What the viewer says once it serves its page, among its first lines.
+SERVED, FIRST_LINES = 'The viewer is at', 100
 # Of a recording that comes along: at other times he bends so fast that an arm which stands still
 # would be in his way.
 EXCERPT = (1.2, 5.2)
@@ -105,7 +107,8 @@ def _run(options: argparse.Namespace) -> None:
             ('planner', 'ros.planner_node', planner),
             *([('viewer', 'cli.viewer', _viewer_words(options))] if options.viewer else []),
         ):
-            child = ChildProcess(f'rrth_planner.{module}', words, partial(_show, name))
+            lines: list[str] = []
+            child = ChildProcess(f'rrth_planner.{module}', words, partial(_show, name, lines))
             children.append(stack.enter_context(child))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
@@ -113,6 +116,9 @@ def _run(options: argparse.Namespace) -> None:
         stack.callback(client.destroy_node)
         report = _Report(client)
         client.wait_for_nodes()
+        if options.viewer:
+            # The last child. It loads for seconds in which the machine may have no time for the physics.
+            client.wait_for(lambda: any(SERVED in line for line in lines), 'the viewer')
         client.timeout = PATIENCE
         targets: list[tuple[float, Array]] = []
         end = time.monotonic() + options.seconds
@@ -259,7 +265,10 @@ def _bodies(client: DemoClient, frame: str) -> Iterator[tuple[float, Scene]]:
         )
 
 
-def _show(name: str, line: str) -> None:
+def _show(name: str, lines: list[str], line: str) -> None:
+    # The first ones say that it has begun.
+    if len(lines) < FIRST_LINES:
+        lines.append(line)
     print(f'  {name:9}| {line}', flush=True)
 
 

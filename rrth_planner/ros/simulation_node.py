@@ -119,7 +119,8 @@ class SimulationNode(Node):
         try:
             while not self._is_over.is_set():
                 self._catch_up()
-                left = self._simulation.time + self._left_out - self._now()[0]
+                due = self._simulation.time + PERIOD + self._left_out
+                left = due - self._now()[0]
                 self._is_over.wait(min(max(left, 0.0), PERIOD))
         except Exception:
             # A signal may have ended the context between two statements.
@@ -139,23 +140,25 @@ class SimulationNode(Node):
             )
         while not self._is_over.is_set():
             with self._lock:
-                time = self._simulation.time
-                if time + self._left_out > now:
+                # Of no state that lies in the future.
+                if self._simulation.time + PERIOD + self._left_out > now:
                     return
                 given_up = self._simulation.step()
-                reading = self._simulation.reading
+                time = self._simulation.time
+                self._n_steps += 1
+                is_due = self._n_steps % self._every == 0
+                reading = self._simulation.reading if is_due else None
                 going = list(self._simulation.events)
                 ended, self._simulation.ended = self._simulation.ended, []
             if given_up:
                 self.get_logger().warning(f'motion given up, arm holds its position: {given_up}')
             # Of the state after the step.
-            stamp = ros_now + (reading.time + self._left_out - now)
-            self._n_steps += 1
-            if self._n_steps % self._every == 0:
+            stamp = ros_now + (time + self._left_out - now)
+            if reading is not None:
                 self._publish_state(reading, stamp)
-            if reading.time >= self._next_body:
-                self._publish_body(reading.time, stamp)
-            self._publish_contacts(going, ended, reading.time, stamp)
+            if time >= self._next_body:
+                self._publish_body(time, stamp)
+            self._publish_contacts(going, ended, time, stamp)
 
     def _publish_state(self, reading: Any, stamp: float) -> None:
         both = np.array([reading.wanted.positions, reading.true_positions])
