@@ -117,7 +117,7 @@ def _run(options: argparse.Namespace) -> None:
         report = _Report(client)
         client.wait_for_nodes()
         if options.viewer:
-            # The last child. It loads for seconds in which the machine may have no time for the physics.
+            # The last child. While it loads the machine may have no time for the physics.
             client.wait_for(lambda: any(SERVED in line for line in lines), 'the viewer')
         client.timeout = PATIENCE
         targets: list[tuple[float, Array]] = []
