@@ -67,6 +67,7 @@ node = [line for line in needed if line.startswith(NODE)]
 executables = [
     'planner_node = rrth_planner.ros.planner_node:main',
     'playback_node = rrth_planner.ros.playback_node:main',
+    'simulation_node = rrth_planner.ros.simulation_node:main',
     'body_boxes_node = rrth_planner.ros.body_boxes_node:main',
     'demo = rrth_planner.cli.demo:main',
     'plan = rrth_planner.cli.plan:main',
@@ -77,6 +78,7 @@ executables = [
     'replay = rrth_planner.cli.replay:main',
     'reproduce = rrth_planner.cli.reproduce:main',
     'viewer = rrth_planner.cli.viewer:main',
+    'simulate = rrth_planner.cli.simulate:main',
     'wearer = rrth_planner.cli.wearer:main',
     'write_urdf = rrth_planner.cli.write_urdf:main',
 ]
@@ -117,6 +119,7 @@ setup(
         'node': node,
         'ros': [*node, *requirements('ros-wheels')],
         'campaign': [*requirements('campaign'), *figures],
+        'simulation': requirements('simulation'),
         'tools': [*requirements('tools'), *figures],
         # By it colcon knows that pytest runs the tests.
         'test': ['pytest', 'hypothesis'],

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The demo: planner and playback nodes, targets, a person at work; checked and drawn."""
+"""The demo: planner and arm, played or simulated, a person at work; checked and drawn."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -12,6 +12,7 @@ import os
 import sys
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
 import numpy as np
 import rclpy
@@ -26,6 +27,7 @@ from rrth_planner.collision.separation_inspection import (
     Sights,
 )
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.extras import require
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
@@ -33,13 +35,16 @@ from rrth_planner.model.arm import pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.separation import Separation
+from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.client.planner_client import (
     DemoClient,
     DemoError,
     parameters_of_planner,
+    STILL,
 )
 from rrth_planner.ros.interface.separation_status import SeparationState
 from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.contacts import GREATEST_FORCE
 from rrth_planner.ros.messages.fields import seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import joint_reading
@@ -56,6 +61,17 @@ DOTS_PER_INCH = 110
 # for 30 bodies per second.
 PERSON = ('--begin', '1.2', '--end', '5.2', '--fps', '30')
 PERSON_TARGETS = ('low', 'front')
+# The same of the simulation.
+SIMULATED_PERSON = (
+    *('-p', 'wearer:=recorded', '-p', 'body_rate:=30.0'),
+    *('-p', 'wearer_begin:=1.2', '-p', 'wearer_end:=5.2'),
+)
+SIMULATION = 'arm_simulation'
+# The servos of config/simulation.yaml are at most so late: 11.4 ms, a step of 2 ms, and what comes
+# late to them [s].
+SERVO_DELAY = 0.02
+# They come to their goals so long after they are slow [s].
+SETTLING = 0.5
 HEADER = (
     f'{"target":10}{"planning":>12}{"path":>11}{"duration":>11}{"clearance":>12}{"ray error":>12}'
 )
@@ -89,8 +105,11 @@ def _run(options: argparse.Namespace) -> None:
     body = _example(options.body, MarkerArray)
     targets = {name: _example(f'target_{name}', PointStamped) for name in options.targets}
 
+    if options.physics:
+        require('simulation', 'mujoco')
     domain = os.environ['ROS_DOMAIN_ID']
-    print(f'Starting planner_node and playback_node (ROS_DOMAIN_ID {domain}).', flush=True)
+    node = 'simulation_node' if options.physics else 'playback_node'
+    print(f'Starting planner_node and {node} (ROS_DOMAIN_ID {domain}).', flush=True)
     print('The first start compiles the planner, which may take a minute or two.', flush=True)
     children: list[ChildProcess] = []
 
@@ -105,23 +124,29 @@ def _run(options: argparse.Namespace) -> None:
 
     def planner(separation: str) -> AbstractContextManager[None]:
         own = ['-p', f'seed:={options.seed}', '-p', f'separation:={separation}']
+        if options.physics:
+            own += ['-p', f'controller_delay:={SERVO_DELAY}']
         words = ['--ros-args', '--params-file', str(planner_file), *own]
         return started('planner', 'ros.planner_node', words)
+
+    def arm_node(*own: str) -> AbstractContextManager[None]:
+        kind = 'simulation' if options.physics else 'playback'
+        file = str(resource_path(f'config/{kind}.yaml'))
+        return started(kind, f'ros.{kind}_node', ['--ros-args', '--params-file', file, *own])
 
     def check() -> None:
         for child in children:
             child.check()
 
     with ExitStack() as stack:
-        playback_file = str(resource_path('config/playback.yaml'))
-        words = ['--ros-args', '--params-file', playback_file]
-        stack.enter_context(started('playback', 'ros.playback_node', words))
         # The body is published once: beside one that stands still nobody has to keep watching.
         first = stack.enter_context(ExitStack())
+        (first if options.physics else stack).enter_context(arm_node())
         first.enter_context(planner('false'))
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         stack.callback(rclpy.try_shutdown)
-        client = DemoClient(arm, options.timeout, check)
+        rest = (REST_SPEED, SETTLING) if options.physics else (STILL, 0.0)
+        client = DemoClient(arm, options.timeout, check, *rest)
         stack.callback(client.destroy_node)
         client.wait_for_nodes()
         client.publish(body)
@@ -130,12 +155,22 @@ def _run(options: argparse.Namespace) -> None:
         client.wait_for_end_of_planner()
         client.withdraw_body()
         print('The wearer is now a person at work, as he was recorded.', flush=True)
+        contacts: list[DiagnosticArray] = []
+        if options.physics:
+            # The same person: in the scene of the physics, which publishes him as well.
+            client.create_subscription(
+                DiagnosticArray, f'{SIMULATION}/contacts', contacts.append, 100
+            )
+            stack.enter_context(arm_node(*SIMULATED_PERSON))
         stack.enter_context(planner('true'))
-        stack.enter_context(started('wearer', 'cli.wearer', PERSON))
+        if not options.physics:
+            stack.enter_context(started('wearer', 'cli.wearer', PERSON))
         client.wait_for_nodes()
         separation, error = _beside_a_person(client, frame)
     # Once nobody else needs the processors.
     beside = _sentences(client, separation, frame, error)
+    if options.physics:
+        beside.append(_sentence_of_contacts(contacts))
     scene = scene_of(WearerBody().apply(body, math.inf, frame))
     figure = motion_figure(
         arm, scene, motions, settings.limits, settings.ray_guard_length, _rates(client)
@@ -241,6 +276,20 @@ def _sentences(client: DemoClient, separation: Separation, frame: str, error: fl
         f'{rules.contact_speed:g} m/s was in contact with him (exceptions: {found.n_contacts} '
         'with parts faster than assumed).',
     ]
+
+
+def _sentence_of_contacts(messages: Sequence[DiagnosticArray]) -> str:
+    """Return what the physics had of contacts; raise DemoError where it published nothing."""
+    if not messages:
+        raise DemoError(f'{SIMULATION}/contacts: none came, expected one a second')
+    found: dict[str, float] = {}
+    for status in (status for msg in messages for status in msg.status):
+        (force,) = (float(pair.value) for pair in status.values if pair.key == GREATEST_FORCE)
+        found[status.name] = max(found.get(status.name, 0.0), force)
+    if not found:
+        return 'By the physics the arm was in contact with no part of him.'
+    pairs = ', '.join(f'{name} ({force:.0f} N)' for name, force in found.items())
+    return f'By the physics the arm was in contact with him, at most so strongly: {pairs}.'
 
 
 def _rates(client: DemoClient) -> Array:

@@ -61,6 +61,17 @@ examples:
   %(prog)s walk.bvh --begin 0.1 --skeleton cmu_bvh
   %(prog)s --as markers --drop 0.1 --noise 0.01
 """
+SIMULATE = """\
+Run the planner with a simulated arm (masses, gravity, friction, servos), a person in the scene and
+a target that moves, until Ctrl-C; shown in the browser, or rendered to a video. At the end it says
+how many targets were reached, which contacts there were, and how far the tool lagged.
+"""
+SIMULATE_EPILOG = """\
+examples:
+  %(prog)s                                  beside a person at work, in the browser
+  %(prog)s --lag 0.03 --payload 1.0         by soft servos
+  %(prog)s --seconds 10 --video run.mp4     rendered, without a browser
+"""
 RECORD = """\
 Record a run of the nodes in an MCAP file until Ctrl-C: every message once, serialized as received,
 from reliable, best-effort and latched publishers. Foxglove opens the file, `plot recording` draws
@@ -189,6 +200,53 @@ def demo() -> argparse.ArgumentParser:
         default=['front', 'left', 'high'],
         metavar='NAME',
         help='msg_examples/target_NAME.yaml each (front left high)',
+    )
+    add(
+        '--physics',
+        action='store_true',
+        help='the arm has masses and servos, and the person may run into it: simulation_node in '
+        'place of playback_node',
+    )
+    return command
+
+
+def simulate() -> argparse.ArgumentParser:
+    """Return the parser of all arguments."""
+    command = command_parser('simulate', SIMULATE, SIMULATE_EPILOG)
+    add = command.add_argument
+    add(
+        '--wearer',
+        choices=('recorded', 'standing'),
+        default='recorded',
+        help='a person who moves, or boxes that do not (%(default)s)',
+    )
+    add('--file', type=Path, metavar='FILE', help='his recording, or his boxes (those that come)')
+    add('--begin', type=_finite, default=0.0, metavar='S', help='start of --file (%(default)g)')
+    add('--end', type=_finite, default=0.0, metavar='S', help='its end [s]; 0: to the end')
+    add('--skeleton', default='cmu_bvh', metavar='NAME', help='of --file (%(default)s)')
+    add(
+        '--lag',
+        type=_positive,
+        default=0.01,
+        metavar='M',
+        help='by so much the servos lag at top speed [m] (%(default)g)',
+    )
+    add('--payload', type=_finite, default=0.2, metavar='KG', help='at the tool (%(default)g)')
+    add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')
+    add('--seconds', type=_seconds, default=math.inf, metavar='S', help='how long (until Ctrl-C)')
+    add('--video', type=Path, metavar='FILE', help='render the run to a .gif or .mp4')
+    add(
+        '--viewer',
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help='show it in the browser (unless there is --video)',
+    )
+    add('--port', type=int, default=8081, help='of the viewer (%(default)s)')
+    add(
+        '--open',
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help='open the viewer in the browser (if there is a display)',
     )
     return command
 

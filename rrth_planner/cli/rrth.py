@@ -59,6 +59,13 @@ COMMANDS = {
         'ros',
         'config/playback.yaml',
     ),
+    'simulation_node': Command(
+        'run a simulated arm with masses as a ROS node',
+        'ros.simulation_node',
+        (ROS, 'mujoco'),
+        'ros,simulation',
+        'config/simulation.yaml',
+    ),
     'body_boxes_node': Command(
         'make boxes of a tracked wearer as a ROS node',
         'ros.body_boxes_node',
@@ -70,6 +77,12 @@ COMMANDS = {
         'point the arm and wait until it has arrived', 'cli.point_at', (ROS, 'tqdm'), 'ros,tools'
     ),
     'wearer': Command('publish a recorded person as the wearer', 'cli.wearer', (ROS,), 'ros'),
+    'simulate': Command(
+        'run planner, simulated arm, person and moving target',
+        'cli.simulate',
+        (ROS, 'mujoco'),
+        'ros,simulation',
+    ),
     'record': Command(
         'record a run of the nodes in an MCAP file',
         'cli.record',

@@ -27,11 +27,12 @@ MAY = {
     'pipeline': 'kernels model collision timing planning',
     'wearer': 'model',
     'io': 'model collision planning pipeline wearer',
+    'simulation': 'model wearer io',
     'visualization': 'model collision planning execution pipeline wearer io',
-    'ros': 'kernels model collision planning timing execution pipeline wearer io',
+    'ros': 'kernels model collision planning timing execution pipeline wearer io simulation',
     'reproduction': 'kernels model collision planning io visualization',
     'cli': 'kernels model collision planning timing execution pipeline wearer io visualization '
-    'ros reproduction',
+    'simulation ros reproduction',
 }
 # Within `ros`, each package imports only itself and those before it.
 ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'client')
@@ -40,6 +41,7 @@ LIBRARIES = {
     'kernels': {'numba'},
     'ros': {*ROS, 'tqdm'},
     'visualization': {'matplotlib', 'mpl_toolkits', 'viser'},
+    'simulation': {'mujoco'},
     'reproduction': {'matplotlib'},
     'cli': {'rclpy', 'matplotlib', 'viser', 'tqdm'},
 }
@@ -56,6 +58,7 @@ OWN = {
     'rrth_planner.ros.client.recorder': {'mcap'},
     'rrth_planner.ros.client.recording_reader': {'mcap', 'mcap_ros2'},
     'rrth_planner.ros.messages.definitions': {'rosbags'},
+    'rrth_planner.simulation.film': {'imageio'},
     'rrth_planner.visualization.viewer.screenshot': {'playwright'},
 }
 # The live viewer shows what a node of its own hears.
@@ -82,6 +85,7 @@ LATE = {
         f'rrth_planner.cli.{name}'
         for name in (
             *('plan', 'plot', 'point_at', 'read_urdf', 'record', 'replay', 'reproduce', 'viewer'),
+            'simulate',
             'file_question',
         )
     ),

@@ -121,7 +121,7 @@ def test_every_requirement_is_said_once():
     names = {re.split(r'[\[<>=]', line)[0] for line in distribution.install_requires}
     assert names == {'numpy', 'numba', 'pyyaml', 'python-fcl'}
     extras = distribution.extras_require
-    assert set(extras) == {'node', 'ros', 'campaign', 'tools', 'test'}
+    assert set(extras) == {'node', 'ros', 'campaign', 'simulation', 'tools', 'test'}
     assert {extra for c in COMMANDS.values() for extra in filter(None, c.extras.split(','))} <= {
         *extras
     }

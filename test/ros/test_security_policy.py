@@ -17,11 +17,13 @@ from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
 from rrth_planner.ros.messages.frames import tf2_ros  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
+from rrth_planner.ros.simulation_node import SimulationNode  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 NODES = {
     '/rrth_planner': PlannerNode,
     '/arm_playback': PlaybackNode,
+    '/arm_simulation': SimulationNode,
     '/body_boxes_node': BodyBoxesNode,
 }
 # What is done with topics and services, and how a node names its own.
@@ -32,13 +34,13 @@ DEEDS = {
     ('services', 'request'): 'client',
 }
 TF = {'/tf', '/tf_static'} if tf2_ros is None else set()
-# These decide whether the arm is safe: only their owner may publish them.
+# These decide whether the arm is safe: only their owner may publish them. An arm is one of two.
 ONE_SPEAKER = {
-    '/markers': '/wearer',
-    '/body_boxes': '/body_boxes_node',
-    '/target': '/operator',
-    '/joint_states': '/arm_playback',
-    '/joint_trajectory': '/rrth_planner',
+    '/markers': ['/wearer'],
+    '/body_boxes': ['/body_boxes_node'],
+    '/target': ['/operator'],
+    '/joint_states': ['/arm_playback', '/arm_simulation'],
+    '/joint_trajectory': ['/rrth_planner'],
 }
 
 
@@ -65,6 +67,8 @@ def policy():
 
 @pytest.mark.parametrize('path', NODES)
 def test_a_node_may_do_what_it_does_and_nothing_else(path, policy, wait_until):
+    if path == '/arm_simulation':
+        pytest.importorskip('mujoco')
     overrides = [Parameter('use_sim_time', value=True)]
     if path == '/rrth_planner':
         # With all that it may publish.
@@ -99,9 +103,9 @@ def test_a_node_may_do_what_it_does_and_nothing_else(path, policy, wait_until):
 
 
 def test_what_decides_safety_has_one_speaker(policy):
-    for topic, owner in ONE_SPEAKER.items():
+    for topic, owners in ONE_SPEAKER.items():
         speakers = [path for path, deeds in policy.items() if topic in deeds['topics', 'publish']]
-        assert speakers == [owner]
+        assert speakers == owners
 
 
 def test_nobody_may_set_parameters_or_use_wildcards(policy):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.extras import require
 from rrth_planner.io.text_file import load_xml
-from rrth_planner.io.urdf.chain import NO_URDF, read_chain, TOOLS, urdf_model
+from rrth_planner.io.urdf.chain import NO_URDF, read_chain, TOOLS, urdf_model, UrdfChain
 from rrth_planner.io.urdf.geometry import mesh_file
 from rrth_planner.model.arm import ArmModel, forward_kinematics
 from rrth_planner.model.arrays import Array
@@ -66,8 +66,32 @@ def place_robot(file: str | Path, arm: ArmModel) -> PlacedRobot:
         read; what reads it is missing.
 
     """
-    require('tools', *TOOLS)
     file = Path(file)
+    chain, T_base_link = place_chain(file, arm)
+    base = chain.base
+    model = _with_meshes(file)
+    order = list(model.actuated_joint_names)
+    columns = tuple(order.index(name) for name in arm.joint_names)
+    robot = PlacedRobot(model, T_base_link, columns)
+    # Joints between the root and the arm stay where they are here.
+    model.update_cfg(robot.values(np.zeros(arm.dof)))
+    link = np.asarray(model.get_transform(base, model.base_link))
+    return replace(robot, T_base_root=T_base_link @ np.linalg.inv(link))
+
+
+def place_chain(file: Path, arm: ArmModel) -> tuple[UrdfChain, Array]:
+    """
+    Return the chain of a URDF from which an arm was read, and where its first link is.
+
+    The link's pose is that in the wearer's base frame, (4, 4) [m].
+
+    Raises
+    ------
+    ModelError, NotInstalledError
+        As `place_robot`.
+
+    """
+    require('tools', *TOOLS)
     joints = {
         joint.name: joint for joint in urdf_model(load_xml(file), f'file {file}').robot.joints
     }
@@ -91,14 +115,7 @@ def place_robot(file: str | Path, arm: ArmModel) -> PlacedRobot:
     )
     if T_base_link is None:
         raise ModelError(f'file {file}: its joints have other axes than those of the arm')
-    model = _with_meshes(file)
-    order = list(model.actuated_joint_names)
-    columns = tuple(order.index(name) for name in arm.joint_names)
-    robot = PlacedRobot(model, T_base_link, columns)
-    # Joints between the root and the arm stay where they are here.
-    model.update_cfg(robot.values(np.zeros(arm.dof)))
-    link = np.asarray(model.get_transform(base, model.base_link))
-    return replace(robot, T_base_root=T_base_link @ np.linalg.inv(link))
+    return chain, T_base_link
 
 
 def _with_meshes(file: Path) -> Any:

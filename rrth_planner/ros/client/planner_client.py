@@ -49,7 +49,8 @@ PAUSE = 0.3
 ACKNOWLEDGED = 0.01
 # A wearer who stands still is published so often [s].
 STANDING = 0.02
-# Of an arm at the end of a motion of the demo: greatest deviation [rad] and speed [rad/s].
+# Of an arm at the end of a motion of the demo: greatest deviation [rad], and speed of one that is
+# played [rad/s].
 ARRIVED, STILL = 1e-3, 1e-6
 
 
@@ -201,10 +202,21 @@ class PlannerClient(Node):
 class DemoClient(PlannerClient):
     """The demo's client: it publishes body and target, requests motions, and follows the arm."""
 
-    def __init__(self, arm: ArmModel, timeout: float, check: Callable[[], None]) -> None:
-        """Create publishers, subscriptions and the client of the planner."""
+    def __init__(
+        self,
+        arm: ArmModel,
+        timeout: float,
+        check: Callable[[], None],
+        still: float = STILL,
+        settling: float = 0.0,
+    ) -> None:
+        """
+        Create publishers, subscriptions and the client of the planner.
+
+        The arm is at rest at a speed of at most `still` [rad/s]; its servos settle in a time [s].
+        """
         super().__init__('rrth_demo', timeout, check)
-        self.arm = arm
+        self.arm, self._still, self._settling = arm, still, settling
         # As `see_separation` keeps them; statuses with the time when they were sent [s].
         self.bodies: list[bytes] = []
         self.commitments: list[JointTrajectory] = []
@@ -233,10 +245,11 @@ class DemoClient(PlannerClient):
         """Wait until the arm stands still at the end of a motion."""
         q_end = trajectory.positions[-1]
         self.wait_for(
-            lambda: self.is_still_at(q_end, ARRIVED, STILL),
+            lambda: self.is_still_at(q_end, ARRIVED, self._still),
             f'the arm at the end of its motion of {trajectory.duration:.2f} s',
             trajectory.duration + self.timeout,
         )
+        self.receive_for(self._settling)
 
     def withdraw_body(self) -> None:
         """Withdraw the body that was published: a planner that starts does not receive it."""
@@ -277,7 +290,7 @@ class DemoClient(PlannerClient):
             while time.monotonic() - moved < PAUSE:
                 self.take_messages()
                 q = self.positions()
-                if not self.is_still_at(q, ARRIVED, STILL):
+                if not self.is_still_at(q, ARRIVED, self._still):
                     moved = time.monotonic()
                 elif q_aims(q):
                     return

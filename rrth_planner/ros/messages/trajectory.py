@@ -45,7 +45,7 @@ def joint_trajectory_to_msg(
     if any(abs(value) > REST_VELOCITY for value in velocities[-1]):
         raise MessageError(f'velocity of the last point: {velocities[-1]}, expected 0 [rad/s]')
     times = [round(t * NANOSECONDS) for t in trajectory.times.tolist()]
-    _check_times(times)
+    check_times(times)
     msg = JointTrajectory(joint_names=list(joint_names))
     msg.header.frame_id = frame
     stamp = msg.header.stamp
@@ -91,7 +91,7 @@ def joint_trajectory_from_msg(
             f'points[0].time_from_start: {times[0] / NANOSECONDS}, expected 0, the state at the '
             'start [s]'
         )
-    _check_times(times)
+    check_times(times)
     stamp = seconds_of(msg.header.stamp)
     if now is not None and stamp != 0.0 and stamp + times[-1] / NANOSECONDS < now:
         raise MessageError(
@@ -131,7 +131,8 @@ def pose_to_msg(T: Array, frame: str) -> PoseStamped:
     return msg
 
 
-def _check_times(times: Sequence[int]) -> None:
+def check_times(times: Sequence[int]) -> None:
+    """Raise MessageError unless the times of points strictly increase [ns]."""
     for i, (before, after) in enumerate(pairwise(times)):
         if after <= before:
             raise MessageError(

@@ -1,0 +1,78 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to joint_trajectory_controller, accepted and rejected as it does in ROS 2 Jazzy."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.errors import MessageError
+from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
+from rrth_planner.ros.messages.trajectory import (
+    check_times,
+    MOST_POINTS,
+    REST_VELOCITY,
+    UNITS,
+)
+from rrth_planner.simulation.trajectory_controller import TimedPoints
+from trajectory_msgs.msg import JointTrajectory
+
+
+def controller_points_from_msg(
+    msg: JointTrajectory, joint_names: Sequence[str], now: float
+) -> TimedPoints:
+    """
+    Return the points of a message that came at a time [s], columns in the order of `joint_names`.
+
+    Rejected, as by the controller with its default parameters: other joints than all of those, no
+    point, times that do not increase, positions that are missing, fields with more or fewer values
+    than joints, efforts, a last point that moves, a stamp whose motion has ended. Numbers that are
+    not finite and more than `MOST_POINTS` points are rejected besides.
+
+    Raises
+    ------
+    MessageError
+        What was given, what was expected, the unit.
+
+    """
+    names = list(msg.joint_names)
+    if sorted(names) != sorted(joint_names):
+        raise MessageError(f'joint_names: {names}, expected each of {list(joint_names)} once')
+    if not 1 <= len(msg.points) <= MOST_POINTS:
+        raise MessageError(f'points: {len(msg.points)}, expected 1 to {MOST_POINTS}')
+    times = [nanoseconds_of(point.time_from_start) for point in msg.points]
+    if times[0] < 0:
+        raise MessageError(
+            f'points[0].time_from_start: {times[0] / NANOSECONDS}, expected >= 0 [s]'
+        )
+    check_times(times)
+    stamp = seconds_of(msg.header.stamp)
+    if stamp != 0.0 and stamp + times[-1] / NANOSECONDS < now:
+        raise MessageError(
+            f'header.stamp: {stamp} with a duration of {times[-1] / NANOSECONDS}, expected 0 or '
+            f'an end after the present time {now} [s]'
+        )
+    if any(len(point.effort) for point in msg.points):
+        raise MessageError('effort: given, expected none: the arm follows positions')
+    columns = [names.index(name) for name in joint_names]
+    rows = {field: _rows(msg.points, field, columns) for field in UNITS}
+    last = rows['velocities'][-1]
+    if (np.abs(last) > REST_VELOCITY).any():
+        raise MessageError(f'velocity of the last point: {last.tolist()}, expected 0 [rad/s]')
+    return TimedPoints(times=np.array(times) / NANOSECONDS, **rows)
+
+
+def _rows(points: Sequence[Any], field: str, columns: Sequence[int]) -> Array:
+    """Return a field of all points, (n, dof); NaN where a point has none."""
+    found = np.full((len(points), len(columns)), np.nan)
+    for i, point in enumerate(points):
+        name, row = f'points[{i}].{field}', getattr(point, field)
+        if not len(row) and field != 'positions':
+            continue
+        if len(row) != len(columns):
+            raise MessageError(
+                f'{name}: {len(row)} values, expected {len(columns)}, one a joint [{UNITS[field]}]'
+            )
+        found[i] = numbers(list(row), name, UNITS[field])[list(columns)]
+    return found
