@@ -92,7 +92,8 @@ class Take:
         return Path(self.file).stem if self.file else 'construction work'
 
     @property
-    def _skeleton(self) -> str:
+    def skeleton(self) -> str:
+        """What makes boxes of it."""
         return 'tum_bvh' if 'tum' in self.name else 'cmu_bvh'
 
     def names(self) -> tuple[str, ...]:
@@ -111,7 +112,7 @@ class Take:
     def _boxes(self, time: float) -> Sequence:
         begin = T_POSE if self.file else 0.0
         posture = posture_at(_person(self.file), begin + self.rate * max(time, 0.0))
-        return body_boxes(load_skeleton_once(self._skeleton), posture)[0].boxes
+        return body_boxes(load_skeleton_once(self.skeleton), posture)[0].boxes
 
 
 @cache

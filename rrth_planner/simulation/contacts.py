@@ -33,6 +33,8 @@ class BodyContact:
         Of the arm on the wearer [N].
     speed, approach : float
         Of the two bodies to each other there, and the part of it along the normal [m/s].
+    arm_speed : float
+        Of the arm there [m/s].
     depth : float
         How far their shapes are in each other [m].
 
@@ -44,6 +46,7 @@ class BodyContact:
     force: float
     speed: float
     approach: float
+    arm_speed: float
     depth: float
 
 
@@ -60,8 +63,8 @@ class ContactEvent:
         When it began: its speed is that of the impact.
     now : BodyContact
         When it was last seen.
-    greatest_force, greatest_speed, greatest_depth : float
-        Until now [N, m/s, m].
+    greatest_force, greatest_speed, greatest_arm_speed, greatest_depth : float
+        Until now [N, m/s, m/s, m].
 
     """
 
@@ -71,6 +74,7 @@ class ContactEvent:
     now: BodyContact
     greatest_force: float
     greatest_speed: float
+    greatest_arm_speed: float
     greatest_depth: float
 
 
@@ -96,15 +100,18 @@ def contacts_of(physics: PhysicsModel, data: Any, velocities: Array) -> list[Bod
         shapes = contact.geom.tolist()
         if contact.dist > 0.0 or any(shape not in physics.names for shape in shapes):
             continue
-        moving = np.zeros(3)
+        is_arm_first = model.geom_contype[shapes[0]] < model.geom_contype[shapes[1]]
+        moving, arm_speed = np.zeros(3), 0.0
         for shape, sign in zip(shapes, (-1.0, 1.0), strict=True):
             body = model.geom_bodyid[shape]
             mujoco.mj_jac(model, data, jacobian, None, contact.pos, body)
-            moving += sign * jacobian @ velocities
+            there = jacobian @ velocities
+            moving += sign * there
+            if (shape == shapes[0]) == is_arm_first:
+                arm_speed = float(np.linalg.norm(there))
         mujoco.mj_contactForce(model, data, k, wrench)
         # The normal leads from the first shape to the second.
         approach = -float(contact.frame[:3] @ moving)
-        is_arm_first = model.geom_contype[shapes[0]] < model.geom_contype[shapes[1]]
         bar, part = (physics.names[s] for s in (shapes if is_arm_first else shapes[::-1]))
         one = BodyContact(
             bar=bar,
@@ -113,6 +120,7 @@ def contacts_of(physics: PhysicsModel, data: Any, velocities: Array) -> list[Bod
             force=float(np.linalg.norm(wrench[:3])),
             speed=float(np.linalg.norm(moving)),
             approach=approach,
+            arm_speed=arm_speed,
             depth=-float(contact.dist),
         )
         other = found.get((bar, part))
@@ -137,6 +145,7 @@ def followed(
                     now=contact,
                     greatest_force=max(event.greatest_force, contact.force),
                     greatest_speed=max(event.greatest_speed, contact.speed),
+                    greatest_arm_speed=max(event.greatest_arm_speed, contact.arm_speed),
                     greatest_depth=max(event.greatest_depth, contact.depth),
                 )
             )
@@ -153,6 +162,7 @@ def followed(
                 now=contact,
                 greatest_force=contact.force,
                 greatest_speed=contact.speed,
+                greatest_arm_speed=contact.arm_speed,
                 greatest_depth=contact.depth,
             )
         )

@@ -12,10 +12,11 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.trajectory import MotionState
 from rrth_planner.simulation.arm_dynamics import ArmDynamics
+from rrth_planner.simulation.body_shapes import capsules_within
 from rrth_planner.simulation.contacts import ContactEvent, contacts_of, followed
 from rrth_planner.simulation.mechanics import Mechanics
 from rrth_planner.simulation.moving_body import MovingBody, state_at
-from rrth_planner.simulation.physics_model import physics_model, RATE, stretch
+from rrth_planner.simulation.physics_model import Fill, physics_model, RATE, stretch
 from rrth_planner.simulation.servo import Servo, servo_effort
 from rrth_planner.simulation.trajectory_controller import (
     commanded_state,
@@ -120,14 +121,20 @@ class SimulatedArm:
         imperfections: Imperfections | None = None,
         from_commanded: bool = True,
         time: float = 0.0,
+        compensated: Mechanics | None = None,
+        fill: Fill = capsules_within,
     ) -> None:
-        """Place the arm at rest at a configuration, (dof,) [rad or m], at a time [s]."""
+        """
+        Place the arm at rest at a configuration, (dof,) [rad or m], at a time [s].
+
+        compensated: what the servos take the arm to weigh; None: what it does.
+        """
         self.arm, self.body = arm, body
         self._servo, self._tolerances = servo, tolerances
         self._is_from_commanded = from_commanded
-        self.physics = physics_model(arm, mechanics, body)
+        self.physics = physics_model(arm, mechanics, body, fill)
         self.data = mujoco.MjData(self.physics.model)
-        self._dynamics = ArmDynamics(arm, mechanics)
+        self._dynamics = ArmDynamics(arm, compensated or mechanics)
         self._max_effort = mechanics.max_effort
         given = imperfections or Imperfections()
         self._noise, self._rng = given.encoder_noise, np.random.default_rng(given.seed)

@@ -1,0 +1,240 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Section `servos`: motions round a wearer at rest, executed by servos that lag; half are stopped.
+
+Each motion is planned with the margin of the package. What the monitor of the node makes of the
+arm's joint states is found by its own code: where the arm is on its motion, and whether it ignores
+a stop.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.io.wearer_file import load_body
+from rrth_planner.model.arm import forward_kinematics
+from rrth_planner.model.arrays import Array
+from rrth_planner.model.scene import Scene
+from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.ros.interface.inputs import Input
+from rrth_planner.ros.messages.joint_state import JointReading
+from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
+from rrth_planner.simulation.body_shapes import whole_box
+from rrth_planner.simulation.moving_body import standing_body
+from rrth_planner.simulation.simulated_arm import ArmReading, PERIOD, SimulatedArm
+from rrth_planner.timing.fast_stop import fast_stop
+
+from benchmarks.common.random_draws import random_wearer
+from benchmarks.physics.setting import (
+    arm_of,
+    clearance_of,
+    DELAYS,
+    LAGS,
+    PAYLOADS,
+    points_of,
+    Setup,
+)
+from benchmarks.separation.setting import FOLDED, MARGIN, random_plans, the_arm, the_settings
+
+# Motions of a chain, the first of which begins folded.
+CHAIN = 10
+# The arm comes to rest under its weight before a motion, and after it [s].
+SETTLING = 0.5
+# Joint states come every so many steps; a motion begins so long after it is sent [s].
+STEPS, AHEAD = 5, 0.01
+# Below this the arm hardly moves, and nothing is said of its lag [rad/s].
+SLOW = 0.3
+
+
+@dataclass(slots=True, eq=False)
+class Judged:
+    """
+    What was seen of motions.
+
+    Parameters
+    ----------
+    n_motions, n_stops : int
+    clearance : float
+        Least one of the arm as it moved [m].
+    nearer : float
+        By how much it was less than that of the commanded curve, at most [m].
+    n_within : int
+        Motions on which it was less than the margin.
+    n_contacts : int
+    error : float
+        Of the tool's place, at most [m].
+    lags : list of float
+        How late the arm was, at each joint state of a fast arm [s].
+    n_states, n_suspended : int
+        Joint states, and those by which the monitor does not find the arm on its motion.
+    n_alarms : int
+        Stops that the monitor takes to be ignored.
+
+    """
+
+    setup: Setup
+    n_motions: int = 0
+    n_stops: int = 0
+    clearance: float = np.inf
+    nearer: float = 0.0
+    n_within: int = 0
+    n_contacts: int = 0
+    error: float = 0.0
+    lags: list[float] = field(default_factory=list)
+    n_states: int = 0
+    n_suspended: int = 0
+    n_alarms: int = 0
+
+
+def setup_of(seed: int) -> Setup:
+    """Return the arm of a chain: all of them in turn."""
+    seed, i = divmod(seed, len(LAGS))
+    seed, k = divmod(seed, len(DELAYS))
+    return Setup(LAGS[i], DELAYS[k], PAYLOADS[seed % len(PAYLOADS)])
+
+
+def chain_of_motions(n: int, seed: int) -> Judged:
+    """Return what was seen of a chain of motions round a wearer at rest."""
+    rng, judged = np.random.default_rng(seed), Judged(setup_of(seed))
+    scene, q = load_body() if rng.random() < 0.5 else random_wearer(rng), FOLDED
+    for k in range(n):
+        plan = next(random_plans(rng, scene, q), None)
+        if plan is None:
+            q = FOLDED
+            continue
+        assert plan.trajectory is not None
+        share = rng.random() if k % 2 else None
+        _Execution(judged, scene, plan.trajectory, int(rng.integers(2**31))).run(share)
+        q = plan.trajectory.positions[-1]
+    return judged
+
+
+class _Execution:
+    """A motion of a simulated arm, and the node's monitor of it."""
+
+    def __init__(self, judged: Judged, scene: Scene, motion: Trajectory, seed: int) -> None:
+        """Let the arm settle where the motion begins, and begin it."""
+        body = standing_body(scene)
+        self.judged, self.motion = judged, motion
+        self.arm: SimulatedArm = arm_of(
+            judged.setup, motion.positions[0], body, seed, fill=whole_box
+        )
+        self.clearance = clearance_of(self.arm.physics)
+        # Of the commanded curve.
+        self.ghost = mujoco.MjData(self.arm.physics.model)
+        self.joints: Input[JointReading | None] = Input('joints', None)
+        self.tracker = ExecutionTracker(self.joints)
+        self.least = self.least_commanded = np.inf
+        self.efforts: list[tuple[Array, Array]] = []
+        self._advance(SETTLING)
+        begin = self.arm.time + AHEAD
+        self.tracker.begin(ExecutingMotion(trajectory=motion, start_time=begin), self.arm.time)
+        self.arm.execute(points_of(motion), begin)
+        self.begin, self.is_stopped = begin, False
+
+    def run(self, share: float | None) -> None:
+        """Execute the motion, to its end or to a share of it, where it is stopped."""
+        judged, motion = self.judged, self.motion
+        judged.n_motions += 1
+        end = AHEAD + (1.0 if share is None else share) * motion.duration
+        self._watch(end)
+        if share is None:
+            self._watch(SETTLING)
+        else:
+            self._stop()
+        judged.clearance = min(judged.clearance, self.least)
+        judged.nearer = max(judged.nearer, self.least_commanded - self.least)
+        judged.n_within += self.least < MARGIN
+        judged.n_contacts += len(self.arm.events) + len(self.arm.ended)
+
+    def _stop(self) -> None:
+        """Stop the arm as the node does, and see whether it is taken to ignore that."""
+        time = self.arm.time
+        phase = self.tracker.phase(time)
+        if phase is None or not 0.0 < phase < self.motion.duration:
+            return
+        self.judged.n_stops += 1
+        stop = fast_stop(self.motion, phase, the_settings().limits)
+        self.tracker.stop(ExecutingMotion(trajectory=stop, start_time=time))
+        self.arm.execute(points_of(stop), time)
+        self.is_stopped = True
+        self._watch(stop.duration + SETTLING)
+
+    def _advance(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD)):
+            self.arm.step()
+
+    def _watch(self, seconds: float) -> None:
+        """Let time pass, and judge each joint state."""
+        states: list[ArmReading] = []
+        for _ in range(round(seconds / PERIOD / STEPS)):
+            for _ in range(STEPS):
+                self.arm.step()
+            state = self.arm.reading
+            states.append(state)
+            self._locate(state)
+            self.least = min(self.least, self.clearance(self.arm.data))
+            self.ghost.qpos[:] = state.wanted.positions
+            mujoco.mj_kinematics(self.arm.physics.model, self.ghost)
+            self.least_commanded = min(self.least_commanded, self.clearance(self.ghost))
+        if not states:
+            return
+        wanted = np.array([state.wanted.positions for state in states])
+        true = np.array([state.true_positions for state in states])
+        places = [forward_kinematics(the_arm(), q)[:, -1, :3, 3] for q in (wanted, true)]
+        error = float(np.linalg.norm(places[0] - places[1], axis=1).max())
+        self.judged.error = max(self.judged.error, error)
+        speeds = np.array([state.wanted.velocities for state in states])
+        fast = np.abs(speeds).max(axis=1) > SLOW
+        gaps, speeds = (wanted - true)[fast], speeds[fast]
+        self.judged.lags += ((gaps * speeds).sum(axis=1) / (speeds**2).sum(axis=1)).tolist()
+
+    def _locate(self, state: ArmReading) -> None:
+        """Have the monitor find the arm on its motion, or on its stop."""
+        self.joints.value = JointReading(
+            state.positions, state.velocities, state.time, state.time, np.inf
+        )
+        self.judged.n_states += 1
+        self.judged.n_suspended += self.tracker.phase(state.time) is None
+        if self.is_stopped and self.tracker.missed_stop(state.time) is not None:
+            self.judged.n_alarms += 1
+
+
+HEADER = (
+    '| lag of the tool [mm] | delay [ms] | motions | stopped | arm late, median [ms] | at most '
+    '(p99) [ms] | tool off at most [mm] | least distance [mm] | nearer than commanded, at most '
+    '[mm] | within the margin | contacts | joint states not on the motion | stops taken to be '
+    'ignored |'
+)
+
+
+def lines_of(chains: Sequence[Judged]) -> list[str]:
+    """Return the lines of the table: one for each servo and delay."""
+    lines = []
+    for lag in LAGS:
+        for delay in DELAYS:
+            some = [one for one in chains if (one.setup.lag, one.setup.delay) == (lag, delay)]
+            if not some:
+                continue
+            late = np.array([value for one in some for value in one.lags])
+            middle, most = np.quantile(late, [0.5, 0.99])
+            cells = (
+                f'{1e3 * lag:g}',
+                f'{1e3 * delay:g}',
+                sum(one.n_motions for one in some),
+                sum(one.n_stops for one in some),
+                f'{1e3 * middle:.1f}',
+                f'{1e3 * most:.1f}',
+                f'{1e3 * max(one.error for one in some):.1f}',
+                f'{1e3 * min(one.clearance for one in some):.1f}',
+                f'{1e3 * max(one.nearer for one in some):.1f}',
+                sum(one.n_within for one in some),
+                sum(one.n_contacts for one in some),
+                f'{sum(one.n_suspended for one in some)} of {sum(one.n_states for one in some)}',
+                sum(one.n_alarms for one in some),
+            )
+            lines.append(f'| {" | ".join(map(str, cells))} |')
+    return lines
