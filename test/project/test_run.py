@@ -3,6 +3,7 @@
 """The script `run`: what it answers without an environment, and of what it makes one."""
 
 from functools import cache
+from importlib import metadata
 from importlib.util import find_spec
 from itertools import product
 import json
@@ -104,7 +105,7 @@ def test_help_is_asked_for_by_a_short_option_too_and_of_the_demo_and_of_a_part(c
 
 
 # What `./run` installs at once, and what it adds for the tests and for single commands.
-FIRST, FURTHER = ('run', 'ros-wheels'), ('campaign', 'tools', 'test')
+FIRST, FURTHER = ('run', 'ros-wheels'), ('campaign', 'tools', 'simulation', 'test')
 PLACES = [
     {'python_version': f'3.{k}', 'python_full_version': f'3.{k}.9', 'platform_machine': machine}
     for k, machine in product(range(10, 14), ('x86_64', 'aarch64'))
@@ -174,6 +175,28 @@ def test_every_range_has_one_exact_version_for_each_python(place):
             assert exact, f'{wanted} of {name}.txt is not locked: requirements/lock'
             assert wanted.specifier.contains(exact), f'{wanted}, locked {exact}: requirements/lock'
     assert found['numpy'] == versions(place, ('run',))['numpy']
+
+
+def needed(name):
+    """Return what an installed package needs here; the extras of requirements are those given."""
+    for text in metadata.requires(name) or ():
+        one = Requirement(text)
+        if one.marker is None or one.marker.evaluate({'extra': ''}):
+            yield plain(one.name)
+
+
+@pytest.mark.parametrize('name', [*FIRST[1:], *FURTHER])
+def test_what_an_exact_version_needs_is_locked_beside_it(name):
+    here = versions({}, (FIRST[0], name))
+    installed = {plain(one.metadata['Name']): one for one in metadata.distributions()}
+    missing = {
+        (package, other)
+        for package in here
+        if package in installed
+        for other in needed(installed[package].metadata['Name'])
+        if other not in here
+    }
+    assert not missing, 'requirements/lock leaves them out'
 
 
 def test_an_environment_is_made_of_exact_versions_and_new_ones_make_a_new_one(tmp_path):
