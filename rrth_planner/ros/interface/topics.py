@@ -1,0 +1,183 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""The topics and services of the nodes: what each is called, its type, and what it means."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Direction(Enum):
+    """What a node does with a topic or a service."""
+
+    SUBSCRIBES = 'subscribes'
+    PUBLISHES = 'publishes'
+    SERVES = 'serves'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Interface:
+    """
+    A topic or a service of a node.
+
+    Parameters
+    ----------
+    name : str
+        Before namespace and remaps; `~` stands for the name of the node, `{name}` for the name of
+        a rigid body.
+    type : str
+        As ROS writes it.
+    meaning : str
+        What a user has to know of it.
+    parameter, value : str
+        The interface exists only where this parameter has this value; empty: always.
+
+    """
+
+    direction: Direction
+    name: str
+    type: str
+    meaning: str
+    parameter: str = ''
+    value: object = None
+
+
+def _subscribed(name: str, kind: str, meaning: str, **only: object) -> Interface:
+    return _interface(Direction.SUBSCRIBES, name, kind, meaning, only)
+
+
+def _published(name: str, kind: str, meaning: str, **only: object) -> Interface:
+    return _interface(Direction.PUBLISHES, name, kind, meaning, only)
+
+
+def _served(name: str, meaning: str, kind: str = 'std_srvs/srv/Trigger') -> Interface:
+    return _interface(Direction.SERVES, name, kind, meaning, {})
+
+
+def _interface(
+    direction: Direction, name: str, kind: str, meaning: str, only: dict[str, object]
+) -> Interface:
+    (parameter, value), *_ = [*only.items(), ('', None)]
+    return Interface(
+        direction=direction,
+        name=name,
+        type=kind,
+        meaning=meaning,
+        parameter=parameter,
+        value=value,
+    )
+
+
+MARKERS, MOTION = 'visualization_msgs/msg/MarkerArray', 'trajectory_msgs/msg/JointTrajectory'
+JOINTS, DIAGNOSTICS = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+
+# By the names of the nodes.
+INTERFACES = {
+    'rrth_planner': (
+        _subscribed(
+            'body_boxes',
+            MARKERS,
+            'the wearer: CUBE or CUBE_LIST markers, `scale` = full size; identity, ADD, DELETE, '
+            'DELETEALL, lifetime as in RViz. An array with one bad marker is rejected whole: the '
+            'last good body stays, a running motion stops, and nothing is planned until a good '
+            'one comes. Stamp each box with the time of its measurement, and give it a lifetime: '
+            'a part whose lifetime runs out is lost; it stays where it was for `keep_lost`, then '
+            'the arm stops, and it is reported by name',
+        ),
+        _subscribed(
+            'target',
+            'geometry_msgs/msg/PointStamped',
+            'the point to point at; the last one wins',
+        ),
+        _subscribed(
+            'joint_states', JOINTS, 'where the arm is; matched by name, other joints ignored'
+        ),
+        _served(
+            '~/plan',
+            'plan from the present joints to the present target round the present body; publish, '
+            'then answer',
+        ),
+        _served(
+            '~/get_plan',
+            'the same, target in `goal.pose.position` (`start` empty); answers the tool path',
+            'nav_msgs/srv/GetPlan',
+        ),
+        _served('~/cancel', 'ends a plan in progress'),
+        _served(
+            '~/reset',
+            'with `separation`: allows motions again after a FAULT, and with `resume: manual` '
+            'lets a stopped one go on',
+        ),
+        _published(
+            'joint_trajectory',
+            MOTION,
+            'the next stretch of the motion and a stop, or the proven rest, with every body; '
+            'without `separation` the whole motion, latched, stamp 0; positions, velocities, '
+            'accelerations; first point = present state. Never published on failure. Where the '
+            'arm moves already, the stamp says when the first point is its state',
+        ),
+        _published(
+            '~/planned_trajectory', MOTION, 'latched: the whole planned motion', separation=True
+        ),
+        _published(
+            '~/state',
+            'diagnostic_msgs/msg/DiagnosticStatus',
+            'latched: NORMAL, SLOWED, PROTECTIVE_STOP or FAULT, with cause, rate, part of the arm '
+            'and box',
+            separation=True,
+        ),
+        _published(
+            '~/ray_clear',
+            'std_msgs/msg/Bool',
+            '50 Hz, deadline 0.1 s, liveliness: whether the pointing ray is known to meet nobody, '
+            'for tools whose beam matters',
+            separation=True,
+        ),
+        _published('~/tool_path', 'nav_msgs/msg/Path', 'latched: the path of the tool'),
+        _published(
+            '~/markers',
+            MARKERS,
+            'latched: body with margin, arm at start and goal, ray, tool path',
+        ),
+        _published('/diagnostics', DIAGNOSTICS, '1 Hz and on change'),
+    ),
+    'arm_playback': (
+        _subscribed(
+            'joint_trajectory',
+            MOTION,
+            'a motion to execute, with the quintic interpolation of a controller; it also listens '
+            'to the liveliness of the planner',
+        ),
+        _published('joint_states', JOINTS, 'the state of the arm, at `rate`'),
+        _published('~/tool_pose', 'geometry_msgs/msg/PoseStamped', 'the tool, at `rate`'),
+        _served('~/stop', 'brakes along the path'),
+    ),
+    'body_boxes_node': (
+        _subscribed('markers', MARKERS, 'a SPHERE a joint, by numbers', input='markers'),
+        _subscribed(
+            'poses',
+            'geometry_msgs/msg/PoseArray',
+            'a pose a joint, by their order',
+            input='poses',
+        ),
+        _subscribed(
+            '{name}/pose',
+            'geometry_msgs/msg/PoseStamped',
+            'a rigid body each, by names; `pose_topic` says how they are called',
+            input='bodies',
+        ),
+        _subscribed('joint_states', JOINTS, 'angles of joints', input='joint_states'),
+        _subscribed(
+            'robot_description',
+            'std_msgs/msg/String',
+            'the URDF of the person (REP 155)',
+            input='joint_states',
+        ),
+        _published(
+            'body_boxes',
+            MARKERS,
+            'a CUBE of each part; `ns` is the name of the part; a part of which a point is lost '
+            'is left out, and without the base frame all is',
+        ),
+        _published('/diagnostics', DIAGNOSTICS, '1 Hz'),
+    ),
+}
