@@ -4,7 +4,6 @@
 
 import os
 from pathlib import Path
-import re
 import subprocess
 import sys
 
@@ -123,11 +122,3 @@ def test_a_reader_that_has_ended_ends_a_command_silently():
     )
     os.close(write)
     assert (ended.returncode, ended.stderr) == (141, '')
-
-
-def test_the_readme_lists_every_command():
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    table = text.partition('## Commands')[2].partition('\n## ')[0]
-    rows = [line.split(' | ')[0] for line in table.splitlines() if line.startswith('| ')]
-    listed = {name for row in rows for name in re.findall(r'`(\w+)', row)}
-    assert listed == set(rrth.COMMANDS)

@@ -11,12 +11,14 @@ import sys
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 PAGES += [ROOT / name for name in ('CONTRIBUTING.md', 'QUALITY_DECLARATION.md')]
 IMAGE = re.compile(r'!\[[^\]]*\]\(([^)\s]+)\)')
 LINK = re.compile(r'(?<!!)\[[^\]]*\]\(([^)\s]+)\)')
 # A command in backticks, as one would type it.
 COMMAND = re.compile(r'`((?:\./run|python -m|ros2) [^`]+)`')
+# The pages with code to try.
+CODE = ('README.md', 'docs/start_python.md')
 # A snippet, and the example that the line before it names.
 SNIPPET = re.compile(r'^([^\n]*)\n\n```python\n(.*?)^```', re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r'^```.*?^```', re.MULTILINE | re.DOTALL)
@@ -104,22 +106,30 @@ def test_links_lead_somewhere(page):
             assert fragment in map(anchor, headings), f'{page.name}: no heading for {link}'
 
 
-def test_a_snippet_of_the_readme_is_in_the_example_that_it_names():
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+def snippets():
+    """Return (page, line before, code) of all code to try."""
+    return [
+        (page, *found)
+        for page in CODE
+        for found in SNIPPET.findall((ROOT / page).read_text(encoding='utf-8'))
+    ]
+
+
+def test_a_snippet_is_in_the_example_that_it_names():
     named = [
-        (name, snippet)
-        for before, snippet in SNIPPET.findall(text)
+        (page, name, snippet)
+        for page, before, snippet in snippets()
         for name in re.findall(r'`(examples/\w+\.py)`', before)
     ]
     assert named
-    for name, snippet in named:
+    for page, name, snippet in named:
         example = (ROOT / name).read_text(encoding='utf-8')
-        assert snippet in example, f'README.md quotes what {name} does not have'
+        assert snippet in example, f'{page} quotes what {name} does not have'
         # Complete: all that it needs, it imports.
         assert example.split('"""')[2].strip().startswith(snippet.split('\n')[0])
 
 
-# What the snippets of the README print: a length of 158.84 at best; the start comes first.
+# What the snippets print: a length of 158.84 at best; the start comes first.
 PLANNED = {
     'A point on a map': r'solved 158\.[89]',
     'A path of the arm': r'solved \[\[ 0\. +-0\.35 ',
@@ -127,9 +137,9 @@ PLANNED = {
 
 
 @pytest.mark.parametrize('start', PLANNED)
-def test_five_lines_of_the_readme_plan(start, tmp_path):
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    (snippet,) = (code for before, code in SNIPPET.findall(text) if before.startswith(start))
+def test_five_lines_plan(start, tmp_path):
+    # The same on each page that has them.
+    (snippet,) = {code for _, before, code in snippets() if before.startswith(start)}
     statements = ast.parse(snippet).body
     assert sum(not isinstance(s, ast.Import | ast.ImportFrom) for s in statements) == 5
     code = f'import sys; sys.path.insert(0, {str(ROOT)!r})\n{snippet}'
