@@ -105,7 +105,7 @@ def test_help_is_asked_for_by_a_short_option_too_and_of_the_demo_and_of_a_part(c
 
 
 # What `./run` installs at once, and what it adds for the tests and for single commands.
-FIRST, FURTHER = ('run', 'ros-wheels'), ('campaign', 'tools', 'simulation', 'test')
+FIRST, FURTHER = ('run', 'ros-wheels'), ('campaign', 'tools', 'simulation', 'test', 'docs')
 PLACES = [
     {'python_version': f'3.{k}', 'python_full_version': f'3.{k}.9', 'platform_machine': machine}
     for k, machine in product(range(10, 14), ('x86_64', 'aarch64'))

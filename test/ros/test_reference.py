@@ -17,6 +17,7 @@ from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
 from rrth_planner.ros.interface import (  # noqa: E402
     parameters,
     playback_parameters,
+    simulation_parameters,
     tracker_parameters,
 )
 from rrth_planner.ros.interface.posture_inputs import points_of  # noqa: E402
@@ -37,6 +38,7 @@ TYPES_OF_EACH = ('rcl_interfaces/', 'type_description_interfaces/')
 SETTINGS = {
     'rrth_planner': (parameters.ARM, *parameters.declared(load_arm().dof)),
     'arm_playback': playback_parameters.SETTINGS,
+    'arm_simulation': simulation_parameters.SETTINGS,
     'body_boxes_node': tracker_parameters.SETTINGS,
 }
 # A node, and the parameters that decide what it offers.
@@ -44,6 +46,8 @@ STARTS = [
     ('rrth_planner', {'separation': True}),
     ('rrth_planner', {'separation': False}),
     ('arm_playback', {}),
+    ('arm_simulation', {'wearer': 'none'}),
+    ('arm_simulation', {'wearer': 'standing'}),
     ('body_boxes_node', {'input': 'markers', 'skeleton': 'azure_kinect'}),
     ('body_boxes_node', {'input': 'poses', 'skeleton': 'xsens'}),
     ('body_boxes_node', {'input': 'bodies', 'skeleton': 'xsens'}),
@@ -65,6 +69,11 @@ def _node(request):
     }
     if name == 'rrth_planner':
         node = PlannerNode(InProcessPlanner(), **options)
+    elif name == 'arm_simulation':
+        pytest.importorskip('mujoco')
+        from rrth_planner.ros.simulation_node import SimulationNode
+
+        node = SimulationNode(**options)
     else:
         node = {'arm_playback': PlaybackNode, 'body_boxes_node': BodyBoxesNode}[name](**options)
     yield node, name, given
@@ -90,7 +99,7 @@ def expected(node, name, given):
     """Return the same by the table."""
     found = set()
     for i in INTERFACES[name]:
-        if i.parameter and given[i.parameter] != i.value:
+        if i.parameter and given[i.parameter] not in i.values:
             continue
         names = [i.name]
         if '{name}' in i.name:
@@ -121,5 +130,10 @@ def test_a_node_declares_and_offers_what_the_reference_says(node, wait_until):
 
 
 def test_tf_is_the_only_input_without_a_topic():
-    of_inputs = {i.value for i in INTERFACES['body_boxes_node'] if i.parameter == 'input'}
+    of_inputs = {
+        value
+        for i in INTERFACES['body_boxes_node']
+        if i.parameter == 'input'
+        for value in i.values
+    }
     assert of_inputs == set(tracker_parameters.INPUTS) - {'tf'}

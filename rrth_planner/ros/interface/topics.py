@@ -28,8 +28,8 @@ class Interface:
         As ROS writes it.
     meaning : str
         What a user has to know of it.
-    parameter, value : str
-        The interface exists only where this parameter has this value; empty: always.
+    parameter : str
+        The interface exists only where this parameter has one of the values; empty: always.
 
     """
 
@@ -38,7 +38,7 @@ class Interface:
     type: str
     meaning: str
     parameter: str = ''
-    value: object = None
+    values: tuple[object, ...] = ()
 
 
 def _subscribed(name: str, kind: str, meaning: str, **only: object) -> Interface:
@@ -56,14 +56,14 @@ def _served(name: str, meaning: str, kind: str = 'std_srvs/srv/Trigger') -> Inte
 def _interface(
     direction: Direction, name: str, kind: str, meaning: str, only: dict[str, object]
 ) -> Interface:
-    (parameter, value), *_ = [*only.items(), ('', None)]
+    (parameter, values), *_ = [*only.items(), ('', ())]
     return Interface(
         direction=direction,
         name=name,
         type=kind,
         meaning=meaning,
         parameter=parameter,
-        value=value,
+        values=values if isinstance(values, tuple) else (values,),
     )
 
 
@@ -150,6 +150,38 @@ INTERFACES = {
         _published('joint_states', JOINTS, 'the state of the arm, at `rate`'),
         _published('~/tool_pose', 'geometry_msgs/msg/PoseStamped', 'the tool, at `rate`'),
         _served('~/stop', 'brakes along the path'),
+    ),
+    'arm_simulation': (
+        _subscribed(
+            'joint_trajectory',
+            MOTION,
+            'a motion to execute, or to reject, as by joint_trajectory_controller',
+        ),
+        _published(
+            'joint_states',
+            JOINTS,
+            'positions by the encoders, velocities as their smoothed differences, efforts of the '
+            'motors, at `rate`',
+        ),
+        _published(
+            '~/contacts',
+            DIAGNOSTICS,
+            'a status for each part of the arm and part of the wearer in contact: WARN while it '
+            'lasts, OK when it has ended; force, speed at the first instant, depth. When one '
+            'begins or ends, every 0.1 s meanwhile, and, without any, an empty one every second',
+        ),
+        _published(
+            'body_boxes',
+            MARKERS,
+            'the boxes of the wearer in the scene, at `body_rate`, stamped',
+            wearer=('standing', 'recorded'),
+        ),
+        _published(
+            '/diagnostics',
+            DIAGNOSTICS,
+            '1 Hz: real-time factor, the greatest distance of the tool from its motion, steps '
+            'with a motor at its limit, contacts',
+        ),
     ),
     'body_boxes_node': (
         _subscribed('markers', MARKERS, 'a SPHERE a joint, by numbers', input='markers'),
