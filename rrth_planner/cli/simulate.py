@@ -45,7 +45,7 @@ CENTER, SWING, ROUNDS = np.array([1.4, 0.0, 0.1]), np.array([0.0, 0.8, 0.3]), (1
 PATIENCE, LONGEST_START = 10.0, 300.0
 # A step of the servos, and what comes late to them [s].
 TRANSPORT = 0.009
-FPS = 20.0
+FPS = 12.5
 SIMULATION = 'arm_simulation'
 # What the viewer says once it serves its page, among its first lines.
 SERVED, FIRST_LINES = 'The viewer is at', 100

@@ -25,7 +25,7 @@ with suppress(ImportError):
 WIDTH, HEIGHT = 640, 480
 FORMATS = ('.gif', '.mp4')
 # Where the camera looks, from how far [m], and from which side: behind the right shoulder [deg].
-CENTER, DISTANCE, AZIMUTH, ELEVATION = (0.0, 0.0, 0.1), 2.6, 35.0, -20.0
+CENTER, DISTANCE, AZIMUTH, ELEVATION = (0.15, 0.0, 0.15), 1.9, 35.0, -20.0
 TARGET_RADIUS, TARGET_COLOR = 0.025, (0.9, 0.1, 0.1, 1.0)
 
 
