@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 import functools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -334,6 +335,13 @@ def capsule_ends(arm: ArmModel, q: Array) -> Array:
     poses = np.concatenate([arm.T_base_mount[None], forward_kinematics(arm, q)])
     ends = [c.ends @ poses[c.link, :3, :3].T + poses[c.link, :3, 3] for c in arm.capsules]
     return np.array(ends).reshape(-1, 2, 3)
+
+
+def pointing_angle(arm: ArmModel, q: Array, target: Array) -> float:
+    """Return the angle between the ray and the direction from tool to target [rad]."""
+    T = tool_pose(arm, q)
+    v, z = target - T[:3, 3], T[:3, 2]
+    return math.atan2(float(np.linalg.norm(np.cross(z, v))), float(v @ z))
 
 
 def pointing_error(arm: ArmModel, q: Array, target: Array) -> float:

@@ -30,6 +30,7 @@ from std_srvs.srv import Trigger
 # on meanwhile.
 if TYPE_CHECKING:
     from rrth_planner.pipeline.planning_process import Planner
+    from rrth_planner.ros.requests.point_head import PointHeadServer
 
 NAME = 'rrth_planner'
 BEGIN = time.monotonic()
@@ -63,6 +64,7 @@ class PlannerNode(Node):
 
         """
         super().__init__(NAME, **kwargs)
+        self._point_head: PointHeadServer | None = None
         parameters = declare_parameters(self)
         self._compile()
         from rrth_planner.execution.warm_up import warm_up
@@ -99,6 +101,7 @@ class PlannerNode(Node):
             (Trigger, '~/reset', self._on_reset),
         ):
             self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
+        self._serve_action()
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
     def _create_components(self, parameters: PlannerParameters) -> None:
@@ -110,7 +113,7 @@ class PlannerNode(Node):
         from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
         from rrth_planner.ros.requests.request_queue import PlanQueue
 
-        inputs = Inputs(
+        self._inputs = inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
         publishers = PlanPublishers(self, parameters.separation is not None)
@@ -128,8 +131,26 @@ class PlannerNode(Node):
             self._planner,
         )
 
+    def _serve_action(self) -> None:
+        """Offer the action point_head, where its type is installed."""
+        from rrth_planner.ros.messages.point_head import PointHead
+
+        if PointHead is not None:
+            from rrth_planner.ros.requests.point_head import PointHeadServer
+
+            self._point_head = PointHeadServer(
+                self,
+                self._scene_monitor,
+                self._inputs,
+                self._reporter,
+                self._monitor,
+                self._queue,
+            )
+
     def close(self) -> None:
         """Stop an arm in motion; end the plan in progress, the queue, and the planning process."""
+        if self._point_head is not None:
+            self._point_head.close()
         self._queue.close()
 
     def fail(self, what: str) -> None:

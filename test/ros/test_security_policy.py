@@ -15,6 +15,7 @@ from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
 from rrth_planner.ros.messages.frames import tf2_ros  # noqa: E402
+from rrth_planner.ros.messages.point_head import PointHead  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
 from rrth_planner.ros.simulation_node import SimulationNode  # noqa: E402
@@ -32,6 +33,12 @@ DEEDS = {
     ('topics', 'subscribe'): 'subscriber',
     ('services', 'reply'): 'service',
     ('services', 'request'): 'client',
+}
+# Actions are services and topics, by these names.
+ACTIONS = ('actions', 'execute'), ('actions', 'call')
+PARTS = {
+    ('services', 'reply'): ('send_goal', 'cancel_goal', 'get_result'),
+    ('topics', 'publish'): ('feedback', 'status'),
 }
 TF = {'/tf', '/tf_static'} if tf2_ros is None else set()
 # These decide whether the arm is safe: only their owner may publish them. An arm is one of two.
@@ -53,7 +60,7 @@ def policy():
     for enclave in root.findall('enclaves/enclave'):
         (profile,) = enclave.findall('profiles/profile')
         assert enclave.get('path') == f'/{profile.get("node")}'
-        allowed = found[enclave.get('path')] = {deed: set() for deed in DEEDS}
+        allowed = found[enclave.get('path')] = {deed: set() for deed in (*DEEDS, *ACTIONS)}
         for group in profile:
             ((deed, word),) = group.attrib.items()
             assert word == 'ALLOW'
@@ -87,7 +94,11 @@ def test_a_node_may_do_what_it_does_and_nothing_else(path, policy, wait_until):
             for deed, what in DEEDS.items()
         }
 
-    allowed = {deed: set(names) for deed, names in policy[path].items()}
+    allowed = {deed: set(policy[path][deed]) for deed in DEEDS}
+    if PointHead is not None:
+        for action in policy[path]['actions', 'execute']:
+            for deed, parts in PARTS.items():
+                allowed[deed] |= {f'{action}/_action/{part}' for part in parts}
     if path == '/rrth_planner':
         assert allowed['topics', 'subscribe'] >= TF
         allowed['topics', 'subscribe'] -= TF
@@ -118,3 +129,5 @@ def test_what_the_operator_calls_is_served(policy):
     served = policy['/rrth_planner']['services', 'reply']
     served = served | policy['/arm_playback']['services', 'reply']
     assert policy['/operator']['services', 'request'] <= served
+    called = policy['/operator']['actions', 'call']
+    assert called == policy['/rrth_planner']['actions', 'execute'] == {'/rrth_planner/point_head'}

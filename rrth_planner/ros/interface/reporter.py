@@ -248,7 +248,6 @@ class Reporter:
 
     def conclude(self, code: ErrorCode, sentence: str, figures: PlanReport) -> str:
         """Log and publish how a request ended, and return the answer to it."""
-        text, sentence = answer(code, sentence), one_line(sentence)
         is_solved = code is ErrorCode.SUCCESS
         with self._lock:
             self.report = replace(
@@ -256,10 +255,20 @@ class Reporter:
                 n_requests=self.report.n_requests + 1,
                 n_solved=self.report.n_solved + is_solved,
                 code=code,
-                sentence=sentence,
+                sentence=one_line(sentence),
             )
+        return self._announce(code, sentence)
+
+    def revise(self, code: ErrorCode, sentence: str) -> str:
+        """Log and publish what became of the last request, and return that as an answer."""
+        with self._lock:
+            self.report = replace(self.report, code=code, sentence=one_line(sentence))
+        return self._announce(code, sentence)
+
+    def _announce(self, code: ErrorCode, sentence: str) -> str:
+        text = answer(code, sentence)
         logger = self._node.get_logger()
-        if is_solved:
+        if code is ErrorCode.SUCCESS:
             logger.info(text)
         elif code is ErrorCode.FAILURE:
             logger.error(text)

@@ -231,6 +231,33 @@ class ExecutionMonitor:
             self._commitments.hold(until)
             return self.running
 
+    @property
+    def goal(self) -> PointingGoal | None:
+        """The goal of the last commanded motion."""
+        return self._goal
+
+    @property
+    def is_monitoring(self) -> bool:
+        """Whether a motion is monitored that is not being stopped."""
+        return self._state is MonitorState.MONITORING
+
+    def is_active(self, now: float) -> bool:
+        """Return whether the arm is to execute a motion or a stop at a time [s]."""
+        running = self.running
+        return running is not None and (
+            self.is_monitoring or now < running.start_time + running.trajectory.duration
+        )
+
+    def has_stopped(self, goal: PointingGoal) -> bool:
+        """Return whether a stop of a motion to this goal is to be taken, and planned after."""
+        with self._lock:
+            return any(stop.goal is goal and stop.is_replanned for stop in self._stops)
+
+    def brake(self, why: str) -> None:
+        """Stop the arm, if it moves, because it is no longer wanted to arrive."""
+        with self._lock:
+            self._stop_unless_over(why, is_replanned=False, is_fault=False)
+
     def take_stops(self) -> list[Stop]:
         """Return the stops published since the last call."""
         with self._lock:
@@ -249,11 +276,15 @@ class ExecutionMonitor:
 
         """
         with self._lock:
-            if self.running is not None and self._state is MonitorState.MONITORING:
-                self._commitments.fail(why, is_fault=not is_replanned)
-                self.pending_stop, self._is_replanned = why, is_replanned
-                self._pending_since = time.perf_counter()
-                self._stop_for_failure()
+            self._stop_unless_over(why, is_replanned, is_fault=not is_replanned)
+
+    def _stop_unless_over(self, why: str, is_replanned: bool, is_fault: bool) -> None:
+        """Stop the arm, if it executes a motion; the lock is held."""
+        if self.running is not None and self._state is MonitorState.MONITORING:
+            self._commitments.fail(why, is_fault)
+            self.pending_stop, self._is_replanned = why, is_replanned
+            self._pending_since = time.perf_counter()
+            self._stop_for_failure()
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""

@@ -22,6 +22,13 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import CODE_OF_STATUS, ErrorCode
 from rrth_planner.ros.requests.handover import Handover, LATE, LEADS
 from rrth_planner.ros.requests.incidents import PlanError
+from rrth_planner.ros.requests.pace import (
+    is_too_short,
+    limits_of,
+    MOST_SLOWER,
+    require_long_enough,
+    slower,
+)
 from rrth_planner.ros.requests.revalidation import Revalidation, START_TOLERANCE
 
 
@@ -127,6 +134,12 @@ def plan_request(
                 hold(math.inf)
             question = _question(snapshot, parameters, handover, inputs.body.age(now))
             plan = planner.plan(question, should_stop)
+            for _ in range(MOST_SLOWER):
+                if not is_too_short(plan, snapshot.goal):
+                    break
+                question = slower(question, plan, snapshot.goal)
+                plan = planner.plan(question, should_stop)
+            require_long_enough(plan, snapshot.goal)
             code = CODE_OF_STATUS[plan.status]
             if plan.disagreement is not None:
                 incident = disagreement_incident(question, plan.disagreement)
@@ -194,8 +207,9 @@ def _question(
         arm=parameters.arm,
         scene=snapshot.scene,
         q_start=snapshot.q_start if handover is None else handover.start_state.state.positions,
-        goal=snapshot.goal,
-        limits=parameters.limits,
+        # Its pace is in the limits.
+        goal=PointingGoal(snapshot.goal.target),
+        limits=limits_of(parameters.limits, snapshot.goal),
         options=parameters.options,
         margin=parameters.margin,
         ray_guard_length=parameters.ray_guard_length,

@@ -56,8 +56,8 @@ class Response:
     ----------
     is_solved : bool
         Whether a motion was published.
-    text : str
-        Code and sentence, as `error_codes.answer` writes them.
+    code, sentence
+        Of the answer.
     tool_path : callable
         Returns the tool's path; empty where no motion was published.
     conclude : callable
@@ -66,15 +66,23 @@ class Response:
     """
 
     is_solved: bool
-    text: str
+    code: ErrorCode
+    sentence: str
     tool_path: Callable[[], Path]
     conclude: Callable[[], None]
+
+    @property
+    def text(self) -> str:
+        """Code and sentence, as `error_codes.answer` writes them."""
+        return answer(self.code, self.sentence)
 
 
 class _Ticket:
     """One plan, until its motion is published or it ends without one."""
 
-    is_cancelled = False
+    def __init__(self, goal: PointingGoal | None) -> None:
+        """Begin; without a goal it is that of the last target."""
+        self.goal, self.is_cancelled = goal, False
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,13 +155,15 @@ class PlanQueue:
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
         self._n_requests = 0
+        # The goal that was given up last after a stop, and the response to its last try.
+        self._given_up: tuple[PointingGoal | None, Response | None] = None, None
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
-        future, ticket = Future(), _Ticket()
+        future, ticket = Future(), _Ticket(goal)
         self._n_requests += 1
         begin = time.perf_counter()
 
@@ -197,6 +207,24 @@ class PlanQueue:
         for ticket in ended:
             ticket.is_cancelled = True
         return len(ended)
+
+    def withdraw(self, goal: PointingGoal) -> None:
+        """Cancel what is planned for this goal, unless its motion is published already."""
+        for ticket in [ticket for ticket in self._open if ticket.goal is goal]:
+            ticket.is_cancelled = True
+            self._open.discard(ticket)
+        if self._resumption is not None and self._resumption.goal is goal:
+            self._resumption = None
+
+    def pursues(self, goal: PointingGoal) -> bool:
+        """Return whether a motion to this goal is planned, or will be after a stop."""
+        is_open = any(ticket.goal is goal for ticket in self._open.copy())
+        return is_open or self._monitor.has_stopped(goal)
+
+    def response_to_given_up(self, goal: PointingGoal) -> Response | None:
+        """Return how the last try after a stop ended, where this goal was given up then."""
+        given_up, response = self._given_up
+        return response if given_up is goal else None
 
     def close(self) -> None:
         """End all work; nothing is published afterwards, and no request may follow."""
@@ -360,7 +388,7 @@ class PlanQueue:
                 self._unseen = outcome, parameters
 
         is_solved = trajectory is not None and not self._is_closed
-        return Response(is_solved, answer(code, sentence), tool_path, conclude)
+        return Response(is_solved, code, sentence, tool_path, conclude)
 
     def _publish(
         self,
@@ -417,7 +445,7 @@ class PlanQueue:
                 self._discard_resumption()
                 duration = stop.trajectory.duration
                 self._resumption = _Resumption(
-                    _Ticket(),
+                    _Ticket(stop.goal),
                     stop.goal,
                     stop.n_motions,
                     self._n_requests,
@@ -473,6 +501,8 @@ class PlanQueue:
                 is_first=False,
             )
         else:
+            if not response.is_solved:
+                self._given_up = resumption.goal, response
             self._open.discard(ticket)
 
     def _check_stop(self, stop: Stop) -> None:
