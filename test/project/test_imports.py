@@ -74,9 +74,11 @@ SECOND_USERS = {
 # planning process before it loads the node; that process loads no kernels that are not compiled
 # yet. The node says that it compiles before it imports what has to be compiled, and so does a
 # command, which also says which libraries it misses before it imports what needs them. What only
-# one option of a command needs takes seconds to load. A playback needs kernels for stops only.
+# one option of a command needs takes seconds to load. A playback needs kernels for stops only. The
+# package of clients gives its public one where that is used.
 LATE = {
     'rrth_planner.pipeline.planning_worker',
+    'rrth_planner.ros.client',
     'rrth_planner.ros.planner',
     'rrth_planner.ros.planner_node',
     'rrth_planner.execution.playback',

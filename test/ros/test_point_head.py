@@ -2,9 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The action point_head of planner and playback, by the real control_msgs/action/PointHead."""
 
+import asyncio
 from contextlib import ExitStack
 import math
 import os
+from pathlib import Path
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -20,6 +24,9 @@ from rclpy.action import ActionClient  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import pointing_angle  # noqa: E402
+from rrth_planner.model.errors import MessageError  # noqa: E402
+from rrth_planner.ros.client import PlannerClient  # noqa: E402
+from rrth_planner.ros.client.planner_client import NotInTimeError  # noqa: E402
 from rrth_planner.ros.messages import point_head  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
@@ -33,6 +40,7 @@ from trajectory_msgs.msg import JointTrajectory  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
+EXAMPLES = Path(__file__).parents[2] / 'examples' / 'ros'
 ARM = load_arm()
 FRONT, LEFT, HIGH = (1.5, 0.1, 0.3), (0.8, 1.6, 0.6), (1.0, -0.3, 1.9)
 SUCCEEDED, CANCELED, ABORTED = (
@@ -115,6 +123,7 @@ def _client(request, ros_context):
             module = f'rrth_planner.ros.{name}_node'
             stack.enter_context(ChildProcess(module, words, lambda _: None))
         client = Client(PointHead, wait_until)
+        client.folder = folder
         stack.enter_context(spinning(client))
         wait_until(client.heads.server_is_ready, 120.0)
         wait_until(lambda: client.states)
@@ -272,6 +281,39 @@ def test_a_goal_stays_active_after_a_stop_until_it_is_given_up(client, send):
     client.wait_for_report('last code', 'GOAL_IN_COLLISION (-12)')
     assert client.speed() == 0.0
     send(client, client.body, samples.wearer())
+
+
+@pytest.mark.parametrize(
+    ('name', 'lines'),
+    [
+        ('point_at_by_service', ['SUCCESS: ', 'SUCCESS after ']),
+        ('point_at_by_action', ['rad to go', 'status 4']),
+        ('follow_by_topics', ['a motion to [']),
+    ],
+)
+def test_an_example_of_a_client_runs_and_is_short(client, name, lines):
+    file = EXAMPLES / f'{name}.py'
+    assert len(file.read_text(encoding='utf-8').splitlines()) <= 32
+    folders = [str(EXAMPLES.parents[1]), client.folder, os.environ.get('PYTHONPATH', '')]
+    done = subprocess.run(
+        [sys.executable, str(file)],
+        env={**os.environ, 'PYTHONPATH': os.pathsep.join(filter(None, folders))},
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 0, done.stderr
+    for line in lines:
+        assert line in done.stdout
+
+
+def test_the_public_client_says_what_it_was_given_and_what_it_waited_for():
+    client = PlannerClient('lonely', timeout=0.05, namespace='/nowhere')
+    with pytest.raises(MessageError, match=r'^target: .*expected .*\[m\]$'):
+        client.point_at((1.0, math.nan, 0.0))
+    for wait in (client.point_at, lambda t: asyncio.run(client.point_at_async(t))):
+        with pytest.raises(NotInTimeError, match='^service .*rrth_planner/plan: nothing for 0.05'):
+            wait((1.0, 0.0, 0.0))
 
 
 def test_without_control_msgs_no_action_is_offered(monkeypatch):

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clients of a planner: nodes that publish body and target, request motions, follow the arm."""
 
-from collections.abc import Callable, Sequence
+import asyncio
+from collections.abc import Callable, Generator, Sequence
+from functools import partial
 import time
-from typing import Any
+from typing import Any, TypeVar
 import warnings
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -20,10 +22,10 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array
+from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.client.answer_parser import answer_from_text
+from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.interface.parameters import (
     declared,
     parameters_from_values,
@@ -40,6 +42,9 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+T = TypeVar('T')
+# What is waited for, and its name, one after the other, until something comes of it.
+Waits = Generator[tuple[Callable[[], bool], str], None, T]
 NODE = 'rrth_planner'
 # Codes of a planner that lacks an input, or a recent one: that may come a moment later.
 LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE_STALE')
@@ -47,6 +52,8 @@ LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE
 PAUSE = 0.3
 # Acknowledgements are waited for so long at a time [s].
 ACKNOWLEDGED = 0.01
+# Pause between two looks for messages while other tasks run [s].
+POLLED = 0.005
 # A wearer who stands still is published so often [s].
 STANDING = 0.02
 # Of an arm at the end of a motion of the demo: greatest deviation [rad], and speed of one that is
@@ -64,16 +71,33 @@ class DemoError(RrthError):
 
 class PlannerClient(Node):
     """
-    The common part of the clients of a planner; it receives messages only while it waits.
+    A client of a planner; it receives messages only while it waits.
 
-    The timeout is the longest wait for anything [s]; `check` raises where waiting is useless.
+    `point_at` and `point_at_async` are what most programs need; rclpy is initialized before, and
+    nothing else spins the node.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    timeout : float
+        Longest wait for anything [s].
+    check : callable, optional
+        Called while it waits; raises where waiting is useless.
+    namespace : str, optional
+        Of the node, and of the planner.
+
     """
 
     def __init__(
-        self, name: str, timeout: float, check: Callable[[], None] = lambda: None
+        self,
+        name: str = 'planner_client',
+        timeout: float = 30.0,
+        check: Callable[[], None] = lambda: None,
+        namespace: str = '',
     ) -> None:
         """Create publishers, subscriptions and the client of the planner."""
-        super().__init__(name)
+        super().__init__(name, namespace=namespace)
         self.timeout, self._check = timeout, check
         # Of the arm: other joint states are ignored.
         self.joint_names: tuple[str, ...] = ()
@@ -100,6 +124,71 @@ class PlannerClient(Node):
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 
+    def point_at(
+        self, target: Sequence[float], frame: str = '', timeout: float | None = None
+    ) -> Answer:
+        """
+        Have the arm point at a target; return the planner's answer once the motion is published.
+
+        Parameters
+        ----------
+        target : sequence of three float
+            [m].
+        frame : str, optional
+            Of the target; empty: the planner's `base_frame`.
+        timeout : float, optional
+            Longest wait for each of: a planner, its acknowledgement, its answer, and for inputs
+            that the planner lacks [s]; without, that of the client.
+
+        Raises
+        ------
+        NotInTimeError
+            No planner, or none that answers.
+        MessageError
+            A coordinate that is missing or not finite.
+
+        """
+        timeout = self.timeout if timeout is None else timeout
+        return self._run(self._point_at(_target(target, frame), timeout), timeout)
+
+    async def point_at_async(
+        self, target: Sequence[float], frame: str = '', timeout: float | None = None
+    ) -> Answer:
+        """
+        Do what `point_at` does, while other tasks of asyncio run; one call at a time.
+
+        A call that is cancelled while the planner plans does not cancel the plan.
+        """
+        timeout = self.timeout if timeout is None else timeout
+        waits = self._point_at(_target(target, frame), timeout)
+        while True:
+            try:
+                condition, what = next(waits)
+            except StopIteration as end:
+                return end.value
+            limit = time.monotonic() + timeout
+            while not condition():
+                self.take_messages(0.0)
+                if time.monotonic() > limit:
+                    raise _late(what, timeout)
+                await asyncio.sleep(POLLED)
+
+    def _run(self, waits: Waits[T], timeout: float) -> T:
+        """Return what comes of some waits, each for a time at most [s]."""
+        while True:
+            try:
+                condition, what = next(waits)
+            except StopIteration as end:
+                return end.value
+            self.wait_for(condition, what, timeout)
+
+    def _point_at(self, target: PointStamped, patience: float) -> Waits[Answer]:
+        service = self.resolve_service_name(f'{NODE}/plan')
+        yield self._plan.service_is_ready, f'service {service}'
+        yield from self._publish(target)
+        response = yield from self._ask(patience)
+        return answer_from_text(response.message)
+
     def wait_for(
         self, condition: Callable[[], bool], what: str, timeout: float | None = None
     ) -> None:
@@ -109,7 +198,7 @@ class PlannerClient(Node):
         while not condition():
             self.take_messages()
             if time.monotonic() > end:
-                raise NotInTimeError(f'{what}: nothing for {timeout:g} s')
+                raise _late(what, timeout)
 
     def take_messages(self, longest: float = 0.05) -> None:
         """Receive a message, if one comes within a time [s]."""
@@ -157,14 +246,18 @@ class PlannerClient(Node):
 
     def ask(self, patience: float) -> Trigger.Response:
         """Return the planner's answer; ask again while it lacks a recent input, for a time [s]."""
+        return self._run(self._ask(patience), self.timeout)
+
+    def _ask(self, patience: float) -> Waits[Trigger.Response]:
         end = time.monotonic() + patience
         while True:
             future = self._plan.call_async(Trigger.Request())
-            self.wait_for(future.done, 'an answer of rrth_planner/plan')
+            yield future.done, 'an answer of rrth_planner/plan'
             answer = future.result()
-            if not answer.message.startswith(LACKS_INPUT) or time.monotonic() >= end:
+            now = time.monotonic()
+            if not answer.message.startswith(LACKS_INPUT) or now >= end:
                 return answer
-            self.receive_for(PAUSE)
+            yield partial(_is_later, now + PAUSE), 'an input of the planner'
 
     def count_arms(self) -> int:
         """Return the number of other subscribers of the motions."""
@@ -172,14 +265,18 @@ class PlannerClient(Node):
 
     def publish(self, message: MarkerArray | PointStamped) -> None:
         """Publish a body or a target; return once the planner has it."""
+        self._run(self._publish(message), self.timeout)
+
+    def _publish(self, message: MarkerArray | PointStamped) -> Waits[None]:
         publisher = self._publishers_by_type[type(message)]
-        self.wait_for(
-            lambda: is_matched(self, publisher), f'a reliable subscription of {publisher.topic}'
+        yield (
+            lambda: is_matched(self, publisher),
+            f'a reliable subscription of {publisher.topic}',
         )
         publisher.publish(message)
         # The request that follows must not overtake the message. Other threads and timers wait
         # meanwhile, and a reader of a program that was killed acknowledges nothing.
-        self.wait_for(
+        yield (
             lambda: publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED)),
             f'an acknowledgement of {publisher.topic}',
         )
@@ -295,6 +392,24 @@ class DemoClient(PlannerClient):
                 elif q_aims(q):
                     return
         raise DemoError(f'the arm did not aim at its target within {self.timeout:g} s: {sentence}')
+
+
+def _target(target: Sequence[float], frame: str) -> PointStamped:
+    """Return the message of a target, (3,) [m], or raise MessageError."""
+    point = frozen_array(target, (3,), 'target', 'm', MessageError)
+    message = PointStamped()
+    message.header.frame_id = frame
+    message.point.x, message.point.y, message.point.z = point.tolist()
+    return message
+
+
+def _late(what: str, timeout: float) -> NotInTimeError:
+    return NotInTimeError(f'{what}: nothing for {timeout:g} s')
+
+
+def _is_later(end: float) -> bool:
+    """Return whether the monotonic clock is past a time [s]."""
+    return time.monotonic() >= end
 
 
 def is_matched(node: Node, publisher: Publisher) -> bool:

@@ -1,0 +1,28 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Have the arm point at two targets by the planner's service, as a call and by asyncio."""
+
+import asyncio
+
+import rclpy
+from rrth_planner.ros.client import PlannerClient
+
+rclpy.init()
+client = PlannerClient(timeout=30.0)
+answer = client.point_at((1.5, 0.1, 0.3))
+print(f'{answer.code.name}: {answer.sentence}')
+
+
+async def point_and_count() -> None:
+    """Count while the planner plans."""
+    pointing = asyncio.create_task(client.point_at_async((0.8, 1.6, 0.6)))
+    n_rounds = 0
+    while not pointing.done():
+        n_rounds += 1
+        await asyncio.sleep(0.001)
+    print(f'{pointing.result().code.name} after {n_rounds} rounds of another task')
+
+
+asyncio.run(point_and_count())
+client.destroy_node()
+rclpy.shutdown()
