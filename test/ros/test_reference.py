@@ -22,6 +22,7 @@ from rrth_planner.ros.interface import (  # noqa: E402
 )
 from rrth_planner.ros.interface.posture_inputs import points_of  # noqa: E402
 from rrth_planner.ros.interface.topics import Direction, INTERFACES  # noqa: E402
+from rrth_planner.ros.messages.point_head import PointHead  # noqa: E402
 from rrth_planner.ros.middleware.parameter_declaration import OF_ROS  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.playback_node import PlaybackNode  # noqa: E402
@@ -82,6 +83,16 @@ def _node(request):
     node.destroy_node()
 
 
+# What an action consists of.
+PARTS = (
+    (Direction.SERVES, 'send_goal', '{}_SendGoal'),
+    (Direction.SERVES, 'cancel_goal', 'action_msgs/srv/CancelGoal'),
+    (Direction.SERVES, 'get_result', '{}_GetResult'),
+    (Direction.PUBLISHES, 'feedback', '{}_FeedbackMessage'),
+    (Direction.PUBLISHES, 'status', 'action_msgs/msg/GoalStatusArray'),
+)
+
+
 def offered(watcher, node):
     """Return what a node has, as (direction, resolved name, type)."""
     return {
@@ -99,6 +110,11 @@ def expected(node, name, given):
     """Return the same by the table."""
     found = set()
     for i in INTERFACES[name]:
+        if i.direction is Direction.PERFORMS:
+            action = expand_topic_name(i.name, node.get_name(), node.get_namespace())
+            for direction, part, kind in PARTS if PointHead is not None else ():
+                found.add((direction, f'{action}/_action/{part}', kind.format(i.type)))
+            continue
         if i.parameter and given[i.parameter] not in i.values:
             continue
         names = [i.name]

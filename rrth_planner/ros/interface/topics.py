@@ -1,23 +1,25 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""The topics and services of the nodes: what each is called, its type, and what it means."""
+"""The topics, services and actions of the nodes: what each is called, its type and meaning."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Direction(Enum):
-    """What a node does with a topic or a service."""
+    """What a node does with a topic, a service or an action."""
 
     SUBSCRIBES = 'subscribes'
     PUBLISHES = 'publishes'
     SERVES = 'serves'
+    # An action, where the package of its type is installed.
+    PERFORMS = 'performs'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interface:
     """
-    A topic or a service of a node.
+    A topic, a service or an action of a node.
 
     Parameters
     ----------
@@ -102,6 +104,14 @@ INTERFACES = {
             'nav_msgs/srv/GetPlan',
         ),
         _served('~/cancel', 'ends a plan in progress'),
+        _interface(
+            Direction.PERFORMS,
+            '~/point_head',
+            'control_msgs/action/PointHead',
+            'a request as a goal, which ends once the arm has arrived, and stops it where it is '
+            'cancelled; where control_msgs is installed',
+            {},
+        ),
         _served(
             '~/reset',
             'with `separation`: allows motions again after a FAULT, and with `resume: manual` '

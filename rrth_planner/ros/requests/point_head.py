@@ -23,7 +23,8 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
-from rrth_planner.ros.messages.point_head import paced_goal, PointHead
+from rrth_planner.ros.messages.paced_goal import paced_goal
+from rrth_planner.ros.messages.point_head import PointHead
 from rrth_planner.ros.middleware.qos import SERVICE
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 from rrth_planner.ros.requests.request_queue import PlanQueue
