@@ -89,7 +89,8 @@ def test_both_nodes_work_with_another_arm(wait_until, send, ask, spinning):
             other.check()
             assert pointing_error(arm, end, np.array(target)) < 1e-6
             seen = np.array([state.position for state in client.states[n_states:]])
-            assert first_contact(arm, scene, seen, RAY, MARGIN) is None
+            contact = first_contact(arm, scene, seen, RAY, MARGIN)
+            assert contact is None, (contact, seen[contact.index], len(client.motions), said)
     assert not [line for line in said if 'rejected' in line or 'ERROR' in line]
 
 

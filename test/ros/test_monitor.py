@@ -162,6 +162,11 @@ def test_a_hand_that_is_lost_in_the_way_of_a_motion_is_not_driven_into(
     assert future.result().success, future.result().message
 
 
+def off_other(q):
+    """Return by how much the ray misses the target OTHER at a configuration [m]."""
+    return pointing_error(worlds.table_1_arm(), np.array(q), np.array(OTHER))
+
+
 def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait_until, send):
     client, said = scene_of_a_motion()
     n, box = len(client.states), in_the_way(client, 1.6)
@@ -173,9 +178,9 @@ def test_a_new_target_is_planned_for_while_the_arm_stops(scene_of_a_motion, wait
     wait_until(future.done)
     # For the new target, whether the arm was at rest or in motion to the old one.
     assert future.result().success, future.result().message
-    last = client.motion().positions[-1]
-    assert pointing_error(worlds.table_1_arm(), last, np.array(OTHER)) < 1e-6
-    wait_until(lambda: client.speed() == 0.0 and np.allclose(client.states[-1].position, last))
+    assert off_other(client.motion().positions[-1]) < 1e-6
+    # On a busy machine after another stop, and then perhaps in another posture.
+    wait_until(lambda: client.speed() == 0.0 and off_other(client.states[-1].position) < 1e-6)
     q = np.array([state.position for state in client.states[n:]])
     assert reference_checker.first_contact(worlds.table_1_arm(), scene, q, 1.0, 0.0) is None
     assert not [line for line in said if 'rejected' in line]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers, seconds_of
+from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers
 from rrth_planner.ros.messages.trajectory import (
+    check_end,
     check_times,
     MOST_POINTS,
     REST_VELOCITY,
@@ -47,12 +48,7 @@ def controller_points_from_msg(
             f'points[0].time_from_start: {times[0] / NANOSECONDS}, expected >= 0 [s]'
         )
     check_times(times)
-    stamp = seconds_of(msg.header.stamp)
-    if stamp != 0.0 and stamp + times[-1] / NANOSECONDS < now:
-        raise MessageError(
-            f'header.stamp: {stamp} with a duration of {times[-1] / NANOSECONDS}, expected 0 or '
-            f'an end after the present time {now} [s]'
-        )
+    check_end(msg, now)
     if any(len(point.effort) for point in msg.points):
         raise MessageError('effort: given, expected none: the arm follows positions')
     columns = [names.index(name) for name in joint_names]

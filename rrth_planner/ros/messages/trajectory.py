@@ -92,12 +92,8 @@ def joint_trajectory_from_msg(
             'start [s]'
         )
     check_times(times)
-    stamp = seconds_of(msg.header.stamp)
-    if now is not None and stamp != 0.0 and stamp + times[-1] / NANOSECONDS < now:
-        raise MessageError(
-            f'header.stamp: {stamp} with a duration of {times[-1] / NANOSECONDS}, expected 0 or '
-            f'an end after the present time {now} [s]'
-        )
+    if now is not None:
+        check_end(msg, now)
     if any(len(point.effort) for point in msg.points):
         raise MessageError('effort: given, expected none: the arm follows positions')
     columns = [names.index(name) for name in joint_names]
@@ -129,6 +125,17 @@ def pose_to_msg(T: Array, frame: str) -> PoseStamped:
     p.x, p.y, p.z = T[:3, 3].tolist()
     o.x, o.y, o.z, o.w = quaternion_xyzw(T[:3, :3]).tolist()
     return msg
+
+
+def check_end(msg: JointTrajectory, now: float) -> None:
+    """Raise MessageError where a stamped motion has ended at a time [s]."""
+    stamp = seconds_of(msg.header.stamp)
+    duration = nanoseconds_of(msg.points[-1].time_from_start) / NANOSECONDS
+    if stamp != 0.0 and stamp + duration < now:
+        raise MessageError(
+            f'header.stamp: {stamp} with a duration of {duration}, expected 0 or an end after the '
+            f'present time {now} [s]'
+        )
 
 
 def check_times(times: Sequence[int]) -> None:
