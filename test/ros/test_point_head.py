@@ -131,6 +131,8 @@ def _client(request, ros_context):
         send(client, client.body, samples.wearer())
         yield client
         client.heads.destroy()
+    # Its publishers would give their last body to each planner of the tests after these.
+    client.destroy_node()
 
 
 def test_a_goal_is_reached_at_its_pace_and_says_how_far_it_is(client):
