@@ -1121,6 +1121,20 @@ def test_a_box_whose_lifetime_has_passed_is_named_and_nothing_is_planned(start, 
     assert stranger.answer().success
 
 
+def test_a_second_publisher_of_the_body_is_reported(start, monkeypatch):
+    planner, stranger = start()
+    warnings = []
+    monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
+    say_all(planner, stranger)
+    stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
+    other = stranger.create_publisher(MarkerArray, 'body_boxes', 10)
+    stranger.wait_until(lambda: stranger.value('publishers of the body') == '2')
+    stranger.destroy_publisher(other)
+    stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
+    (line,) = [line for line in warnings if 'publishers' in line]
+    assert 'body_boxes has 2 publishers: of each marker the last edit counts' in line, line
+
+
 @pytest.mark.parametrize('age', [1.0, 3600.0])
 def test_a_body_that_was_measured_long_ago_is_stale_however_new_the_message(start, age):
     planner, stranger = start(body_timeout=0.2)

@@ -97,6 +97,7 @@ class Reporter:
         self._published = -SHORTEST_PERIOD
         self._is_changed = False
         self._named: set[tuple[str, int]] = set()
+        self._n_publishers = 0
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
@@ -174,6 +175,7 @@ class Reporter:
             self._published, self._is_changed = time.monotonic(), False
             now = self._node.get_clock().now()
             self._warn_of_lost(now.nanoseconds * 1e-9)
+            self._warn_of_publishers()
             msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
             msg.header.stamp = now.to_msg()
             self._publisher.publish(msg)
@@ -194,6 +196,7 @@ class Reporter:
             'path length [rad]': f'{report.length:.4f}',
             'least clearance [m]': f'{report.clearance:.4f}',
             'boxes': body.n_boxes,
+            'publishers of the body': self._n_publishers,
             'lost parts': body.lost_names(),
             'allowed contacts': '; '.join(map(': '.join, self.parameters.arm.allowed)),
             'monitor': monitor,
@@ -240,6 +243,15 @@ class Reporter:
             self._node.get_logger().warning(
                 f'{self._inputs.body.topic}: lifetime of {names} expired: no new motion until '
                 'published again or deleted'
+            )
+
+    def _warn_of_publishers(self) -> None:
+        """Log where the body comes from several publishers, which may be meant, or a mistake."""
+        topic, before = self._inputs.body.topic, self._n_publishers
+        self._n_publishers = n = self._node.count_publishers(topic)
+        if n > max(before, 1):
+            self._node.get_logger().warning(
+                f'{topic} has {n} publishers: of each marker the last edit counts, whoever sent it'
             )
 
     def reject(self, code: ErrorCode, sentence: str) -> None:
