@@ -5,6 +5,7 @@
 import argparse
 from pathlib import Path
 
+from rrth_planner.cli.numbers import integer, number, number_of_runs
 from rrth_planner.cli.program import add_files, add_target, command_parser, program
 
 PLAN = """\
@@ -103,12 +104,12 @@ def plan() -> argparse.ArgumentParser:
     add_files(parser, arm='the arm (config/arm.yaml)', body=WEARER)
     add = parser.add_argument
     start = 'start configuration, one value per joint [rad or m] (folded; with --arm, all 0)'
-    add('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
+    add('--from', dest='q_from', type=number('rad or m'), nargs='+', metavar='Q', help=start)
     add_files(parser, settings='parameters of the node; defaults are those of config/planner.yaml')
-    add('--margin', type=float, metavar='M', help='clearance demanded from every box [m]')
-    add('--seed', type=int, metavar='N', help='random seed; -1: a new one each time')
+    add('--margin', type=number('m'), metavar='M', help='clearance demanded from every box [m]')
+    add('--seed', type=integer, metavar='N', help='random seed; -1: a new one each time')
     add_files(parser, output='file of the motion, .yaml or .csv')
-    add('--period', type=float, metavar='S', help='time between two points in that file [s]')
+    add('--period', type=number('s'), metavar='S', help='time between two points in that file [s]')
     add('--json', action='store_true', help='print the figures as JSON')
     return parser
 
@@ -124,15 +125,19 @@ def plot() -> argparse.ArgumentParser:
     plan = commands.add_parser('plan', help='plan a motion and draw it; needs no ROS')
     add_target(plan, 'target of the pointing ray, in the base frame [m]')
     add_files(plan, body=WEARER)
-    start = 'joint positions at the start [rad] (as in config/playback.yaml)'
-    plan.add_argument('--from', dest='q_from', type=float, nargs='+', metavar='Q', help=start)
-    plan.add_argument('--seed', type=int, help='random seed; -1: a new one (as in the settings)')
+    start = 'joint positions at the start [rad or m] (as in config/playback.yaml)'
+    plan.add_argument(
+        '--from', dest='q_from', type=number('rad or m'), nargs='+', metavar='Q', help=start
+    )
+    plan.add_argument(
+        '--seed', type=integer, help='random seed; -1: a new one (as in the settings)'
+    )
     recording = commands.add_parser('recording', help='draw a run recorded by `record`')
     add = recording.add_argument
     add('file', type=Path, metavar='FILE', help='MCAP')
     for name in ('begin', 'end'):
         what = f'{name} of the drawn interval [s]; < 0: relative to the end of the run'
-        add(f'--{name}', type=float, metavar='S', help=what)
+        add(f'--{name}', type=number('s'), metavar='S', help=what)
     add('--namespace', metavar='NAME', help='namespace, if there are several')
     frame = 'base frame of the planner (%(default)s)'
     add('--base-frame', default='torso', metavar='NAME', help=frame)
@@ -173,7 +178,7 @@ def viewer() -> argparse.ArgumentParser:
     )
     add('--host', default='127.0.0.1', help='address to listen on (%(default)s)')
     port = 'port to listen on; 0: any free one (%(default)s)'
-    add('--port', type=int, default=VIEWER_PORT, help=port)
+    add('--port', type=integer, default=VIEWER_PORT, help=port)
     add(
         '--open',
         action=argparse.BooleanOptionalAction,
@@ -220,7 +225,7 @@ def read_urdf() -> argparse.ArgumentParser:
     )
     add(
         '--mount',
-        type=float,
+        type=number('m'),
         nargs=7,
         metavar=('X', 'Y', 'Z', 'QX', 'QY', 'QZ', 'QW'),
         help="pose of the first link in the wearer's base frame [m] (the same frame)",
@@ -232,9 +237,9 @@ def read_urdf() -> argparse.ArgumentParser:
         help='shape of the links: their collision geometry, if any, or bars (%(default)s)',
     )
     radius = 'radius of links that are bars [m] (%(default)s)'
-    add('--radius', type=float, default=0.03, metavar='M', help=radius)
+    add('--radius', type=number('m'), default=0.03, metavar='M', help=radius)
     radius = 'radius of the pointing ray [m] (0; that of the links where these are bars)'
-    add('--ray-radius', type=float, metavar='M', help=radius)
+    add('--ray-radius', type=number('m'), metavar='M', help=radius)
     add(
         '--include-branches',
         action='store_true',
@@ -244,7 +249,7 @@ def read_urdf() -> argparse.ArgumentParser:
     add('--srdf', type=Path, metavar='FILE', help=srdf)
     add('--output', type=Path, required=True, metavar='FILE', help='arm file to write')
     check = 'print the tool pose at these joint positions [rad or m]'
-    add('--check', type=float, nargs='+', metavar='Q', help=check)
+    add('--check', type=number('rad or m'), nargs='+', metavar='Q', help=check)
     return parser
 
 
@@ -258,7 +263,7 @@ def write_urdf() -> argparse.ArgumentParser:
         output='file to write (default: standard output)',
     )
     radius = 'radius of bars that have none of their own [m] (default: %(default)s)'
-    parser.add_argument('--radius', type=float, default=0.015, metavar='M', help=radius)
+    parser.add_argument('--radius', type=number('m'), default=0.015, metavar='M', help=radius)
     frame = 'link that the arm is mounted on, as base_frame of the node (default: %(default)s)'
     parser.add_argument('--base-frame', default='torso', metavar='NAME', help=frame)
     return parser
@@ -281,9 +286,9 @@ def reproduce() -> argparse.ArgumentParser:
     data = 'Parquet file of the runs (reproduction.parquet in the output)'
     add('--data', type=Path, help=data)
     runs = 'timed runs per planner and map; the fewest and most are reported (10 100)'
-    add('--runs', type=_number_of_runs, nargs='+', metavar='N', help=runs)
+    add('--runs', type=number_of_runs, nargs='+', metavar='N', help=runs)
     seeds = 'runs for each share and number of draws (1000)'
-    add('--seeds', type=_number_of_runs, metavar='N', help=seeds)
+    add('--seeds', type=number_of_runs, metavar='N', help=seeds)
     add('--maps', nargs='+', metavar='NAME', help='only these maps')
     add('--targets', nargs='+', metavar='NAME', help='only these targets of the arm')
     add_where = parser.add_mutually_exclusive_group().add_argument
@@ -294,9 +299,3 @@ def reproduce() -> argparse.ArgumentParser:
     )
     add_where('--serial', action='store_true', help='run all in this process, one by one')
     return parser
-
-
-def _number_of_runs(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f'{text}, expected a number of runs of 1 or more')
-    return int(text)

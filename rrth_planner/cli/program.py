@@ -10,6 +10,7 @@ import signal
 import sys
 from typing import NoReturn
 
+from rrth_planner.cli.numbers import number
 from rrth_planner.model.errors import one_line, RrthError
 
 INTERRUPTED = 130
@@ -48,7 +49,9 @@ def add_files(parser: argparse.ArgumentParser, **helps: str) -> None:
 def add_target(parser: argparse.ArgumentParser, text: str, required: bool = True) -> None:
     """Add the option of a target, with its help."""
     xyz = ('X', 'Y', 'Z')
-    parser.add_argument('--target', type=float, nargs=3, required=required, metavar=xyz, help=text)
+    parser.add_argument(
+        '--target', type=number('m'), nargs=3, required=required, metavar=xyz, help=text
+    )
 
 
 def run(name: str, action: Callable[[], int | None], failed: int) -> int:
@@ -75,5 +78,5 @@ def interrupt_on_signals() -> None:
     def interrupt(*_: object) -> NoReturn:
         raise KeyboardInterrupt
 
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, interrupt)
+    for one in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(one, interrupt)

@@ -6,6 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
+from rrth_planner.cli.numbers import integer, number
 from rrth_planner.cli.program import command_parser
 
 # What `record` records: all topics of a planner and an arm, with their types.
@@ -90,7 +91,7 @@ def point_at() -> argparse.ArgumentParser:
     command = command_parser('point_at', POINT_AT, POINT_AT_EPILOG)
     add = command.add_argument
     for axis, direction in (('x', 'forward'), ('y', 'left'), ('z', 'up')):
-        add(axis, type=_coordinate, metavar=axis.upper(), help=f'{direction} [m]')
+        add(axis, type=number('m'), metavar=axis.upper(), help=f'{direction} [m]')
     add('--frame', metavar='NAME', help="frame of the target (the planner's base_frame: torso)")
     add(
         '--body',
@@ -103,7 +104,7 @@ def point_at() -> argparse.ArgumentParser:
     add('--no-move', action='store_true', help='plan only, and publish nothing')
     add(
         '--timeout',
-        type=_positive,
+        type=number('s', above=0.0),
         default=30.0,
         metavar='S',
         help='timeout of every wait, and of the arrival after the end of the motion [s] '
@@ -111,7 +112,7 @@ def point_at() -> argparse.ArgumentParser:
     )
     add(
         '--tolerance',
-        type=_positive,
+        type=number('rad', above=0.0),
         default=0.01,
         metavar='RAD',
         help='tolerance of each joint at the end of the motion [rad] (%(default)g)',
@@ -130,7 +131,11 @@ def record() -> argparse.ArgumentParser:
     add = command.add_argument
     add('-o', '--output', type=Path, metavar='FILE', help='new file to write (run-DATE-TIME.mcap)')
     add(
-        '--duration', type=_seconds, default=math.inf, metavar='S', help='stop after this time [s]'
+        '--duration',
+        type=number('s', above=0.0),
+        default=math.inf,
+        metavar='S',
+        help='stop after this time [s]',
     )
     add(
         '--topics',
@@ -153,23 +158,23 @@ def wearer() -> argparse.ArgumentParser:
         default='boxes',
         help='boxes on body_boxes (default), SPHERE markers on markers, or a PoseArray on poses',
     )
-    for name, text, default in (
-        ('rate', 'speed of the motion; 1: as recorded, 0: he stands', 1.0),
-        ('fps', 'measurements per second [1/s]', 60.0),
-        ('latency', 'from a measurement until it is published, with the old stamp [s]', 0.0),
-        ('drop', 'share of the measurements that are lost, 0 to below 1', 0.0),
-        ('noise', 'standard deviation of each coordinate of the points [m]', 0.0),
-        ('begin', 'start of what is played; 0.1 leaves out a T-pose at the start [s]', 0.0),
+    for name, text, unit, default in (
+        ('rate', 'speed of the motion; 1: as recorded, 0: he stands', '-', 1.0),
+        ('fps', 'measurements per second', '1/s', 60.0),
+        ('latency', 'from a measurement until it is published, with the old stamp', 's', 0.0),
+        ('drop', 'share of the measurements that are lost, 0 to below 1', '-', 0.0),
+        ('noise', 'standard deviation of each coordinate of the points', 'm', 0.0),
+        ('begin', 'start of what is played; 0.1 leaves out a T-pose at the start', 's', 0.0),
     ):
         add(
             f'--{name}',
-            type=_finite,
+            type=number(unit),
             default=default,
             metavar='X',
-            help=f'{text} (%(default)g)',
+            help=f'{text} [{unit}] (%(default)g)',
         )
-    add('--end', type=_finite, metavar='X', help='end of what is played [s]')
-    add('--seed', type=int, default=0, help='of noise and losses (%(default)s)')
+    add('--end', type=number('s'), metavar='X', help='end of what is played [s]')
+    add('--seed', type=integer, default=0, help='of noise and losses (%(default)s)')
     add(
         '--skeleton',
         default='cmu_bvh',
@@ -191,8 +196,13 @@ def demo() -> argparse.ArgumentParser:
     )
     add = command.add_argument
     add('--output', type=Path, default=Path('demo.png'), help='picture file (%(default)s)')
-    add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')
-    add('--timeout', type=_positive, default=180.0, help='timeout of every wait [s] (%(default)s)')
+    add('--seed', type=integer, default=1, help='random seed of the planner; -1: a new one')
+    add(
+        '--timeout',
+        type=number('s', above=0.0),
+        default=180.0,
+        help='timeout of every wait [s] (%(default)s)',
+    )
     add('--body', default='body', metavar='NAME', help='msg_examples/NAME.yaml (%(default)s)')
     add(
         '--targets',
@@ -221,19 +231,22 @@ def simulate() -> argparse.ArgumentParser:
         help='a person who moves, or boxes that do not (%(default)s)',
     )
     add('--file', type=Path, metavar='FILE', help='his recording, or his boxes (those that come)')
-    add('--begin', type=_finite, default=0.0, metavar='S', help='start of --file (%(default)g)')
-    add('--end', type=_finite, default=0.0, metavar='S', help='its end [s]; 0: to the end')
+    begin = 'start of --file [s] (%(default)g)'
+    add('--begin', type=number('s'), default=0.0, metavar='S', help=begin)
+    add('--end', type=number('s'), default=0.0, metavar='S', help='its end [s]; 0: to the end')
     add('--skeleton', default='cmu_bvh', metavar='NAME', help='of --file (%(default)s)')
     add(
         '--lag',
-        type=_positive,
+        type=number('m', above=0.0),
         default=0.01,
         metavar='M',
         help='by so much the servos lag at top speed [m] (%(default)g)',
     )
-    add('--payload', type=_finite, default=0.2, metavar='KG', help='at the tool (%(default)g)')
-    add('--seed', type=int, default=1, help='random seed of the planner; -1: a new one')
-    add('--seconds', type=_seconds, default=math.inf, metavar='S', help='how long (until Ctrl-C)')
+    payload = 'at the tool [kg] (%(default)g)'
+    add('--payload', type=number('kg'), default=0.2, metavar='KG', help=payload)
+    add('--seed', type=integer, default=1, help='random seed of the planner; -1: a new one')
+    seconds = 'how long [s] (until Ctrl-C)'
+    add('--seconds', type=number('s', above=0.0), default=math.inf, metavar='S', help=seconds)
     add('--video', type=Path, metavar='FILE', help='render the run to a .gif or .mp4')
     add(
         '--viewer',
@@ -241,7 +254,7 @@ def simulate() -> argparse.ArgumentParser:
         default=None,
         help='show it in the browser (unless there is --video)',
     )
-    add('--port', type=int, default=8081, help='of the viewer (%(default)s)')
+    add('--port', type=integer, default=8081, help='of the viewer (%(default)s)')
     add(
         '--open',
         action=argparse.BooleanOptionalAction,
@@ -249,35 +262,3 @@ def simulate() -> argparse.ArgumentParser:
         help='open the viewer in the browser (if there is a display)',
     )
     return command
-
-
-def _coordinate(text: str) -> float:
-    return _number(text, 'a coordinate, a finite number [m]')
-
-
-def _finite(text: str) -> float:
-    return _number(text, 'a finite number')
-
-
-def _positive(text: str) -> float:
-    value = _number(text, 'a number > 0')
-    if value <= 0.0:
-        raise argparse.ArgumentTypeError(f'{text}, expected a number > 0')
-    return value
-
-
-def _number(text: str, expected: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'"{text}", expected {expected}')
-    return value
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not value > 0.0:
-        raise argparse.ArgumentTypeError(f'{text}, expected a time > 0 [s]')
-    return value

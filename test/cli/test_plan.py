@@ -94,8 +94,6 @@ def test_a_refusal_is_a_sentence_and_leaves_no_file(tmp_path, capsys):
     ('arguments', 'words'),
     [
         (['--from', '1', '2'], '--from: 2 values, expected 4, one for each'),
-        (['--from', '1', '2', 'nan', '0'], 'finite'),
-        (['--target', 'inf', '0', '0'], 'target'),
         (['--margin', '-1'], 'margin: -1.0, expected'),
         (['--seed', '-7'], 'seed: -7, expected -1 to'),
         (['--output', 'motion.txt'], '.yaml or .csv'),

@@ -236,9 +236,7 @@ def test_what_is_no_arm_is_rejected_in_a_sentence(tmp_path, capsys, words):
         (['--base', 'lamp'], 'no joint moves'),
         (['--ray', 'up'], 'expected one of +x'),
         (['--radius', '-1'], 'radius: -1.0, expected a length >= 0'),
-        (['--radius', 'nan'], 'radius: nan'),
         (['--mount', '0', '0', '0', '0', '0', '0', '0'], 'not all 0'),
-        (['--mount', '0', '0', 'inf', '0', '0', '0', '1'], 'finite'),
         (['--check', '1', '2'], '--check: 2 values, expected 6, one for each'),
         # The first joint alone sweeps a cone.
         (['--tool', 'turret'], 'expected 2: the ray sweeps a surface'),

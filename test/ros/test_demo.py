@@ -101,4 +101,4 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path, call, arguments, words)
 def test_no_timeout_at_all_is_rejected(tmp_path, call):
     ended = call(demo.main, '--output', tmp_path / 'motions.png', '--timeout', '0')
     assert ended.returncode == 2
-    assert '--timeout: 0, expected a number > 0' in ended.stderr
+    assert '--timeout: 0, expected a number > 0 [s]' in ended.stderr

@@ -268,9 +268,9 @@ def test_it_can_be_interrupted(bystander, wait_until):
     ('arguments', 'words'),
     [
         (['1', '2'], 'Z'),
-        (['1', 'two', '3'], '"two", expected a coordinate'),
-        (['1', 'nan', '3'], '"nan", expected a coordinate'),
-        (['1', '2', '3', '--timeout', '0'], '--timeout: 0, expected a number > 0'),
+        (['1', 'two', '3'], '"two", expected a finite number [m]'),
+        (['1', 'nan', '3'], 'nan, expected a finite number [m]'),
+        (['1', '2', '3', '--timeout', '0'], '--timeout: 0, expected a number > 0 [s]'),
         (['1', '2', '3', '--body', '/nowhere.yaml'], '--body: file /nowhere.yaml'),
         (['1', '2', '3', '--body', str(resource_path('config/arm.yaml'))], 'no body, expected'),
         (['1', '2', '3', '--ros-args', '-r', 'nonsense'], '--ros-args'),

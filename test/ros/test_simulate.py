@@ -54,7 +54,7 @@ def test_the_target_moves_slowly_and_stays_before_the_wearer():
     [
         (['--video', 'run.gif'], 2, '--video: given without --seconds'),
         (['--video', 'run.avi', '--seconds', '1'], 1, 'ends in .gif or .mp4'),
-        (['--lag', '0'], 2, '--lag: 0, expected a number > 0'),
+        (['--lag', '0'], 2, '--lag: 0, expected a number > 0 [m]'),
     ],
 )
 def test_what_is_wrong_is_said(call, arguments, code, words):
