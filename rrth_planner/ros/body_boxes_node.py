@@ -6,14 +6,10 @@ from collections.abc import Callable
 import sys
 from typing import Any
 
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
-from rrth_planner.model.errors import MessageError, RrthError, SceneError
+from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.ros.interface.posture_inputs import create_input
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
 from rrth_planner.ros.interface.tracker_reporter import TrackerReporter
@@ -21,6 +17,7 @@ from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.posture import TrackedPosture
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
+from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
 from visualization_msgs.msg import MarkerArray
@@ -77,28 +74,14 @@ class BodyBoxesNode(Node):
         return self._markers.message(scene, own or settings.base_frame, stamp), lost
 
 
+def _run(node: BodyBoxesNode) -> None:
+    settle_interpreter()
+    spin(node)
+
+
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal; return the exit code."""
-    node = None
-    try:
-        rclpy.init(args=args)
-        node = BodyBoxesNode()
-        settle_interpreter()
-        spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (RrthError, ParameterException) as problem:
-        get_logger(NAME).fatal(f'cannot start: {" ".join(str(problem).split())}')
-        return 1
-    except Exception:
-        # A signal between two statements of a callback leaves publishers without a context.
-        if rclpy.ok():
-            raise
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run_node(NAME, BodyBoxesNode, _run, args)
 
 
 if __name__ == '__main__':

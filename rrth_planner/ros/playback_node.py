@@ -15,8 +15,6 @@ from geometry_msgs.msg import PoseStamped
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
@@ -30,12 +28,14 @@ from rrth_planner.ros.interface.playback_parameters import (
 )
 from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg, pose_to_msg
+from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded
 from rrth_planner.ros.middleware.qos import SERVICE, SUPERVISED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
+NAME = 'arm_playback'
 # Longer trajectories are not decoded, which would delay the joint states.
 MOST_BYTES = 2 * 1024 * 1024
 # Motions are reported at most this often [s].
@@ -49,7 +49,7 @@ class PlaybackNode(Node):
 
     def __init__(self, **options: Any) -> None:
         """Declare parameters and interfaces; bad values raise, naming the parameter."""
-        super().__init__('arm_playback', **options)
+        super().__init__(NAME, **options)
         self._arm = declare_playback_parameters(self)
         self._base_frame: str = self.get_parameter('base_frame').value
         self._playback = standing(initial_positions(self, self._arm))
@@ -191,30 +191,16 @@ def _load_stops() -> None:
     gc.freeze()
 
 
+def _run(node: PlaybackNode) -> None:
+    Thread(target=_load_stops, name='stops').start()
+    rclpy.spin(node)
+
+
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal; return the exit code."""
-    node = None
     # Kernels are plain Python here: a stop is found in some 20 ms, and nothing is compiled.
     os.environ['NUMBA_DISABLE_JIT'] = '1'
-    try:
-        rclpy.init(args=args)
-        node = PlaybackNode()
-        Thread(target=_load_stops, name='stops').start()
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (RrthError, ParameterException) as problem:
-        print(f'arm_playback: {" ".join(str(problem).split())}', file=sys.stderr)
-        return 1
-    except Exception:
-        # A signal between two statements of a callback leaves publishers without a context.
-        if rclpy.ok():
-            raise
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run_node(NAME, PlaybackNode, _run, args)
 
 
 if __name__ == '__main__':

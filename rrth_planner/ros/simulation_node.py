@@ -15,13 +15,11 @@ import numpy as np
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rrth_planner.model.arm import tool_pose
-from rrth_planner.model.errors import MessageError, RrthError, SceneError
+from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.ros.interface.simulation_parameters import (
     declare_simulation_parameters,
     simulated_arm,
@@ -33,6 +31,7 @@ from rrth_planner.ros.messages.diagnostics import status_to_msg
 from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.tracked_person import LIFETIME
+from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded
 from rrth_planner.simulation.physics_model import RATE
 from rrth_planner.simulation.simulated_arm import PERIOD
@@ -40,6 +39,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
+NAME = 'arm_simulation'
 # Longer trajectories are not decoded.
 MOST_BYTES = 2 * 1024 * 1024
 # Motions are reported at most this often [s].
@@ -59,7 +59,7 @@ class SimulationNode(Node):
 
     def __init__(self, **options: Any) -> None:
         """Declare parameters and interfaces, and begin; bad values raise, naming the parameter."""
-        super().__init__('arm_simulation', **options)
+        super().__init__(NAME, **options)
         self._thread: Thread | None = None
         self._arm = declare_simulation_parameters(self)
         value = {name: self.get_parameter(name).value for name in ('rate', 'body_rate')}
@@ -255,25 +255,7 @@ def _to_msg(stamp: float) -> Any:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal; return the exit code."""
-    node = None
-    try:
-        rclpy.init(args=args)
-        node = SimulationNode()
-        rclpy.spin(node)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (RrthError, ParameterException) as problem:
-        print(f'arm_simulation: {" ".join(str(problem).split())}', file=sys.stderr)
-        return 1
-    except Exception:
-        # A signal between two statements of a callback leaves publishers without a context.
-        if rclpy.ok():
-            raise
-    finally:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run_node(NAME, SimulationNode, rclpy.spin, args)
 
 
 if __name__ == '__main__':

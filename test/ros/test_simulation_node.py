@@ -210,5 +210,5 @@ def test_bad_parameters_end_it_with_one_sentence(call, words, said):
     ended = call(lambda args: main(['simulation_node', *args]), '--ros-args', *words)
     assert ended.returncode == 1
     line = ended.stderr.splitlines()[-1]
-    assert line.startswith('arm_simulation: ')
+    assert '[arm_simulation]: cannot start: ' in line
     assert said in line
