@@ -1,8 +1,14 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 
+from ament_index_python.packages import get_packages_with_prefixes
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription
+from launch.actions import (
+    DeclareLaunchArgument,
+    ExecuteProcess,
+    IncludeLaunchDescription,
+    LogInfo,
+)
 from launch.conditions import IfCondition
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import (
@@ -40,6 +46,14 @@ def include(name, params_file):
             'use_sim_time': LaunchConfiguration('use_sim_time'),
         }.items(),
     )
+
+
+def rviz(condition, **arguments):
+    """Start RViz where it is installed; else say that it is not."""
+    if 'rviz2' in get_packages_with_prefixes():
+        return Node(package='rviz2', executable='rviz2', condition=condition, **arguments)
+    missing = 'RViz is not installed and not started: apt install ros-jazzy-rviz2, or rviz:=false'
+    return LogInfo(msg=missing, condition=condition)
 
 
 def generate_launch_description():
@@ -83,7 +97,7 @@ def generate_launch_description():
             DeclareLaunchArgument(
                 'rviz',
                 default_value='true',
-                description='Start RViz, where the tool Publish Point says the target.',
+                description='Start RViz, if installed; its tool Publish Point says the target.',
             ),
             DeclareLaunchArgument(
                 'rviz_config',
@@ -113,14 +127,12 @@ def generate_launch_description():
                 condition=IfCondition(NotEqualsSubstitution(body_file, '')),
                 output='log',
             ),
-            Node(
-                package='rviz2',
-                executable='rviz2',
+            rviz(
+                IfCondition(LaunchConfiguration('rviz')),
                 namespace=namespace,
                 arguments=['-d', LaunchConfiguration('rviz_config')],
                 remappings=[(f'/{topic}', topic) for topic in RVIZ_TOPICS],
                 parameters=[{'use_sim_time': use_sim_time}],
-                condition=IfCondition(LaunchConfiguration('rviz')),
                 output='log',
             ),
         ]

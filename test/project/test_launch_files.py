@@ -15,10 +15,17 @@ from rrth_planner.io.text_file import load_yaml
 import yaml
 
 ROOT = Path(__file__).parents[2]
+# What the launch files of single nodes share.
+SHARED = 'rrth_planner.ros.middleware.node_launch'
 FILES = sorted((ROOT / 'launch').glob('*.py'))
 NAMES = {
     'launch': ['LaunchDescription'],
-    'launch.actions': ['DeclareLaunchArgument', 'ExecuteProcess', 'IncludeLaunchDescription'],
+    'launch.actions': [
+        'DeclareLaunchArgument',
+        'ExecuteProcess',
+        'IncludeLaunchDescription',
+        'LogInfo',
+    ],
     'launch.conditions': ['IfCondition'],
     'launch.launch_description_sources': ['PythonLaunchDescriptionSource'],
     'launch.substitutions': [
@@ -49,6 +56,20 @@ def stand_in(monkeypatch):
         for name in names:
             setattr(made, name, lambda *a, _name=name, **k: Said(_name, a, k))
         monkeypatch.setitem(sys.modules, module, made)
+    monkeypatch.delitem(sys.modules, SHARED, raising=False)
+    yield
+    # It has imported the stand-in.
+    sys.modules.pop(SHARED, None)
+
+
+@pytest.fixture(autouse=True, name='packages')
+def _packages(monkeypatch):
+    """Return the installed packages, as ament lists them: RViz, whether it is here or not."""
+    index = ModuleType('ament_index_python.packages')
+    found = {'rviz2': '/opt/ros/jazzy'}
+    index.get_packages_with_prefixes = lambda: found
+    monkeypatch.setitem(sys.modules, 'ament_index_python.packages', index)
+    return found
 
 
 def value(said, configuration):
@@ -152,6 +173,16 @@ def test_the_demo_does_without_rviz_and_body(stand_in):
         'playback_node',
         'robot_state_publisher',
     ]
+
+
+def test_the_demo_says_that_rviz_is_not_installed_and_goes_on(stand_in, packages):
+    packages.clear()
+    *others, (name, kwargs) = launched(ROOT / 'launch' / 'demo_launch.py', {})
+    assert name == 'LogInfo'
+    assert kwargs['msg'].startswith('RViz is not installed and not started: ')
+    assert [name for name, _ in others] == ['Node'] * 3 + ['ExecuteProcess']
+    (*_, (name, _)) = launched(ROOT / 'launch' / 'demo_launch.py', {'rviz': 'false'})
+    assert name == 'ExecuteProcess'
 
 
 def test_arguments_of_the_demo_reach_the_nodes(stand_in):
