@@ -1,44 +1,9 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
-from launch_ros.substitutions import FindPackageShare
+from rrth_planner.ros.middleware.node_launch import node_launch
 
 
 def generate_launch_description():
     """Start the node that makes boxes of what a tracker sees of the wearer."""
-    params_file = PathJoinSubstitution(
-        [FindPackageShare('rrth_planner'), 'config', 'body_boxes.yaml']
-    )
-    use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument(
-                'namespace',
-                default_value='',
-                description='Namespace of the node and of its topics and services.',
-            ),
-            DeclareLaunchArgument(
-                'params_file',
-                default_value=params_file,
-                description='Full path of the YAML file with the parameters of the node.',
-            ),
-            DeclareLaunchArgument(
-                'use_sim_time',
-                default_value='false',
-                description='Take the time from /clock instead of from the system.',
-            ),
-            Node(
-                package='rrth_planner',
-                executable='body_boxes_node',
-                name='body_boxes_node',
-                namespace=LaunchConfiguration('namespace'),
-                parameters=[LaunchConfiguration('params_file'), {'use_sim_time': use_sim_time}],
-                output='screen',
-            ),
-        ]
-    )
+    return node_launch('body_boxes_node', 'body_boxes_node', 'body_boxes.yaml')

@@ -39,7 +39,7 @@ ROS_ROOMS = ('messages', 'middleware', 'interface', 'monitor', 'requests', 'clie
 ROS = {'rclpy', 'tf2_ros', 'builtin_interfaces', 'rcl_interfaces', 'std_srvs', 'rosidl_parser'}
 LIBRARIES = {
     'kernels': {'numba'},
-    'ros': {*ROS, 'tqdm'},
+    'ros': {*ROS, 'tqdm', 'launch', 'launch_ros'},
     'visualization': {'matplotlib', 'mpl_toolkits', 'viser'},
     'simulation': {'mujoco'},
     'reproduction': {'matplotlib'},
