@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.colors import to_rgb
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.reference_checker import bar_box_contact
@@ -28,6 +29,8 @@ N_DRAWN = 16
 AIMED = 0.01
 # How large the space is drawn, and the width of the picture over its height.
 ZOOM, SHAPE = 0.93, 1.35
+# Of a label from what it names [m].
+LABEL_OFFSET = 0.04
 # Segments that a line is cut into; each is hidden or visible as a whole.
 N_SEGMENTS = 40
 FAR = 50.0
@@ -169,12 +172,18 @@ def draw_configurations(
     draw_line(poses[:, :3, 3], PATH, 1.8, 0.95)
     draw_line(first_ray, START, 1.2, 0.7)
     draw_line(ray, GOAL, 1.8, 0.95)
-    ends = [(outlines[0], START, names[0], -0.14), (outlines[-1], GOAL, names[1], 0.07)]
-    stops = [(arm_points(arm, row), STOP, '', 0.0) for row in q_stops]
-    for outline, colour, name, offset in (*stops, *ends):
+    ends = [(outlines[0], START), (outlines[-1], GOAL)]
+    for outline, colour in (*((arm_points(arm, row), STOP) for row in q_stops), *ends):
         draw_line(outline, colour, 5.0, 1.0)
         axes.plot(*outline.T, ls='', marker='o', ms=4.5, color=colour, mec='white', zorder=VISIBLE)
-        axes.text(*outline[-1] + [0.0, 0.0, offset], name, color=colour, fontsize=9, zorder=9)
+    # The upper label is above its tool in the picture and the lower one below, so they are apart.
+    heights = [proj_transform(*outline[-1], axes.get_proj())[1] for outline, _ in ends]
+    sides = ((-1.0, 'top'), (1.0, 'bottom'))
+    if heights[0] > heights[1]:
+        sides = sides[::-1]
+    for (outline, colour), name, (side, align) in zip(ends, names, sides, strict=True):
+        place = {'ha': 'center', 'va': align, 'color': colour, 'fontsize': 9, 'zorder': 9}
+        axes.text(*outline[-1] + [0.0, 0.0, side * LABEL_OFFSET], name, **place)
     if target is None:
         return
     star = {'marker': '*', 'ms': 17, 'color': '#f2b705', 'mec': '#5c4600'}

@@ -12,6 +12,7 @@ pytest.importorskip('matplotlib')
 from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
+from mpl_toolkits.mplot3d.proj3d import proj_transform  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.model.arm import forward_kinematics, tool_pose  # noqa: E402
 from rrth_planner.model.scene import Box, Scene  # noqa: E402
@@ -146,3 +147,28 @@ def test_the_drawn_arm_goes_from_the_mount_through_all_frames():
     corners = points[1::2]
     lengths = np.linalg.norm(points[2::2] - corners, axis=1)
     np.testing.assert_allclose(lengths, np.abs(ARM.dh[:, 3]), atol=1e-12)
+
+
+def seen_place(text, axes):
+    """Return where a label in space is in the picture [pixel]."""
+    x, y, _ = proj_transform(*text.get_position_3d(), axes.get_proj())
+    text.set_position((x, y))
+    return text.get_window_extent()
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_the_labels_of_start_and_goal_never_overlap(seed):
+    rng = np.random.default_rng(seed)
+    # Near one another, in height too, as where the arm turns a little: at the same place at worst.
+    q_end = FOLDED + rng.normal(size=4) * seed / 10.0
+    figure = Figure()
+    canvas, axes = FigureCanvasAgg(figure), figure.add_subplot(projection='3d')
+    q = np.array([FOLDED, q_end])
+    draw_configurations(axes, ARM, SCENE, q, q, None, 1.0, names=('first', 'last'))
+    canvas.draw()
+    first, last = (seen_place(text, axes) for text in axes.texts)
+    assert [text.get_text() for text in axes.texts] == ['first', 'last']
+    for place in (first, last):
+        assert figure.bbox.containsx(place.x0) and figure.bbox.containsy(place.y0)
+        assert place.width > 10.0 and place.height > 5.0
+    assert not first.overlaps(last)
