@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').rglob('*.md'))]
 PAGES += [ROOT / name for name in ('CONTRIBUTING.md', 'QUALITY_DECLARATION.md')]
+PAGES += sorted((ROOT / '.github').glob('*.md'))
 IMAGE = re.compile(r'!\[[^\]]*\]\(([^)\s]+)\)')
 LINK = re.compile(r'(?<!!)\[[^\]]*\]\(([^)\s]+)\)')
 # A command in backticks, as one would type it.
