@@ -95,7 +95,7 @@ setup(
     project_urls={url.get('type', 'website'): url.text for url in manifest.findall('url')},
     keywords=['motion planning', 'collision checking', 'wearable robotics', 'RRT', 'ROS 2'],
     classifiers=[
-        'Development Status :: 4 - Beta',
+        'Development Status :: 5 - Production/Stable',
         'Intended Audience :: Science/Research',
         'Operating System :: POSIX :: Linux',
         'Programming Language :: Python :: 3',

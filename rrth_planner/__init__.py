@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from rrth_planner.timing.braking import brake as brake, certify_braking as certify_braking
     from rrth_planner.timing.parameterization import parameterize as parameterize
 
-__version__ = '0.1.0'
+__version__ = '1.0.0'
 
 # The names of each module.
 _PUBLIC = {

@@ -1,12 +1,13 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""What package.xml declares is what the code imports and the launch files start."""
+"""What ROS reads of the package: dependencies that the code has, and a changelog by versions."""
 
 import ast
 from pathlib import Path
 import re
 import sys
 
+from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 import pytest
 
@@ -60,3 +61,20 @@ def test_the_manifest_declares_what_is_imported_and_started_and_nothing_else(wit
     shown = {name for name in needed if name.startswith('rviz')}
     assert 'rviz2' in shown
     assert declared(with_rviz) == (needed if with_rviz else needed - shown)
+
+
+def test_the_changelog_has_the_version_of_the_manifest_on_top_and_groups_its_changes():
+    text = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    # Between two releases, what is to come is above, as Forthcoming.
+    released = re.findall(r'^(\d+\.\d+\.\d+) \(\d{4}-\d\d-\d\d\)$', text, re.MULTILINE)
+    assert released == sorted(released, key=lambda version: [*map(int, version.split('.'))])[::-1]
+    assert released[0] == parse_package(str(ROOT / 'package.xml')).version
+    changelog = get_changelog_from_path(str(ROOT), package_name='rrth_planner')
+    for version in released:
+        assert changelog.get_date_of_version(version) is not None
+        groups = re.findall(
+            r'^\* (.*)', str(changelog.get_content_of_version(version)[-1]), re.MULTILINE
+        )
+        assert groups
+        for group in groups:
+            assert re.match(r'(Added|Changed|Removed|Fixed)\b', group), group
