@@ -6,6 +6,7 @@ import ast
 from graphlib import TopologicalSorter
 import os
 from pathlib import Path
+import re
 import subprocess
 import sys
 
@@ -155,6 +156,19 @@ def graph_of_modules():
         - {'rrth_planner'}
         for module, file in MODULES.items()
     }
+
+
+def test_contributing_has_the_same_table():
+    page = (ROOT.parent / 'CONTRIBUTING.md').read_text(encoding='utf-8')
+    rows = re.findall(r'^\| `rrth_planner/(\w+)/` \|.*\| ([^|]+) \|$', page, re.MULTILINE)
+    assert [room for room, _ in rows] == [*MAY]
+    for room, cell in rows:
+        others, _, libraries = cell.partition(';')
+        listed = set(MAY) - {room} if others == 'everything' else set(others.split(', '))
+        assert listed - {'nothing of the project'} == set(MAY[room].split()), room
+        if room in {'kernels', 'simulation', 'visualization', 'reproduction'}:
+            assert set(libraries.strip().split(', ')) == LIBRARIES[room] - {'mpl_toolkits'}
+    assert f'those before it: {", ".join(ROS_ROOMS)};' in ' '.join(page.split())
 
 
 def test_imports_are_acyclic():
