@@ -217,8 +217,8 @@ def depths(boxes, points, found):
     Write by how much each box would have to shrink on every side for each bar to be clear.
 
     boxes (15, m): a column for each box, its axes, offset and half sizes as from `boxes.rows_of`;
-    points (n, n_bars, 8): the bars of the arm in n configurations, each its start, one number, its
-    end and its radius [m]; found (n, n_bars, m) [m], < 0: apart.
+    points (n, n_bars, 8): the bars of the arm in n configurations, each its start, half its length
+    (not read), its end and its radius [m]; found (n, n_bars, m) [m], < 0: apart.
     """
     middle, along, half = np.empty(3), np.empty(3), np.empty(3)
     for k in range(points.shape[0]):
