@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
-from rrth_planner.model.errors import RrthError
-from rrth_planner.reproduction.row_store import replace_file
+from rrth_planner.io.parquet_file import read_table, replace_file, write_table
 
 from benchmarks.common.task import Row
 
@@ -44,22 +42,14 @@ def read_rows(path: Path) -> list[Row]:
         The file holds no rows of the benchmarks.
 
     """
-    if not path.exists():
-        return []
-    try:
-        rows: list[Row] = pq.read_table(path).select(SCHEMA.names).cast(SCHEMA).to_pylist()
-    except (pa.ArrowException, KeyError, ValueError, OSError) as problem:
-        raise RrthError(
-            f'file {path}: {" ".join(str(problem).split())}; expected rows of the benchmarks'
-        ) from problem
+    rows: list[Row] = read_table(path, SCHEMA, 'rows of the benchmarks').to_pylist()
     return rows
 
 
 def write_rows(path: Path, rows: Sequence[Row]) -> None:
     """Write all rows at once, or leave the file as it is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     table = pa.Table.from_pylist([{n: r.get(n) for n in SCHEMA.names} for r in rows], SCHEMA)
-    replace_file(path, lambda target: pq.write_table(table, target, compression='zstd'))
+    write_table(path, table)
 
 
 def write_summary(path: Path, header: Sequence[str], lines: Sequence[Sequence[Any]]) -> None:

@@ -17,10 +17,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rrth_planner.io.parquet_file import replace_file
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import sample, Trajectory
-from rrth_planner.reproduction.row_store import replace_file
 from rrth_planner.ros.messages.fields import nanoseconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.middleware.child_process import ChildProcess

@@ -9,8 +9,8 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 import numpy as np
+from rrth_planner.io.parquet_file import replace_file
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
-from rrth_planner.reproduction.row_store import replace_file
 
 from benchmarks.common.controller_curve import curve_of, derivative, instants
 from benchmarks.common.task import Row

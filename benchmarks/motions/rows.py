@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from rrth_planner.io.parquet_file import write_table
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
-from rrth_planner.reproduction.row_store import replace_file
 
 from benchmarks.common.controller_curve import Curve, curve_of, derivative, instants
 from benchmarks.common.fcl_checker import least_distance, PERIOD
@@ -140,6 +140,5 @@ def read_motions(path: Path) -> list[Row]:
 
 def write_motions(path: Path, rows: Sequence[Row]) -> None:
     """Write all rows at once, or leave the file as it is."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     table = pa.Table.from_pylist([{n: r.get(n) for n in SCHEMA.names} for r in rows], SCHEMA)
-    replace_file(path, lambda target: pq.write_table(table, target, compression='zstd'))
+    write_table(path, table)

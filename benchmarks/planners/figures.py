@@ -8,8 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 import numpy as np
+from rrth_planner.io.parquet_file import replace_file
 from rrth_planner.model.arrays import Array
-from rrth_planner.reproduction.row_store import replace_file
 
 from benchmarks.common.queries import MAPS, QUERIES
 from benchmarks.common.task import Row

@@ -37,11 +37,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except RrthError as problem:
         say('reproduce', str(problem))
         return 2
-    from rrth_planner.reproduction.cluster import cluster_client, run_campaign
+    from rrth_planner.io.cluster import cluster_client
+    from rrth_planner.io.parquet_file import replace_file
+    from rrth_planner.reproduction.cluster import run_campaign
     from rrth_planner.reproduction.experiments import spread_runs, timed_runs
     from rrth_planner.reproduction.figures.all import draw_pictures
     from rrth_planner.reproduction.report import report
-    from rrth_planner.reproduction.row_store import read_rows, replace_file
+    from rrth_planner.reproduction.row_store import read_rows
     from rrth_planner.reproduction.run import processor_name, source_digest
     from rrth_planner.reproduction.statistics import Rows
 

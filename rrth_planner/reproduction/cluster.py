@@ -10,22 +10,15 @@ seeds from the cluster.
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-import logging
 from pathlib import Path
-import sys
-import tempfile
-import time
 from typing import Any
 
+from rrth_planner.io.cluster import collect, in_order
 from rrth_planner.reproduction.row_store import append_rows, CLUSTER, finished_keys, SERIAL
 from rrth_planner.reproduction.run import execute, Row, Run
-from tqdm import tqdm
 
 # Runs in a task: tasks must take far longer than the millisecond or so that dask spends on one.
 BATCH = 10
-# Rows are saved at least so often: what an interruption may lose [s].
-SAVE_PERIOD = 20.0
 
 
 def run_campaign(
@@ -44,7 +37,7 @@ def run_campaign(
     path : Path
         The Parquet file of the campaign.
     client : distributed.Client
-        Where to run, see `cluster_client`; None: here, one after another.
+        Where to run, see `io.cluster`; None: here, one after another.
     timed : bool
         Times matter: what was done beside other runs is done again.
     label : str
@@ -57,51 +50,14 @@ def run_campaign(
         return 0
     one_by_one = ([execute(run, SERIAL)] for run in pending)
     results = one_by_one if client is None else _on_cluster(pending, client)
-    rows: list[Row] = []
-    saved = time.monotonic()
-    with tqdm(
-        total=len(pending), desc=label, unit='run', file=sys.stderr, mininterval=1.0
-    ) as progress:
-        try:
-            for batch in results:
-                rows.extend(batch)
-                progress.update(len(batch))
-                if time.monotonic() - saved > SAVE_PERIOD:
-                    append_rows(path, rows)
-                    rows, saved = [], time.monotonic()
-        finally:
-            # Also when interrupted.
-            if rows:
-                append_rows(path, rows)
+    collect(
+        results,
+        lambda lots: append_rows(path, [row for rows in lots for row in rows]),
+        total=len(pending),
+        label=label,
+        unit='run',
+    )
     return len(pending)
-
-
-@contextmanager
-def cluster_client(scheduler: str | None = None, n_workers: int | None = None) -> Iterator[Any]:
-    """
-    Open a client of a scheduler, or of a cluster of this machine's own cores.
-
-    Parameters
-    ----------
-    scheduler : str
-        As `tcp://host:8786`; None: a local cluster, one thread a process.
-    n_workers : int
-        Processes of the local cluster; None: as many as cores.
-
-    """
-    from distributed import Client
-
-    with tempfile.TemporaryDirectory(prefix='rrth-campaign-') as folder:
-        local = {
-            'n_workers': n_workers,
-            'threads_per_worker': 1,
-            'processes': True,
-            'dashboard_address': '127.0.0.1:0',
-            'local_directory': folder,
-            'silence_logs': logging.ERROR,
-        }
-        with Client(**local) if scheduler is None else Client(scheduler) as client:
-            yield client
 
 
 def run_batch(runs: Sequence[Run]) -> list[Row]:
@@ -110,14 +66,8 @@ def run_batch(runs: Sequence[Run]) -> list[Row]:
 
 
 def _on_cluster(runs: Sequence[Run], client: Any) -> Iterator[list[Row]]:
-    from distributed import as_completed
-
     # Fewer runs a task when there are few, so that no worker waits for the last one.
     n_threads = max(1, sum(client.nthreads().values()))
     size = max(1, min(BATCH, len(runs) // (4 * n_threads)))
     batches = [runs[i : i + size] for i in range(0, len(runs), size)]
-    # A run on another machine, or of an edited source, is not the same: never pure.
-    futures = client.map(run_batch, batches, pure=False)
-    for future in as_completed(futures):
-        yield future.result()
-        future.release()
+    return in_order(client, run_batch, batches)

@@ -1,23 +1,15 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The rows of a campaign in one Parquet file that pandas and polars read.
-
-A Parquet file cannot be continued, so it is written anew with each lot of rows: at once or not at
-all.
-"""
+"""The rows of a campaign in one Parquet file that pandas and polars read."""
 
 # mypy: disable-error-code="import-untyped,import-not-found,no-untyped-call"
 
-from collections.abc import Callable, Sequence
-import os
+from collections.abc import Sequence
 from pathlib import Path
-import uuid
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
-from rrth_planner.model.errors import RrthError
+from rrth_planner.io.parquet_file import read_table, write_table
 from rrth_planner.reproduction.run import Row
 
 # Where times were taken: alone on the machine, or beside other runs.
@@ -51,11 +43,9 @@ SCHEMA = pa.schema(
 
 def append_rows(path: Path, rows: Sequence[Row]) -> None:
     """Add rows to a campaign, in place of those of the same runs; all or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     fresh, old = pa.Table.from_pylist(list(rows), schema=SCHEMA), read_rows(path)
     kept = old.filter(pc.invert(pc.is_in(old['key'], fresh['key'])))
-    table = pa.concat_tables([kept, fresh])
-    replace_file(path, lambda target: pq.write_table(table, target, compression='zstd'))
+    write_table(path, pa.concat_tables([kept, fresh]))
 
 
 def read_rows(path: Path) -> pa.Table:
@@ -68,14 +58,7 @@ def read_rows(path: Path) -> pa.Table:
         The file is no Parquet file of a campaign.
 
     """
-    if not path.exists():
-        return SCHEMA.empty_table()
-    try:
-        return pq.read_table(path).select(SCHEMA.names).cast(SCHEMA)
-    except (pa.ArrowException, KeyError, ValueError, OSError) as problem:
-        raise RrthError(
-            f'file {path}: {" ".join(str(problem).split())}; expected the rows of a campaign'
-        ) from problem
+    return read_table(path, SCHEMA, 'the rows of a campaign')
 
 
 def finished_keys(path: Path, *, timed: bool = False) -> set[str]:
@@ -84,15 +67,3 @@ def finished_keys(path: Path, *, timed: bool = False) -> set[str]:
     if timed:
         table = table.filter(pc.equal(table['timing'], SERIAL))
     return set(table['key'].to_pylist())
-
-
-def replace_file(path: Path, write: Callable[[Path], object]) -> None:
-    """Have a file written beside its place, then move it there."""
-    fresh = path.with_name(f'.{path.name}.{uuid.uuid4().hex[:8]}')
-    try:
-        write(fresh)
-        with fresh.open('rb') as file:
-            os.fsync(file.fileno())
-        os.replace(fresh, path)
-    finally:
-        fresh.unlink(missing_ok=True)

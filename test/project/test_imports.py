@@ -48,13 +48,17 @@ LIBRARIES = {
 }
 # What single modules import beyond that.
 OWN = {
+    'rrth_planner.cli.campaign_file': {'pyarrow'},
+    'rrth_planner.cli.query_batch': {'pyarrow'},
+    'rrth_planner.io.cluster': {'tqdm', 'distributed'},
+    'rrth_planner.io.parquet_file': {'pyarrow'},
+    'rrth_planner.io.query_file': {'pyarrow'},
     'rrth_planner.io.motion_capture_file': {'pybvh', 'c3d'},
     'rrth_planner.io.resources': {'ament_index_python'},
     'rrth_planner.io.text_file': {'yaml'},
     'rrth_planner.io.urdf.chain': {'yourdfpy', 'trimesh'},
     'rrth_planner.io.urdf.geometry': {'trimesh'},
     'rrth_planner.io.urdf.placed_robot': {'yourdfpy'},
-    'rrth_planner.reproduction.cluster': {'tqdm', 'distributed'},
     'rrth_planner.reproduction.row_store': {'pyarrow'},
     'rrth_planner.ros.client.recorder': {'mcap'},
     'rrth_planner.ros.client.recording_reader': {'mcap', 'mcap_ros2'},
@@ -89,7 +93,7 @@ LATE = {
         for name in (
             *('plan', 'plot', 'point_at', 'read_urdf', 'record', 'replay', 'reproduce', 'viewer'),
             'simulate',
-            'file_question',
+            *('campaign', 'file_question', 'query_batch'),
         )
     ),
 }

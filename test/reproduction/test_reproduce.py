@@ -15,9 +15,9 @@ pytest.importorskip('distributed')
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from rrth_planner.cli.reproduce import main
+from rrth_planner.io.cluster import cluster_client
 from rrth_planner.reproduction import path_club, run
 from rrth_planner.reproduction.claims.plane import plane_claims
-from rrth_planner.reproduction.cluster import cluster_client
 from rrth_planner.reproduction.experiments import ALGORITHMS, PRINTED_DENSE, QUICK, RRT
 from rrth_planner.reproduction.row_store import read_rows
 from rrth_planner.reproduction.statistics import Rows

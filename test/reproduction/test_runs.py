@@ -9,16 +9,18 @@ import pytest
 
 pa = pytest.importorskip('pyarrow')
 pytest.importorskip('tqdm')
+pytest.importorskip('distributed')
 
 import pyarrow.parquet as pq
 from rrth_planner.io.arm_file import load_arm
+from rrth_planner.io.cluster import cluster_client
 from rrth_planner.io.map_file import load_map
 from rrth_planner.model.errors import RrthError
 from rrth_planner.planning.visibility_graph import shortest_path
 from rrth_planner.reproduction import cluster
 from rrth_planner.reproduction.claims.arm import is_the_papers
 from rrth_planner.reproduction.claims.path_club import both_ways_shares
-from rrth_planner.reproduction.cluster import cluster_client, run_campaign
+from rrth_planner.reproduction.cluster import run_campaign
 from rrth_planner.reproduction.experiments import (
     ALGORITHMS,
     PRINTED,
@@ -238,7 +240,6 @@ def test_the_cost_of_a_run_falls_from_nothing_to_its_last(tmp_path):
 
 
 def test_a_cluster_brings_the_rows_of_a_serial_campaign(tmp_path):
-    pytest.importorskip('distributed')
     asked = runs(4, (RRT, RRT_H, RRT_STAR))
     serial, spread = tmp_path / 'serial.parquet', tmp_path / 'spread.parquet'
     run_campaign(asked, serial)
