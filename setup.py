@@ -69,6 +69,7 @@ executables = [
     'playback_node = rrth_planner.ros.playback_node:main',
     'simulation_node = rrth_planner.ros.simulation_node:main',
     'body_boxes_node = rrth_planner.ros.body_boxes_node:main',
+    'campaign = rrth_planner.cli.campaign:main',
     'demo = rrth_planner.cli.demo:main',
     'plan = rrth_planner.cli.plan:main',
     'plot = rrth_planner.cli.plot:main',

@@ -2,16 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The question that files and arguments ask a planner, and its answer."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, TYPE_CHECKING
 
 import numpy as np
+from rrth_planner.cli.joint_values import joint_values
 from rrth_planner.cli.program import say
 from rrth_planner.io.resources import resource_path
 from rrth_planner.io.settings import load_settings, PlanSettings
 from rrth_planner.io.text_file import load_yaml
-from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.arm import ArmModel, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
@@ -20,11 +22,29 @@ from rrth_planner.pipeline.request import PlanQuestion
 if TYPE_CHECKING:
     from rrth_planner.pipeline.motion_plan import MotionPlan
 
+# A seed is less than this.
+SEEDS = 2**31
+
 
 def folded() -> list[float]:
     """Return where the packaged arm starts in the playback: folded, (4,) [rad]."""
     file = load_yaml(resource_path('config/playback.yaml'))
     return list(file['/**']['ros__parameters']['initial_positions'])
+
+
+def start_of(
+    given: Sequence[float] | None, label: str, arm: ArmModel, *, is_packaged: bool
+) -> Array:
+    """
+    Return the start configuration that is given, (dof,) [rad or m], or that of the arm.
+
+    The packaged arm starts folded, others where all joints are 0, or as near to it as they get.
+    """
+    if given is not None:
+        return joint_values(given, label, arm.joint_names)
+    if is_packaged:
+        return np.array(folded())
+    return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
 
 
 def new_seed(seed: int) -> int:
@@ -78,3 +98,29 @@ def plan_of(question: PlanQuestion, name: str) -> 'MotionPlan':
     # Compiling and loading do not count as planning time.
     warm_up(question.arm, question.options, question.second_checker)
     return plan_question(question)
+
+
+def figures_of(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any]:
+    """Return the figures of a plan; the names end with their units."""
+    figures: dict[str, Any] = {
+        'status': plan.status.value,
+        'sentence': plan.sentence,
+        'start': _ray(arm, q_start),
+    }
+    if plan.path is not None and plan.trajectory is not None:
+        figures |= {
+            'waypoints': len(plan.path.waypoints),
+            'duration_s': plan.trajectory.duration,
+            'length_rad': plan.path.length,
+            'clearance_m': plan.clearance,
+            'reach_m': plan.target_distance,
+            'escape_time_s': plan.escape_time,
+            'end': _ray(arm, plan.trajectory.positions[-1]),
+        }
+    return figures | {'planning_time_s': plan.planning_time, 'seed': plan.seed}
+
+
+def _ray(arm: ArmModel, q: Array) -> dict[str, list[float]]:
+    """Return a configuration, and origin and direction of the pointing ray there."""
+    T = tool_pose(arm, q)
+    return {'q': q.tolist(), 'ray_from_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}

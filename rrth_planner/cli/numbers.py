@@ -33,8 +33,15 @@ def integer(text: str) -> int:
         raise argparse.ArgumentTypeError(f'"{text}", expected an integer') from None
 
 
-def number_of_runs(text: str) -> int:
-    """Return how many runs an argument says."""
-    if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f'"{text}", expected a number of runs of 1 or more')
-    return int(text)
+def _count(what: str) -> Callable[[str], int]:
+    """Return the type of a number of at least one thing, such as `runs`."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < 1:
+            raise argparse.ArgumentTypeError(f'"{text}", expected a number of {what} of 1 or more')
+        return int(text)
+
+    return read
+
+
+number_of_runs, number_of_workers = _count('runs'), _count('workers')

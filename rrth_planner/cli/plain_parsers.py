@@ -5,7 +5,7 @@
 import argparse
 from pathlib import Path
 
-from rrth_planner.cli.numbers import integer, number, number_of_runs
+from rrth_planner.cli.numbers import integer, number, number_of_runs, number_of_workers
 from rrth_planner.cli.program import add_files, add_target, command_parser, program
 
 PLAN = """\
@@ -31,6 +31,33 @@ fewest points that define the motion exactly.
 example:    %(prog)s --target 1.5 0.8 0.6 --output motion.csv --period 0.01
             %(prog)s --arm config/examples/chest_arm.yaml \\
                 --body config/examples/seated_body.yaml --target 1 0.5 0 --json
+"""
+CAMPAIGN = """\
+Plan a motion for each row of one or more files of queries, on all cores of this machine or on a
+dask cluster, and write one Parquet file with a row for each. Plans are those of `plan`: the same
+query and seed have the same result, whoever plans it. Needs no ROS.
+"""
+CAMPAIGN_EPILOG = """\
+Queries are .csv or .parquet files; all of a campaign have the same columns:
+  target_x target_y target_z   target of the pointing ray in the base frame [m]
+  start_1 ... start_n          start configuration [rad or m] (as of `plan`)
+  arm, body                    files of the arm and the wearer, from the folder of the queries
+                               (--arm, --body)
+  seed                         random seed (--seed; without, the number of the row, from 0)
+Only the target is required; where a value is missing the default in parentheses counts. Other
+columns are kept as they are.
+
+The output has the columns of the queries, the seed that was used, digests of the files of arm and
+wearer, and the figures of the plan, named as `plan --json` does; end: the joint positions there
+[rad or m]. status is `solved`, the reason why there is no motion, `invalid query`, or `error`;
+sentence says more. An interrupted campaign, started again, continues.
+
+exit codes: 0  all queries are planned, whatever came out
+            2  wrong usage or input, or a cluster that ended: the error on standard error
+          130  interrupted; what was planned is kept
+
+example:    %(prog)s queries.parquet --output plans.parquet
+            %(prog)s first.csv second.csv --output plans.parquet --scheduler tcp://10.0.0.1:8786
 """
 PLOT_EXAMPLES = """\
 examples:   %(prog)s plan --target 0.3 1.4 0.4 -o plan.png
@@ -111,6 +138,33 @@ def plan() -> argparse.ArgumentParser:
     add_files(parser, output='file of the motion, .yaml or .csv')
     add('--period', type=number('s'), metavar='S', help='time between two points in that file [s]')
     add('--json', action='store_true', help='print the figures as JSON')
+    return parser
+
+
+def campaign() -> argparse.ArgumentParser:
+    """Return the parser of all arguments."""
+    parser = command_parser('campaign', CAMPAIGN, CAMPAIGN_EPILOG)
+    add = parser.add_argument
+    add('queries', type=Path, nargs='+', metavar='QUERIES', help='.csv or .parquet')
+    output = 'Parquet file of the plans; one that is there is continued'
+    add('--output', type=Path, required=True, metavar='FILE', help=output)
+    add_files(
+        parser,
+        arm='the arm of queries that name none (config/arm.yaml)',
+        body=WEARER,
+        settings='parameters of the node; defaults are those of config/planner.yaml',
+    )
+    add('--margin', type=number('m'), metavar='M', help='clearance demanded from every box [m]')
+    seed = 'random seed of queries that have none; -1: the number of the row'
+    add('--seed', type=integer, metavar='N', help=seed)
+    add_where = parser.add_mutually_exclusive_group().add_argument
+    add_where(
+        '--workers',
+        type=number_of_workers,
+        metavar='N',
+        help='processes on this machine (its cores)',
+    )
+    add_where('--scheduler', metavar='tcp://HOST:PORT', help='address of a dask scheduler')
     return parser
 
 

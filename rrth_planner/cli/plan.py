@@ -7,26 +7,27 @@ from collections.abc import Sequence
 import json
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from rrth_planner.cli import plain_parsers
-from rrth_planner.cli.file_question import folded, new_seed, plan_of, question_of, settings_of
-from rrth_planner.cli.joint_values import joint_values
+from rrth_planner.cli.file_question import (
+    figures_of,
+    new_seed,
+    plan_of,
+    question_of,
+    SEEDS,
+    settings_of,
+    start_of,
+)
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.model.arm import ArmModel, tool_pose
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.status import PlanStatus
 
-if TYPE_CHECKING:
-    from rrth_planner.pipeline.motion_plan import MotionPlan
-
 SOLVED, REJECTED, WRONG = 0, 1, 2
-SEEDS = 2**31
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -46,10 +47,11 @@ def _plan(options: argparse.Namespace) -> int:
     settings = settings_of(arm, options.settings, margin=options.margin, seed=options.seed)
     if not -1 <= settings.seed < SEEDS:
         raise OptionsError(f'seed: {settings.seed}, expected -1 to {SEEDS - 1} [-]')
-    q_start, seed = _start(options, arm), new_seed(settings.seed)
+    q_start = start_of(options.q_from, '--from', arm, is_packaged=options.arm is None)
+    seed = new_seed(settings.seed)
     question = question_of(arm, scene, q_start, options.target, settings, seed)
     plan = plan_of(question, 'plan')
-    figures = _figures(arm, q_start, plan)
+    figures = figures_of(arm, q_start, plan)
     if plan.trajectory is not None and options.output is not None:
         motion = motion_of(arm, plan.trajectory)
         if options.period is not None:
@@ -64,41 +66,6 @@ def _plan(options: argparse.Namespace) -> int:
         return SOLVED
     say('plan', f'{plan.status.value}: {plan.sentence}')
     return REJECTED
-
-
-def _start(options: argparse.Namespace, arm: ArmModel) -> Array:
-    """Return the start configuration, (dof,) [rad or m]."""
-    if options.q_from is not None:
-        return joint_values(options.q_from, '--from', arm.joint_names)
-    if options.arm is None:
-        return np.array(folded())
-    return np.asarray(np.clip(np.zeros(arm.dof), *arm.bounds))
-
-
-def _figures(arm: ArmModel, q_start: Array, plan: 'MotionPlan') -> dict[str, Any]:
-    """Return the figures of a plan; the names end with their units."""
-    figures: dict[str, Any] = {
-        'status': plan.status.value,
-        'sentence': plan.sentence,
-        'start': _ray(arm, q_start),
-    }
-    if plan.path is not None and plan.trajectory is not None:
-        figures |= {
-            'waypoints': len(plan.path.waypoints),
-            'duration_s': plan.trajectory.duration,
-            'length_rad': plan.path.length,
-            'clearance_m': plan.clearance,
-            'reach_m': plan.target_distance,
-            'escape_time_s': plan.escape_time,
-            'end': _ray(arm, plan.trajectory.positions[-1]),
-        }
-    return figures | {'planning_time_s': plan.planning_time, 'seed': plan.seed}
-
-
-def _ray(arm: ArmModel, q: Array) -> dict[str, list[float]]:
-    """Return a configuration, and origin and direction of the pointing ray there."""
-    T = tool_pose(arm, q)
-    return {'q': q.tolist(), 'ray_from_m': T[:3, 3].tolist(), 'ray': T[:3, 2].tolist()}
 
 
 def _lines(figures: dict[str, Any], output: Path | None) -> list[str]:

@@ -43,6 +43,7 @@ class Command(NamedTuple):
 
 COMMANDS = {
     'plan': Command('plan a motion from files, without ROS', 'cli.plan'),
+    'campaign': Command('plan files of many queries on a cluster', 'cli.campaign'),
     'plot': Command('draw a motion or a recording', 'cli.plot'),
     'viewer': Command('show the planner in the browser', 'cli.viewer'),
     'read_urdf': Command('import an arm from a URDF', 'cli.read_urdf'),

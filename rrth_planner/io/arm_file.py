@@ -193,7 +193,11 @@ def load_arm(path: str | Path | None = None) -> ArmModel:
 
     """
     file = Path(path) if path else resource_path('config/arm.yaml')
-    text = read_text(file)
+    return arm_from_text(read_text(file), file)
+
+
+def arm_from_text(text: str, file: str | Path) -> ArmModel:
+    """Return the arm that the text of a YAML file describes, as `load_arm` does."""
     if text.lstrip().startswith('<'):
         raise ModelError(
             f'file {file}: XML, as a URDF is, expected an arm laid out as config/arm.yaml; '

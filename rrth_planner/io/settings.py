@@ -77,21 +77,26 @@ def load_settings(dof: int, path: str | Path | None = None, /, **changes: Any) -
         An invalid value, or an unknown name.
 
     """
+    return checked_settings(load_values(dof, path), changes, dof)
+
+
+def load_values(dof: int, path: str | Path | None = None) -> dict[str, Any]:
+    """Return what `load_settings` makes settings of: all values of the files, by name."""
     packaged = _parameters(resource_path('config/planner.yaml'))
     # Limits of the packaged arm are equal for all joints.
     values = {**packaged, **{name: packaged[name][:1] for name in LIMIT_UNITS}}
     if path is not None:
         given = _parameters(path)
         with naming_file(path, OptionsError):
-            _typed_settings(values, given, dof)
+            checked_settings(values, given, dof)
         values |= given
-    return _typed_settings(values, changes, dof)
+    return values
 
 
-def _typed_settings(
+def checked_settings(
     values: Mapping[str, Any], changes: Mapping[str, Any], dof: int
 ) -> PlanSettings:
-    """Return the settings of values with some changes, of any type."""
+    """Return the settings of values with some changes, of any type, or raise OptionsError."""
     for name in changes:
         if name not in values:
             raise OptionsError(f'{name}: unknown parameter, expected one of {", ".join(values)}')

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.io.entries import mapping, sequence, text, whole
 from rrth_planner.io.resources import resource_path
-from rrth_planner.io.text_file import load_yaml, naming_file
+from rrth_planner.io.text_file import naming_file, parse_yaml, read_text
 from rrth_planner.model.arrays import FARTHEST, frozen_array
 from rrth_planner.model.errors import one_line, printable, SceneError, shown
 from rrth_planner.model.rotation import rotation_matrix
@@ -40,7 +40,12 @@ def load_body(path: str | Path | None = None) -> Scene:
 
     """
     file = Path(path) if path else resource_path('config/body.yaml')
-    data = load_yaml(file)
+    return body_from_text(read_text(file), file)
+
+
+def body_from_text(content: str, file: str | Path) -> Scene:
+    """Return the wearer that the text of a YAML file describes, as `load_body` does."""
+    data = parse_yaml(content, f'file {file}')
     with naming_file(file, SceneError):
         if isinstance(data, dict) and 'markers' in data:
             data = {'boxes': _boxes_after(data['markers'])}

@@ -7,7 +7,7 @@ import re
 
 import pytest
 from rrth_planner.cli import plain_parsers, ros_parsers
-from rrth_planner.cli.numbers import integer, number, number_of_runs
+from rrth_planner.cli.numbers import integer, number, number_of_runs, number_of_workers
 from rrth_planner.cli.rrth import COMMANDS
 
 UNIT = re.compile(r'\[([^\]]+)\]')
@@ -37,7 +37,7 @@ def numbers():
 
 @pytest.mark.parametrize('option', numbers())
 def test_a_bad_number_is_answered_with_its_unit(option):
-    has_unit = option.type not in (integer, number_of_runs)
+    has_unit = option.type not in (integer, number_of_runs, number_of_workers)
     for text in ('two', '1 m', '', 'nan', '-inf'):
         with pytest.raises(argparse.ArgumentTypeError) as said:
             option.type(text)
@@ -54,6 +54,7 @@ def test_a_number_is_finite_and_above_its_bound():
         ('x', number('kg', above=0.0), '"x", expected a number > 0 [kg]'),
         ('1.5', integer, '"1.5", expected an integer'),
         ('0', number_of_runs, '"0", expected a number of runs of 1 or more'),
+        ('two', number_of_workers, '"two", expected a number of workers of 1 or more'),
     ):
         with pytest.raises(argparse.ArgumentTypeError, match=f'^{re.escape(expected)}$'):
             kind(text)

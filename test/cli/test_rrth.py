@@ -54,6 +54,8 @@ for arguments, needed, extras in (
     (['viewer'], ['viser'], 'tools'),
     (['read_urdf', 'a.urdf', '--output', 'a.yaml'], ['yourdfpy', 'trimesh'], 'tools'),
     (['plot', 'plan', '--target', '1', '0', '0', '-o', 'a.png'], ['matplotlib'], 'tools'),
+    (['campaign', 'a.csv', '--output', 'a.parquet'], ['distributed', 'pyarrow', 'tqdm'],
+     'campaign'),
     (['reproduce'], ['distributed', 'pyarrow', 'tqdm', 'matplotlib'], 'campaign'),
 ):
     code, out, err = run(*arguments)
