@@ -66,7 +66,7 @@ def seen_again(
     A part moved faster than assumed where a corner of its box went further than its greatest speed
     and two errors explain. Its bound is raised for a while then. Parts are known by their names.
     """
-    old, names = _places(before.scene, scene), _names(scene)
+    old, names = places_of(before.scene, scene), _names(scene)
     known = old >= 0
     then, n = old[known], len(names)
     speeds, until = np.zeros(n), np.zeros(n)
@@ -119,7 +119,7 @@ def _speeds(names: tuple[str, ...], rules: SeparationRules) -> Array:
     return speeds
 
 
-def _places(before: Scene, after: Scene) -> NDArray[np.intp]:
+def places_of(before: Scene, after: Scene) -> NDArray[np.intp]:
     """Return which box of a scene is which one of the scene before, -1: none, (m,)."""
     return _matches(_names(before), _names(after))
 

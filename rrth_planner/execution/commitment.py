@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commitments: motions that are given to a controller, each safe by itself up to its end."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 
@@ -40,6 +41,8 @@ END = 1e-4
 # How far the points of an arm may be from a new commitment when that begins, late or after a stop:
 # 2e-4 rad at the tip of an arm of some metres [m].
 JUMP_WAY = 5e-4
+# What keeps an arm from what is proven and is not clear.
+IN_THE_WAY = Blocked(0.0, 'the rest of the motion', 'the wearer')
 # Spacing of the samples by which a stop is localized on its motion [s].
 SPACING = 2e-3
 
@@ -151,14 +154,19 @@ def first_commitment(
 
 
 def extended(
-    commitment: Commitment, time: float, body: SeenBody, settings: Separation
+    commitment: Commitment,
+    time: float,
+    body: SeenBody,
+    settings: Separation,
+    is_clear: Callable[[Trajectory], bool] = lambda curve: True,
 ) -> Commitment | Blocked | None:
     """
     Return the commitment that replaces the present one from a time on [s].
 
-    body: the wearer at that time. None where the present one leads to the end of the motion, is
-    over, has arrived there, or is in a stop that ends at rest first; where no longer one is
-    proven, what keeps it from it: then the present one, which is proven, ends in its stop.
+    body: the wearer at that time; is_clear: what else is asked of what the controller gets. None
+    where the present one leads to the end of the motion, is over, has arrived there, or is in a
+    stop that ends at rest first; where no longer one is proven, what keeps it from it: then the
+    present one, which is proven, ends in its stop.
     """
     if commitment.is_whole or is_in_sharp_stop(commitment, time, settings):
         return None
@@ -167,7 +175,7 @@ def extended(
         return None
     elapsed = time - commitment.start_time
     held = continued(commitment.profile, elapsed) if elapsed <= commitment.stretch else None
-    return _committed(commitment.motion, time, state, held, body, settings)
+    return _committed(commitment.motion, time, state, held, body, settings, is_clear)
 
 
 def is_in_sharp_stop(commitment: Commitment, time: float, settings: Separation) -> bool:
@@ -189,6 +197,7 @@ def _committed(
     held: RateProfile | None,
     body: SeenBody,
     settings: Separation,
+    is_clear: Callable[[Trajectory], bool] = lambda curve: True,
 ) -> Commitment | Blocked:
     """Return the fastest commitment from a state that is proven, or what keeps it from it."""
     rules, margin = settings.rules, settings.margin + JUMP_WAY
@@ -197,6 +206,8 @@ def _committed(
     def is_proven(curve: Trajectory) -> bool:
         nonlocal blocked
         found = first_unproven(curve, 0.0, settings.arm, body, rules, margin)
+        if found is None and not is_clear(curve):
+            found = IN_THE_WAY
         blocked = blocked or found
         return found is None
 

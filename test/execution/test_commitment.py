@@ -385,3 +385,30 @@ def test_the_permitted_rate_is_less_the_older_the_body_is():
         n_forbidden += permitted(motion, 0.3 * motion.duration, body_at(5.0), SETTINGS) < 0.2
     assert n_between > 2
     assert n_forbidden >= 2
+
+
+def test_what_is_not_clear_is_not_committed_to():
+    n_shortened, alone = 0, body_at(scene=Scene(()))
+    for motion in motions():
+        present, time = first_commitment(motion, 0.0, body_at(), SETTINGS), 0.0
+        end = motion.positions[-1]
+        while not present.is_whole:
+            time += PERIOD
+            # As where a hand is in the ray at the end: a stretch and its stop are still clear.
+            short = extended(
+                present,
+                time,
+                alone,
+                SETTINGS,
+                lambda curve, end=end: np.abs(curve.positions[-1] - end).max() > 0.1,
+            )
+            none = extended(present, time, alone, SETTINGS, lambda curve: False)
+            assert isinstance(none, Blocked)
+            assert (none.bar, none.box) == ('the rest of the motion', 'the wearer')
+            present = extended(present, time, alone, SETTINGS)
+            if isinstance(short, Commitment):
+                assert not short.is_whole
+                assert np.abs(short.trajectory.positions[-1] - end).max() > 0.1
+                check_commitment(short, alone)
+                n_shortened += present.is_whole
+    assert n_shortened > 3

@@ -18,7 +18,7 @@ from rrth_planner.collision.reference_checker import separation_violations  # no
 from rrth_planner.execution.body_motion import body_at  # noqa: E402
 from rrth_planner.execution.commitment import extended  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION  # noqa: E402
-from rrth_planner.model.scene import Box  # noqa: E402
+from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.inputs import RequestError  # noqa: E402
 from rrth_planner.ros.interface.parameters import declare_parameters  # noqa: E402
@@ -539,6 +539,52 @@ def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
     # Older than `body_timeout`.
     arm.frames(30, sees=False)
     assert not arm.ray_clear[-1]
+
+
+def in_the_ray():
+    """Return a hand in the pointing ray at the end of the motion, far from the arm itself."""
+    T = reference_checker.frames(ARM, SWING.positions[-1:])[0, -1]
+    return Box('other hand', T[:3, 3] + 0.7 * T[:3, 2], [0.1] * 3, np.eye(3))
+
+
+def check_ray(arm, n_before, hand):
+    """Check that no commitment since leads the ray into a hand."""
+    length = arm.reporter.parameters.ray_guard_length
+    for trajectory, _ in arm.published[n_before:]:
+        q, _, _ = sample(trajectory, np.linspace(0.0, trajectory.duration, 200))
+        assert reference_checker.first_contact(ARM, Scene((hand,)), q, length, 0.0) is None
+
+
+def test_a_hand_in_the_ray_further_on_stops_the_arm_only_where_it_stays(separated):
+    arm, hand = beside(separated, 0.3)
+    n, other = len(arm.published), in_the_ray()
+    arm.frames(15, hand, other)
+    assert 'stopped' not in arm.said
+    assert len(arm.published) > n + 5
+    check_ray(arm, n, other)
+    # It moves on: so does the arm, to the end.
+    arm.frames(600, hand)
+    assert 'stopped' not in arm.said
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+    arm, hand = beside(separated, 0.3)
+    n = len(arm.published)
+    arm.frames(60, hand, other)
+    assert 'stopped' in arm.said
+    assert arm.monitor.stop_reason == execution_monitor.IN_THE_WAY
+    check_ray(arm, n, other)
+    arm.frames(100, hand, other)
+    assert not arm.commanded(arm.now)[1].any()
+
+
+def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(separated, monkeypatch):
+    arm, hand = beside(separated, 0.3)
+    n, other = len(arm.published), in_the_ray()
+    monkeypatch.setattr(arm.inputs, 'expected_scene', lambda: Scene((other,)))
+    arm.frames(250, hand)
+    check_ray(arm, n, other)
+    assert not arm.commanded(arm.now)[1].any()
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() > 1e-2
 
 
 def test_where_the_controller_rejects_commitments_the_one_that_it_executes_is_continued(separated):

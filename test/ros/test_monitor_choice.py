@@ -16,10 +16,11 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rrth_planner.collision import reference_checker  # noqa: E402
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
-from rrth_planner.model.scene import Box  # noqa: E402
+from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
 from rrth_planner.ros.messages.marker_edits import BodyPart  # noqa: E402
+from rrth_planner.ros.monitor import execution_monitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, MonitorState  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -37,6 +38,20 @@ def test_a_free_motion_continues(monitored):
     monitored.see(FAR)
     assert monitored.published == []
     assert monitored.said == ['free']
+
+
+@pytest.mark.parametrize('ahead', [0.1, 0.2, 0.7])
+def test_an_arm_stops_for_a_part_that_is_about_to_move_into_its_way(monitored, ahead):
+    expected = Scene((monitored.hand(ahead, 0.0),))
+    monitored.inputs.expected_scene = lambda: expected
+    monitored.see(FAR)
+    # Further on there is time enough.
+    assert monitored.said == (['free'] if ahead > 0.5 else ['stopped'])
+    if ahead < 0.5:
+        assert monitored.monitor.stop_reason == execution_monitor.SOON_IN_THE_WAY
+        # It is proven free of the wearer as he is.
+        (stop,) = monitored.monitor.take_stops()
+        assert stop.scene is not None
 
 
 @pytest.mark.parametrize('ahead', [0.02, 0.1, 0.6])

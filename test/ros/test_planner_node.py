@@ -38,7 +38,7 @@ from rrth_planner.model.arm import (  # noqa: E402
     pointing_error,
     tool_pose,
 )
-from rrth_planner.model.scene import Scene  # noqa: E402
+from rrth_planner.model.scene import Box, Scene  # noqa: E402
 from rrth_planner.model.trajectory import positions_at, Trajectory  # noqa: E402
 from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
@@ -1127,12 +1127,66 @@ def test_a_second_publisher_of_the_body_is_reported(start, monkeypatch):
     monkeypatch.setattr(planner.get_logger(), 'warning', warnings.append)
     say_all(planner, stranger)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
-    other = stranger.create_publisher(MarkerArray, 'body_boxes', 10)
+    other = stranger.node.create_publisher(MarkerArray, 'body_boxes', 10)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '2')
-    stranger.destroy_publisher(other)
+    stranger.node.destroy_publisher(other)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
     (line,) = [line for line in warnings if 'publishers' in line]
     assert 'body_boxes has 2 publishers: of each marker the last edit counts' in line, line
+
+
+def hand_in_the_way():
+    """Return a hand as large as the arm at its shoulder, which no motion is free of."""
+    shoulder = np.asarray(load_arm().T_base_mount)[:3, 3]
+    return Scene((Box('hand', shoulder, np.ones(3), np.eye(3)),))
+
+
+def test_a_motion_begins_only_once_no_part_is_about_to_move_into_its_way(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    # A hand that comes nearer, and turns back before it is there.
+    expected = [hand_in_the_way()] * 5
+    inputs = inputs_of(planner)
+    monkeypatch.setattr(
+        inputs, 'expected_scene', lambda: expected.pop() if expected else Scene(())
+    )
+    assert stranger.answer().success
+    assert not expected
+
+
+def test_a_part_that_stays_about_to_move_into_the_way_ends_the_request(start, monkeypatch):
+    planner, stranger = start(time_limit=0.3)
+    say_all(planner, stranger)
+    monkeypatch.setattr(inputs_of(planner), 'expected_scene', hand_in_the_way)
+    message = stranger.answer().message
+    assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): '), message
+    assert 'the wearer is about to move into the way of the motion' in message
+    assert not stranger.received['joint_trajectory']
+
+
+def test_parts_are_expected_where_they_will_be_by_their_last_bodies(start):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    inputs = inputs_of(planner)
+    assert not inputs.expected_scene().boxes
+    # 20 ms apart, as far as the machine goes: the speed is that of the times at which they came.
+    begin, place = time.monotonic(), 0.0
+    while time.monotonic() < begin + 0.3:
+        place = -2.0 + (time.monotonic() - begin)
+        n = inputs.body.n_good
+        stranger.publishers['body_boxes'].publish(
+            array(box('far hand', center=(-3.0, place, 0.0)))
+        )
+        stranger.wait_until(lambda n=n: inputs.body.n_good > n)
+        time.sleep(0.02)
+    found = inputs.expected_scene().boxes
+    assert [one.name for one in found] == ['far hand/0'] * 3
+    steps = [one.center[1] - place for one in found]
+    np.testing.assert_allclose(steps, (0.1, 0.2, 0.3), rtol=0.6)
+    assert found[0].center[0] == -3.0
+    # At rest it is expected nowhere else.
+    time.sleep(0.3)
+    assert not inputs.expected_scene().boxes
 
 
 @pytest.mark.parametrize('age', [1.0, 3600.0])

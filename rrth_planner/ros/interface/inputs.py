@@ -14,6 +14,7 @@ from rrth_planner.execution.executing_motion import (
     predict_start_state,
     sharp_phase_of,
 )
+from rrth_planner.execution.expected_wearer import expected_scene
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
@@ -31,6 +32,8 @@ T = TypeVar('T')
 CLOCK_STEP = 0.1
 # A wearer moves whose boxes have changed by so much [m] within so long [s]; of so many bodies.
 MOVED, LATELY, REMEMBERED = 0.01, 0.25, 64
+# Velocities are those of this time at least: what a tracker's noise adds is small then [s].
+STEADY = 0.08
 
 
 class RequestError(RrthError):
@@ -205,6 +208,17 @@ class Inputs:
             return False
         now, before = scene_of(bodies[-1]).numbers, scene_of(bodies[0]).numbers
         return now.shape != before.shape or bool(np.abs(now - before).max(initial=0.0) > MOVED)
+
+    def expected_scene(self) -> Scene:
+        """Return where moving parts of the wearer will be soon; no box where that is unknown."""
+        bodies = tuple(self._bodies)
+        if not bodies or time.monotonic() - bodies[-1][0] > LATELY:
+            return Scene(())
+        came, present = bodies[-1]
+        for then, before in reversed(bodies):
+            if STEADY <= came - then <= LATELY:
+                return expected_scene(scene_of(before), scene_of(present), came - then)
+        return Scene(())
 
     @property
     def all(self) -> dict[str, Input[Any]]:

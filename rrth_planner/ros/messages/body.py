@@ -105,7 +105,7 @@ class WearerBody:
 
 # The same body is the same scene each time: what is derived from it is kept, here and in the
 # planning process.
-@functools.lru_cache(maxsize=8)
+@functools.lru_cache(maxsize=32)
 def scene_of(body: WearerBody) -> Scene:
     """Return the boxes, lost ones too, as a scene; take `body.at(now)` first for times."""
     return Scene(tuple(box for _, part in (*body.parts, *body.lost) for box in part.boxes))

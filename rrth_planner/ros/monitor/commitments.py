@@ -3,6 +3,7 @@
 """The commitments of the running motion: what its controller is given of it, body by body."""
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 import time
@@ -21,7 +22,7 @@ from rrth_planner.execution.commitment import (
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import Separation
-from rrth_planner.model.trajectory import part_of, positions_at
+from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
 from rrth_planner.ros.interface.inputs import RequestError
 from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
@@ -213,7 +214,11 @@ class Commitments:
         return is_manual and self.is_active and not self.is_arrived(now)
 
     def extend(
-        self, now: float, begin: float, reading: JointReading | None
+        self,
+        now: float,
+        begin: float,
+        reading: JointReading | None,
+        is_clear: Callable[[Trajectory], bool] = lambda curve: True,
     ) -> ExecutingMotion | None:
         """
         Publish the commitment that replaces the present one now [s]; return it if it changed.
@@ -224,13 +229,18 @@ class Commitments:
         is_other = self._find_present(reading)
         present, planned, parameters = self.present, self.planned, self._parameters
         assert present is not None and planned is not None and parameters is not None
-        found = None if self.fault else self._extended(now, begin, present, parameters)
+        found = None if self.fault else self._extended(now, begin, present, parameters, is_clear)
         if found is None:
             return _executing(present, planned) if is_other else None
         return _executing(found, planned)
 
     def _extended(
-        self, now: float, begin: float, present: Commitment, parameters: PlannerParameters
+        self,
+        now: float,
+        begin: float,
+        present: Commitment,
+        parameters: PlannerParameters,
+        is_clear: Callable[[Trajectory], bool],
     ) -> Commitment | None:
         """Return the commitment that was published in place of the present one; None: none was."""
         separation = parameters.separation
@@ -248,7 +258,7 @@ class Commitments:
             self._report(blocked, float(path_state(present, now)[1]), True)
             return None
         seen = body_at(self._body, now, separation.rules)
-        found = extended(present, now, seen, self._stretched(separation))
+        found = extended(present, now, seen, self._stretched(separation), is_clear)
         if found is None:
             return None
         if isinstance(found, Blocked):

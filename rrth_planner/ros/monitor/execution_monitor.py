@@ -12,6 +12,7 @@ from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from threading import RLock
 import time
 import traceback
@@ -21,6 +22,7 @@ from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
+from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
     is_ray_clear,
@@ -48,6 +50,11 @@ LONGEST_WAIT = 0.05
 OFF_TRAJECTORY = (
     f'arm is > {MAX_DEVIATION:g} rad from the commanded trajectory: monitoring suspended'
 )
+# Why the arm is stopped for a body.
+IN_THE_WAY = 'the remaining motion is not proven free of the wearer'
+SOON_IN_THE_WAY = 'the wearer is about to move into the way'
+# With separation it goes on for so long while the wearer is in the way further on [s].
+PATIENCE = 0.3
 # Why a motion is given up.
 TOO_NEAR = 'the wearer is too near for the motion to go on'
 NOT_FOLLOWED = 'the arm rests beside its motion, and does not follow it'
@@ -128,6 +135,8 @@ class ExecutionMonitor:
         self._n_ignored = 0
         # Of the plan: a margin that is changed later does not apply to its motion.
         self._parameters = reporter.parameters
+        # Since when the wearer has been in the way of the running motion [s].
+        self._in_the_way_since: float | None = None
         # A stop that was not published, since the commitment that comes to rest by itself is
         # proven and the stop is not: the motion that it ends.
         self._withheld_stop: ExecutingMotion | None = None
@@ -170,6 +179,7 @@ class ExecutionMonitor:
                 self._tracker.begin(commanded, now)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._withheld_stop = MonitorState.MONITORING, None
+                self._in_the_way_since = None
                 publish()
                 if commanded is not running:
                     self._publishers.publish_motion(
@@ -307,12 +317,22 @@ class ExecutionMonitor:
         if phase is None:
             return
         self._reporter.body_used(self._inputs.body.age(now))
-        scene = scene_of(body.at(now))
-        if self._holds(is_remaining_free, *self._remaining(phase, now), scene):
+        scene, expected = scene_of(body.at(now)), self._inputs.expected_scene()
+        planned, planned_phase = self._remaining(phase, now)
+        is_free = self._holds(is_remaining_free, planned, planned_phase, scene)
+        # An escape leaves where he is.
+        is_soon_free = planned_phase < planned.escape_time or self._holds(
+            is_expected_free, self.running, phase, expected
+        )
+        if is_free and is_soon_free:
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
+            self._in_the_way_since = None
             self._extend(now, begin)
+        elif self._may_go_on(phase, now, scene):
+            self._extend(now, begin, partial(self._is_clear, scene, expected))
         else:
-            self._stop(phase, now, scene, arrived)
+            why = IN_THE_WAY if is_soon_free else SOON_IN_THE_WAY
+            self._stop(phase, now, scene, arrived, why)
         waited = self._elapsed(arrived)
         # The ages of parts count where motions are proven separate.
         if waited > LONGEST_WAIT and not self._commitments.is_active:
@@ -320,6 +340,32 @@ class ExecutionMonitor:
                 f'a body was checked {waited:.3f} s after its arrival, expected at most '
                 f'{LONGEST_WAIT:g} s'
             )
+
+    def _may_go_on(self, phase: float, now: float, scene: Scene) -> bool:
+        """
+        Return whether the arm may go on although the wearer is in the way further on.
+
+        With separation it has been given nothing but a stretch that ends in a stop. Where that is
+        free of him, a further stretch that is free as well may follow, while he moves on.
+        """
+        running = self.running
+        assert running is not None
+        planned, planned_phase = self._remaining(phase, now)
+        since = self._in_the_way_since = self._in_the_way_since or now
+        return (
+            self._commitments.is_active
+            and now - since < PATIENCE
+            and planned_phase >= planned.escape_time
+            and self._holds(is_remaining_free, running, phase, scene)
+        )
+
+    def _is_clear(self, scene: Scene, expected: Scene, curve: Trajectory) -> bool:
+        """Return whether a stretch and its stop are free of the wearer, now and soon."""
+        assert self.running is not None
+        motion = replace(self.running, trajectory=curve, escape_time=0.0)
+        return self._holds(is_remaining_free, motion, 0.0, scene) and self._holds(
+            is_expected_free, motion, 0.0, expected
+        )
 
     def _remaining(self, phase: float, now: float) -> tuple[ExecutingMotion, float]:
         """Return the motion that the arm is to execute, and the time within it [s]."""
@@ -329,7 +375,12 @@ class ExecutionMonitor:
             (self.running, phase) if planned is None else (planned, self._commitments.phase(now))
         )
 
-    def _extend(self, now: float, begin: float) -> None:
+    def _extend(
+        self,
+        now: float,
+        begin: float,
+        is_clear: Callable[[Trajectory], bool] = lambda curve: True,
+    ) -> None:
         """
         Have the commitment of the running motion replaced by one that leads further.
 
@@ -337,7 +388,7 @@ class ExecutionMonitor:
         """
         if self._commitments.is_active and not self.pending_stop:
             planned = self._commitments.planned
-            motion = self._commitments.extend(now, begin, self._inputs.joints.value)
+            motion = self._commitments.extend(now, begin, self._inputs.joints.value, is_clear)
             if motion is not None:
                 self._tracker.replace(motion)
             if self._commitments.planned is not planned:
@@ -456,9 +507,8 @@ class ExecutionMonitor:
             self._set_state(self._state, OFF_TRAJECTORY)
         return phase
 
-    def _stop(self, phase: float, then: float, scene: Scene, arrived: int) -> None:
+    def _stop(self, phase: float, then: float, scene: Scene, arrived: int, why: str) -> None:
         """Stop the arm for a body, from its phase at a time `then` [s]; the lock is held."""
-        why = 'the remaining motion is not proven free of the wearer'
         # The check since then took time.
         now = self._now()
         phase += now - then

@@ -1,0 +1,66 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the wearer's parts will be soon, if they go on as they move."""
+
+from dataclasses import replace
+
+import numpy as np
+from rrth_planner.execution.body_motion import places_of
+from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.remaining_motion import is_remaining_free
+from rrth_planner.kernels.layout import MAX_BOXES, SIZE
+from rrth_planner.model.arm import ArmModel
+from rrth_planner.model.scene import Box, Scene
+from rrth_planner.model.trajectory import part_of
+
+# A part is looked for at these times, if it goes on: about as long as a stop takes [s].
+AHEAD = (0.1, 0.2, 0.3)
+# A slower part counts as at rest [m/s].
+SLOW = 0.2
+
+
+def expected_scene(before: Scene, present: Scene, elapsed: float) -> Scene:
+    """
+    Return the moving parts of a wearer at the times `AHEAD`, from two sights of him.
+
+    elapsed: time from one to the other, > 0 [s]. The result has no box where nothing moves.
+    """
+    old = places_of(before, present)
+    known = np.flatnonzero(old >= 0)
+    boxes = present.numbers
+    velocities = (boxes[known, :SIZE] - before.numbers[old[known], :SIZE]) / elapsed
+    is_moving = np.linalg.norm(velocities, axis=1) > SLOW
+    # With very many parts there is room for the last times only.
+    times = AHEAD[-max(1, MAX_BOXES // max(1, int(is_moving.sum()))) :]
+    expected = []
+    for i, velocity in zip(known[is_moving], velocities[is_moving], strict=True):
+        for time in times:
+            row = boxes[i].copy()
+            row[:SIZE] += time * velocity
+            row.setflags(write=False)
+            expected.append(Box.of_row(present.boxes[i].name, row))
+    return Scene(tuple(expected))
+
+
+def is_expected_free(
+    running: ExecutingMotion,
+    phase: float,
+    arm: ArmModel,
+    expected: Scene,
+    *,
+    margin: float,
+    ray_guard_length: float,
+) -> bool:
+    """
+    Return whether the next stretch of a motion is free of where the wearer is expected.
+
+    An escape is not judged: it leaves where he is. The parameters are those of
+    `is_remaining_free`.
+    """
+    if not expected.boxes or phase < running.escape_time:
+        return True
+    stretch = part_of(running.trajectory, phase, phase + AHEAD[-1])
+    ahead = replace(running, trajectory=stretch, target_distance=0.0, escape_time=0.0)
+    return is_remaining_free(
+        ahead, 0.0, arm, expected, margin=margin, ray_guard_length=ray_guard_length
+    )
