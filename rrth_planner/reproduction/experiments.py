@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rrth_planner.planning.options import (
     InformedRRTStarOptions,
+    Options,
     PrintedRRTHOptions,
     RRTHOptions,
     RRTOptions,
@@ -18,6 +19,10 @@ from rrth_planner.planning.options import (
 )
 from rrth_planner.reproduction.path_club import ScatterOptions
 from rrth_planner.reproduction.problems import TARGETS
+from rrth_planner.reproduction.relatives.dubins_path import DubinsOptions
+from rrth_planner.reproduction.relatives.lattice import LatticeOptions
+from rrth_planner.reproduction.relatives.potential_field import PotentialFieldOptions
+from rrth_planner.reproduction.relatives.roadmap import RoadmapOptions
 from rrth_planner.reproduction.run import Run
 
 MAPS = ('c_shape', 'spiral', 'fence')
@@ -74,6 +79,25 @@ ALGORITHMS: dict[str, TreeOptions] = {
     LONG_STEP: RRTOptions(**{**_GROWTH, 'step_size': 20.0}),
     BIASED: RRTOptions(**{**_GROWTH, 'goal_bias': 0.05}),
 }
+# What the paper names beside the five, and references; in the plane only.
+FIELD, NO_FIELD = 'RRT, potential field', 'RRT, steps of one length'
+RADII = (2.0, 5.0, 10.0)
+DUBINS = tuple(f'RRT-H, Dubins, radius {radius:g}' for radius in RADII)
+LATTICES = COARSE, FINE = 'A*, spacing 5', 'A*, spacing 1'
+ROADMAPS = SPARSE_ROADMAP, DENSE_ROADMAP = 'PRM, 200 draws', 'PRM, 2000 draws'
+RELATIVES: dict[str, Options] = {
+    # With the constants of that class, and without any force but that to the draw.
+    FIELD: PotentialFieldOptions(),
+    NO_FIELD: PotentialFieldOptions(attraction=0.0, repulsion=0.0),
+    **{
+        name: DubinsOptions(**{**_RRT_H, 'radius': radius})
+        for name, radius in zip(DUBINS, RADII, strict=True)
+    },
+    COARSE: LatticeOptions(spacing=5.0),
+    FINE: LatticeOptions(spacing=1.0),
+    SPARSE_ROADMAP: RoadmapOptions(n_samples=200),
+    DENSE_ROADMAP: RoadmapOptions(n_samples=STEPS),
+}
 # Growths after the first one that the escape may make.
 ATTEMPTS = (0, 1, 2, 3, 4, 6)
 # More club points than `club_count`, so near [map units], turn a new point away with this chance.
@@ -110,7 +134,7 @@ class Extent:
     Parameters
     ----------
     few, many : int
-        Runs of each planner on each map in the two columns of the table, timed.
+        Runs of each planner on each map in the two columns of the table, timed but for relatives.
     seeds : int
         Runs behind what needs more of them: shares, medians of draws.
     long : int
@@ -151,7 +175,10 @@ def timed_runs(extent: Extent) -> list[Run]:
 
 def spread_runs(extent: Extent) -> list[Run]:
     """Return the other runs, which may be done beside each other."""
-    runs = [*_long_runs(extent), *_arm_runs(extent), *_club_runs(extent), *_map_runs(extent)]
+    runs = [
+        *(*_long_runs(extent), *_arm_runs(extent), *_club_runs(extent), *_map_runs(extent)),
+        *_relative_runs(extent),
+    ]
     # Long and short ones mixed: the progress bar is realistic, and no worker is left with all
     # the long ones.
     return [runs[i] for i in np.random.default_rng(0).permutation(len(runs))]
@@ -178,7 +205,7 @@ def club_label(name: str, attempts: int) -> str:
 
 
 def _runs(
-    problem: str, name: str, seeds: Iterable[int], options: TreeOptions | None = None
+    problem: str, name: str, seeds: Iterable[int], options: Options | None = None
 ) -> list[Run]:
     """Return a run a seed, of a planner of ALGORITHMS or of other options."""
     options = options or ALGORITHMS[name]
@@ -192,6 +219,13 @@ def _map_runs(extent: Extent) -> Iterator[Run]:
             yield from _runs(problem, name, range(extent.many, extent.seeds))
         for name in (LONG_STEP, BIASED):
             yield from _runs(problem, name, range(extent.seeds))
+
+
+def _relative_runs(extent: Extent) -> Iterator[Run]:
+    for problem in with_near(extent.maps):
+        for name, options in RELATIVES.items():
+            # A lattice leaves nothing to chance.
+            yield from _runs(problem, name, range(1 if name in LATTICES else extent.many), options)
 
 
 def _long_runs(extent: Extent) -> Iterator[Run]:

@@ -17,21 +17,22 @@ from typing import Any
 
 import numpy as np
 from rrth_planner.model.status import PlanStatus
-from rrth_planner.planning.options import TreeOptions
-from rrth_planner.planning.planner import plan
+from rrth_planner.planning.options import Options
 from rrth_planner.reproduction.path_club import (
     goes_over_the_top,
     scattered_growths,
     ScatterOptions,
 )
 from rrth_planner.reproduction.problems import CERTIFIED, load_problem, NamedProblem
+from rrth_planner.reproduction.relatives.search import find_path
 
 Row = dict[str, Any]
 # Sources that determine a row, besides the run itself.
 _SOURCES = (
     *('kernels', 'planning', 'collision/world.py', 'collision/box_tree.py'),
     *('collision/reference_checker.py', 'model/reach.py', 'reproduction/problems.py'),
-    *('reproduction/run.py', 'reproduction/path_club.py', 'io/map_file.py'),
+    *('reproduction/run.py', 'reproduction/path_club.py', 'reproduction/relatives'),
+    'io/map_file.py',
 )
 
 
@@ -53,7 +54,7 @@ class Run:
 
     problem: str
     algorithm: str
-    options: TreeOptions
+    options: Options
     seed: int
     collision: str = CERTIFIED
 
@@ -63,7 +64,7 @@ class Run:
         return _digest(json.dumps([*parts, self.collision, source_digest()]))
 
 
-def options_digest(options: TreeOptions) -> str:
+def options_digest(options: Options) -> str:
     """Return a short digest of the kind and the values of options."""
     return _digest(json.dumps([type(options).__name__, asdict(options)], sort_keys=True))
 
@@ -130,9 +131,9 @@ def _planned(named: NamedProblem, run: Run) -> Row:
     kind = (type(run.options).__name__, run.collision, run.problem.startswith('arm/'))
     if kind not in _warm:
         # Kernels are loaded by the first plan that uses them: that is not its planning time.
-        plan(named.problem, run.options, np.random.default_rng(run.seed))
+        find_path(named.problem, run.options, np.random.default_rng(run.seed))
         _warm.add(kind)
-    result = plan(named.problem, run.options, np.random.default_rng(run.seed))
+    result = find_path(named.problem, run.options, np.random.default_rng(run.seed))
     row: Row = {
         'status': result.status.value,
         'time_total': result.planning_time,
