@@ -20,6 +20,7 @@ from rrth_planner.reproduction.claims.plane import (
     plane_claims,
     plane_table,
 )
+from rrth_planner.reproduction.claims.relatives import relatives_table, relatives_words
 from rrth_planner.reproduction.experiments import ARM_STEP, DENSE, Extent, SPARSE, STEPS, TWO_WAYS
 from rrth_planner.reproduction.problems import MARGIN, RAY
 from rrth_planner.reproduction.statistics import markdown_table, Rows
@@ -102,6 +103,17 @@ Draws of the goal itself, which the paper names beside the work that it builds o
 which all runs above are made: growth of RRT, the first {extent.seeds} seeds.
 
 {goal_bias_table(rows, extent)}
+
+## Relatives that the paper names, and references
+
+Growth guided by a potential field and smoothing by Dubins' words are named in the paper; A* and
+PRM stand for searches that grow no tree at random. All are references in the plane: neither the
+planner nor its nodes offer them. Their paths are checked by the same code as all others, arcs as
+chords of 0.01 rad. There are no times: these are interpreted Python, the others are compiled.
+
+{relatives_table(rows, extent)}
+
+{relatives_words(rows, extent)}
 
 ## The escape from local traps (section 4)
 

@@ -18,12 +18,20 @@ from rrth_planner.cli.reproduce import main
 from rrth_planner.io.cluster import cluster_client
 from rrth_planner.reproduction import path_club, run
 from rrth_planner.reproduction.claims.plane import plane_claims
-from rrth_planner.reproduction.experiments import ALGORITHMS, PRINTED_DENSE, QUICK, RRT
+from rrth_planner.reproduction.experiments import (
+    ALGORITHMS,
+    LATTICES,
+    PRINTED_DENSE,
+    QUICK,
+    RELATIVES,
+    RRT,
+    RRT_H,
+)
 from rrth_planner.reproduction.row_store import read_rows
 from rrth_planner.reproduction.statistics import Rows
 
 TINY = ('--quick', '--serial', '--runs', '2', '--seeds', '2', '--maps', 'c_shape', '--targets')
-PICTURES = ('09', '10a', '10b', '11', '12', '14', '20', '21')
+PICTURES = ('09', '10a', '10b', '11', '12', '14', '20', '21', 'relatives')
 
 
 @pytest.fixture(scope='module')
@@ -114,6 +122,22 @@ def test_the_report_tells_what_spacings_cost_what_goal_bias_does_and_which_arm_i
     told = re.sub(r'\s+', ' ', text)
     assert '10 check points lie on the first 1 m of the ray, every 10 cm' in told
     assert 'The first cost of RRT*-Smart is that of its first path as it shortened it' in told
+
+
+def test_the_report_has_the_relatives_with_what_each_is_and_none_with_a_time(output):
+    text = (output / 'reproduction.md').read_text(encoding='utf-8')
+    part = text.partition('## Relatives that')[2].partition('\n## ')[0]
+    for name in (RRT, RRT_H, *RELATIVES):
+        for problem in ('c_shape', 'c_shape_near'):
+            n = 1 if name in LATTICES else 2
+            row = rf'\| {problem} \([\d.]+\) \| {re.escape(name)} \| {n} of {n} \| 100 % \|'
+            assert re.search(row, part), (name, problem)
+    assert 'There are no times' in part
+    assert ' ms' not in part
+    for begin in ('**RRT, potential field**', '**RRT-H, Dubins**', '**A***', '**PRM**', 'Shorter'):
+        assert part.count(f'\n- {begin}') == 1, begin
+    # Nothing that keeps to a lattice or to draws is as short as what is pulled round corners.
+    assert 'Shorter than RRT-H in the median: none' in part
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from rrth_planner.reproduction.experiments import Extent, NEAR, with_near
+from rrth_planner.reproduction.experiments import (
+    ALGORITHMS,
+    COARSE,
+    DENSE_ROADMAP,
+    DUBINS,
+    Extent,
+    FIELD,
+    FIVE,
+    NEAR,
+    RELATIVES,
+    with_near,
+)
 from rrth_planner.reproduction.figures.arm import joint_paths_figure, median_paths, motions_figure
 from rrth_planner.reproduction.figures.costs import (
     convergence_figure,
@@ -35,7 +46,8 @@ def draw_pictures(rows: Rows, extent: Extent, output: Path) -> dict[str, str]:
 def _pictures(rows: Rows, extent: Extent) -> Iterator[tuple[str, str, Figure]]:
     """Yield the number, the caption and the picture of each figure."""
     maps, n = extent.maps, extent.many
-    yield '09', 'Figure 9: trees and paths of the five planners', trees_figure(maps)
+    five = {name: ALGORITHMS[name] for name in FIVE}
+    yield '09', 'Figure 9: trees and paths of the five planners', trees_figure(maps, five)
     note = f'medians and quartiles of {n} runs'
     caption = f'Figure 10a: cost against the number of P_random, {note}'
     yield '10a', caption, convergence_figure(rows, maps, DRAWS, n)
@@ -51,3 +63,10 @@ def _pictures(rows: Rows, extent: Extent) -> Iterator[tuple[str, str, Figure]]:
     yield '20', caption, joint_paths_figure(pairs)
     shown = dict(list(pairs.items())[:: max(1, len(pairs) // N_MOTIONS)])
     yield '21', "Figure 21: the arm's motion", motions_figure(shown)
+    some = {name: RELATIVES[name] for name in (FIELD, DUBINS[1], COARSE, DENSE_ROADMAP)}
+    figure = trees_figure(maps, some, "RRT-H's path before smoothing")
+    yield (
+        'relatives',
+        'Relatives of RRT-H and references: what they search, and their paths',
+        figure,
+    )

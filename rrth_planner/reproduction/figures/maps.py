@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of maps with trees and paths, as the paper's Figures 9 and 14."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.collections import LineCollection
@@ -12,11 +12,10 @@ import numpy as np
 from rrth_planner.io.map_file import load_map
 from rrth_planner.model.arrays import Array
 from rrth_planner.planning.box_map import BoxMap
-from rrth_planner.planning.planner import plan
+from rrth_planner.planning.options import Options
 from rrth_planner.reproduction.claims.path_club import both_ways_shares
 from rrth_planner.reproduction.experiments import (
-    ALGORITHMS,
-    FIVE,
+    LATTICES,
     SCATTERED,
     SCATTERED_CLUB,
     SCATTERED_PLAIN,
@@ -24,25 +23,33 @@ from rrth_planner.reproduction.experiments import (
 )
 from rrth_planner.reproduction.path_club import goes_over_the_top, scattered_growths
 from rrth_planner.reproduction.problems import load_problem
+from rrth_planner.reproduction.relatives.search import find_path
 from rrth_planner.reproduction.statistics import Rows
 from rrth_planner.visualization.motion_figure import GRID
 
 WALL, FRAME, TREE = '#4c5560', '#30343b', '#9fb4c9'
 FIRST, FINAL, START, GOAL = '#d9822b', '#c2185b', '#2f9e6e', '#1b6ca8'
+BEFORE = "RRT-H's path before shortening"
 # Of the plans that are drawn.
 SEED = 1
 
 
-def trees_figure(maps: Sequence[str]) -> Figure:
-    """Return the trees and paths of one seed: a row a map, a column a planner."""
+def trees_figure(
+    maps: Sequence[str], planners: Mapping[str, Options], before: str = BEFORE
+) -> Figure:
+    """
+    Return the trees and paths of one seed: a row a map, a column a planner.
+
+    before: what the legend calls the path that RRT-H's final one was made of.
+    """
     figure = Figure(
-        figsize=(2.75 * len(FIVE), 2.95 * len(maps) + 0.5), layout='constrained', dpi=100
+        figsize=(2.75 * len(planners), 2.95 * len(maps) + 0.5), layout='constrained', dpi=100
     )
-    grid = figure.subplots(len(maps), len(FIVE), squeeze=False)
+    grid = figure.subplots(len(maps), len(planners), squeeze=False)
     for row, problem in zip(grid, maps, strict=True):
-        for axes, name in zip(row, FIVE, strict=True):
+        for axes, (name, options) in zip(row, planners.items(), strict=True):
             rng = np.random.default_rng(SEED)
-            result = plan(load_problem(problem).problem, ALGORITHMS[name], rng)
+            result = find_path(load_problem(problem).problem, options, rng)
             _draw_map(axes, load_map(problem))
             for tree in result.trees:
                 children = np.flatnonzero(tree.parents >= 0)
@@ -55,9 +62,10 @@ def trees_figure(maps: Sequence[str]) -> Figure:
             if result.path is not None:
                 _draw_path(axes, result.path.waypoints, FINAL, 2.2)
                 note = f'cost {result.path.length:.1f}'
-            axes.set_title(f'{name}\n{note}, {result.n_samples} P_random', fontsize=9)
+            unit = 'nodes' if name in LATTICES else 'P_random'
+            axes.set_title(f'{name}\n{note}, {result.n_samples} {unit}', fontsize=9)
         row[0].set_ylabel(problem.replace('_', ' '), fontsize=11, fontweight='bold')
-    _legend(figure, ('tree', TREE), ("RRT-H's path before shortening", FIRST), ('path', FINAL))
+    _legend(figure, ('tree', TREE), (before, FIRST), ('path', FINAL))
     return figure
 
 
