@@ -83,6 +83,7 @@ ALGORITHMS: dict[str, TreeOptions] = {
 FIELD, NO_FIELD = 'RRT, potential field', 'RRT, steps of one length'
 RADII = (2.0, 5.0, 10.0)
 DUBINS = tuple(f'RRT-H, Dubins, radius {radius:g}' for radius in RADII)
+HALVED = 'RRT-H, Dubins, radius 10, halved where it must be'
 LATTICES = COARSE, FINE = 'A*, spacing 5', 'A*, spacing 1'
 ROADMAPS = SPARSE_ROADMAP, DENSE_ROADMAP = 'PRM, 200 draws', 'PRM, 2000 draws'
 RELATIVES: dict[str, Options] = {
@@ -93,6 +94,7 @@ RELATIVES: dict[str, Options] = {
         name: DubinsOptions(**{**_RRT_H, 'radius': radius})
         for name, radius in zip(DUBINS, RADII, strict=True)
     },
+    HALVED: DubinsOptions(**{**_RRT_H, 'radius': RADII[-1], 'halvings': 2}),
     COARSE: LatticeOptions(spacing=5.0),
     FINE: LatticeOptions(spacing=1.0),
     SPARSE_ROADMAP: RoadmapOptions(n_samples=200),

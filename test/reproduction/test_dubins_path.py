@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rrth_planner.planning.box_map import BoxMap, map_problem
 from rrth_planner.planning.visibility_graph import shortest_path
-from rrth_planner.reproduction.experiments import DUBINS, RADII, RELATIVES
+from rrth_planner.reproduction.experiments import DUBINS, HALVED, RADII, RELATIVES
 from rrth_planner.reproduction.problems import load_problem
 from rrth_planner.reproduction.relatives.dubins_path import DubinsOptions, smooth
 from rrth_planner.reproduction.relatives.dubins_words import follow, FULL_TURN
@@ -63,3 +63,25 @@ def test_a_radius_that_does_not_fit_is_not_found():
     assert wide.status.value == 'sample limit'
     # The path that could not be smoothed.
     assert wide.raw_path.length == pytest.approx(exact, rel=1e-2)
+
+
+def test_the_radius_is_halved_only_where_it_must_be():
+    named, halved = load_problem('fence'), RELATIVES[HALVED]
+    n_tighter = 0
+    for seed in range(6):
+        plain, other = (
+            find_path(named.problem, options, np.random.default_rng(seed))
+            for options in (RELATIVES[DUBINS[-1]], halved)
+        )
+        assert named.is_path_valid(other.path.waypoints)
+        poses, curvatures, _ = smooth(other.raw_path.waypoints, named.problem, halved)
+        is_tighter = np.abs(curvatures) > 1.0 / RADII[-1] + 1e-12
+        assert (np.abs(curvatures) <= 4.0 / RADII[-1] + 1e-12).all()
+        if plain.path is not None:
+            np.testing.assert_array_equal(other.path.waypoints, plain.path.waypoints)
+            assert not is_tighter.any()
+        else:
+            # One word or two of it.
+            assert 0 < is_tighter.sum() <= 6 < len(poses)
+            n_tighter += 1
+    assert n_tighter > 0

@@ -9,6 +9,7 @@ from rrth_planner.reproduction.experiments import (
     DUBINS,
     Extent,
     FIELD,
+    HALVED,
     LATTICES,
     NO_FIELD,
     RELATIVES,
@@ -96,11 +97,11 @@ def _field_words(rows: Rows, extent: Extent) -> str:
 
 def _dubins_words(rows: Rows, extent: Extent) -> str:
     parts = []
-    for name in DUBINS:
+    for name in (*DUBINS, HALVED):
         some = rows.where(algorithm=name, below=extent.many)
         is_found = np.isfinite(some.aligned('cost_final'))
         excess = some.aligned('cost_final')[is_found] / some.aligned('cost_first')[is_found] - 1.0
-        text = f'{name.rpartition(", ")[2]}: {share_of(is_found)}'
+        text = f'{name.removeprefix("RRT-H, Dubins, ")}: {share_of(is_found)}'
         if len(excess):
             text += f', {percent(float(np.median(excess)), 1)} longer'
         parts.append(text)
@@ -112,7 +113,8 @@ def _dubins_words(rows: Rows, extent: Extent) -> str:
         f'{"; ".join(parts)}. It wins where something cannot turn on the spot. A point can, and '
         "so can an arm's joints, whose corners the planner rounds otherwise. The heading has no "
         'jump, but the curvature has. Where no free path of that radius leads through the '
-        'waypoints it is "not found": it neither takes a smaller radius nor looks for another way.'
+        'waypoints it is "not found", or the radius is halved in as few places as will do, up to '
+        'twice in each; no other way is looked for.'
     )
 
 

@@ -26,6 +26,8 @@ from rrth_planner.reproduction.relatives.graph_search import Edge, one_path, sho
 # Waypoints within so many radii behind the next one may be reached instead of it: those of one
 # corner lie closer together than a turn can follow.
 SKIPPED = 4.0
+# A word whose radius is halved counts as longer by this, once for each time: no path on a map is.
+DETOUR = 1e6
 # Of the waypoints along an arc that stand for it in results [rad].
 FINEST_TURN = 0.01
 
@@ -34,7 +36,10 @@ FINEST_TURN = 0.01
 class DubinsOptions(RRTHOptions):
     """RRT-H, its path then smoothed by the words of Dubins (after Zhou, as the paper cites it)."""
 
-    radius: float = option(5.0, 0.01, 1000.0, 'map', 'of all turns')
+    radius: float = option(5.0, 0.01, 1000.0, 'map', 'of all turns, but for halvings')
+    halvings: int = option(
+        0, 0, 10, '-', 'how often the radius is halved at most, at a corner where it does not fit'
+    )
     n_headings: int = option(8, 1, 360, '-', 'headings that are tried at each waypoint')
 
 
@@ -63,8 +68,9 @@ def smooth(
     Return the shortest path of Dubins' words through waypoints that is free, in pieces.
 
     Its curvature is nowhere greater than 1 / radius, and its heading does not jump. Each word is
-    proven free in closed form. Shortest: over the headings that are tried, evenly spaced from
-    the mean of both edges at the waypoint on; waypoints of one corner may be left out.
+    proven free in closed form. Shortest: of those with the fewest `halvings`, over the headings
+    that are tried, evenly spaced from the mean of both edges at the waypoint on; waypoints of
+    one corner may be left out.
 
     Returns
     -------
@@ -76,6 +82,8 @@ def smooth(
     """
     poses, walls = _poses(waypoints, options.n_headings), _walls(problem)
     n, last = options.n_headings, len(waypoints) - 1
+    radii: Array = options.radius * 0.5 ** np.arange(options.halvings + 1, dtype=np.float64)
+    extra = DETOUR * np.repeat(np.arange(len(radii)), len(WORDS))
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)))
     # The waypoints from the next one to this one may be reached.
     ends = np.searchsorted(along, along[1:] + SKIPPED * options.radius, 'right')
@@ -87,19 +95,20 @@ def smooth(
     def edges(node: int) -> Iterable[Edge]:
         i = node // n
         others = np.arange((i + 1) * n, ends[i] * n)
-        totals = word_pieces(poses[[node]], poses[others], options.radius).sum(axis=2)
+        pieces = [word_pieces(poses[[node]], poses[others], radius) for radius in radii]
+        totals = np.concatenate(pieces, axis=1).sum(axis=2) + extra
         rows, kinds = np.nonzero(np.isfinite(totals))
         lengths = totals[rows, kinds]
         return zip(others[rows].tolist(), lengths.tolist(), kinds.tolist(), strict=True)
 
     def is_free(node: int, other: int, kind: int) -> bool:
-        return not enters(*_word(poses[node], poses[other], kind, options.radius), walls).any()
+        return not enters(*_word(poses[node], poses[other], kind, radii), walls).any()
 
     goals = set(range(last * n, len(poses)))
     bound = np.repeat(to_goal, n).tolist().__getitem__
     steps = shortest_route(range(n), goals, edges, is_free, bound).steps
     words = [
-        _word(poses[node], poses[other], kind, options.radius)
+        _word(poses[node], poses[other], kind, radii)
         for (node, _), (other, kind) in zip(steps[:-1], steps[1:], strict=True)
     ]
     if not words:
@@ -138,12 +147,11 @@ def _walls(problem: PlanningProblem) -> Array:
     return walls + np.array([[CONTACT], [-CONTACT]])
 
 
-def _word(
-    pose_from: Array, pose_to: Array, kind: int, radius: float
-) -> tuple[Array, Array, Array]:
-    """Return the pieces of a word: poses (3, 3), curvatures (3,) and lengths (3,)."""
-    lengths = word_pieces(pose_from[None], pose_to[None], radius)[0, kind]
-    curvatures = WORDS[kind] / radius
+def _word(pose_from: Array, pose_to: Array, kind: int, radii: Array) -> tuple[Array, Array, Array]:
+    """Return the pieces of a word, radius by radius: poses (3, 3), curvatures, lengths (3,)."""
+    times, word = divmod(kind, len(WORDS))
+    lengths = word_pieces(pose_from[None], pose_to[None], radii[times])[0, word]
+    curvatures = WORDS[word] / radii[times]
     poses = [pose_from]
     for curvature, length in zip(curvatures[:2], lengths[:2], strict=True):
         poses.append(follow(poses[-1], curvature, length))
