@@ -109,7 +109,8 @@ which all runs above are made: growth of RRT, the first {extent.seeds} seeds.
 Growth guided by a potential field and smoothing by Dubins' words are named in the paper; A* and
 PRM stand for searches that grow no tree at random. All are references in the plane: neither the
 planner nor its nodes offer them. Their paths are checked by the same code as all others, arcs as
-chords of 0.01 rad. There are no times: these are interpreted Python, the others are compiled.
+chords of 0.01 rad. There are no times: these are interpreted Python, the others are compiled. In
+the last column a path that was not found counts as longer than any.
 
 {relatives_table(rows, extent)}
 

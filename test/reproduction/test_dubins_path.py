@@ -45,6 +45,17 @@ def test_a_smoothed_path_turns_no_tighter_has_no_corner_and_is_clear(problem, na
     assert (bends <= (0.5 * (sizes[:-1] + sizes[1:])[is_bent] + 1e-6) / radius).all()
 
 
+@pytest.mark.parametrize(
+    ('problem', 'i', 'seed'),
+    [('c_shape', 2, 72), ('spiral', 0, 75), ('spiral', 1, 88), ('c_shape_near', 0, 33)],
+)
+def test_chords_are_clear_of_a_corner_that_their_arc_just_clears(problem, i, seed):
+    # With these seeds the shortest path has an arc within 1e-4 of a corner.
+    named = load_problem(problem)
+    result = find_path(named.problem, RELATIVES[DUBINS[i]], np.random.default_rng(seed))
+    assert named.is_path_valid(result.path.waypoints)
+
+
 def test_a_radius_that_does_not_fit_is_not_found():
     corridor = BoxMap(
         name='corridor',

@@ -109,7 +109,8 @@ def _dubins_words(rows: Rows, extent: Extent) -> str:
         "**RRT-H, Dubins** (after Zhou, as the paper cites it): RRT-H's path becomes arcs of one "
         'radius and lines through its waypoints, the shortest over eight headings at each; '
         'waypoints of one corner may be left out, and every piece is proven clear of the walls in '
-        f'closed form. Found on all maps together, and how much longer than before (median): '
+        'closed form, its chords too. Found on all maps together, and how much longer than before '
+        '(median): '
         f'{"; ".join(parts)}. It wins where something cannot turn on the spot. A point can, and '
         "so can an arm's joints, whose corners the planner rounds otherwise. The heading has no "
         'jump, but the curvature has. Where no free path of that radius leads through the '

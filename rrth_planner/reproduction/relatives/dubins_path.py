@@ -68,9 +68,9 @@ def smooth(
     Return the shortest path of Dubins' words through waypoints that is free, in pieces.
 
     Its curvature is nowhere greater than 1 / radius, and its heading does not jump. Each word is
-    proven free in closed form. Shortest: of those with the fewest `halvings`, over the headings
-    that are tried, evenly spaced from the mean of both edges at the waypoint on; waypoints of
-    one corner may be left out.
+    proven free in closed form, and so are the chords that stand for it in results. Shortest: of
+    those with the fewest `halvings`, over the headings that are tried, evenly spaced from the
+    mean of both edges at the waypoint on; waypoints of one corner may be left out.
 
     Returns
     -------
@@ -102,7 +102,12 @@ def smooth(
         return zip(others[rows].tolist(), lengths.tolist(), kinds.tolist(), strict=True)
 
     def is_free(node: int, other: int, kind: int) -> bool:
-        return not enters(*_word(poses[node], poses[other], kind, radii), walls).any()
+        pieces = _word(poses[node], poses[other], kind, radii)
+        if enters(*pieces, walls).any():
+            return False
+        # Beside an arc that just clears a corner a chord may not: results are made of chords.
+        points = sampled(*pieces)
+        return all(map(problem.world.is_edge_valid, points[:-1], points[1:]))
 
     goals = set(range(last * n, len(poses)))
     bound = np.repeat(to_goal, n).tolist().__getitem__
