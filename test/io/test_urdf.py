@@ -176,7 +176,6 @@ def test_the_command_writes_where_it_is_told(tmp_path, capsys):
     ('arguments', 'words'),
     [
         (['--radius', '0'], 'radius: 0.0, expected a length > 0 [m]'),
-        (['--radius', 'nan'], 'radius: nan, expected a length > 0 [m]'),
         (['--arm', 'nowhere.yaml'], 'nowhere.yaml'),
         (['--settings', 'nowhere.yaml'], 'nowhere.yaml'),
         (['--base-frame', 'tool'], 'expected names, printable and all different'),

@@ -155,7 +155,6 @@ def test_bad_files_and_arguments_are_one_sentence(tmp_path, capsys):
         (['--set', 'margin=[0.1]'], 'margin: [0.1], expected a number [m]'),
         (['--set', 'margin="1"'], "margin: '1', expected a number [m]"),
         (['--set', 'margin=*a'], '--set margin: line 1: '),
-        (['--target', 'nan', '0', '0'], 'target'),
         (['--person', 'none.bvh'], 'file none.bvh: No such file'),
         (['--person', '--body', str(file)], '--person: given with --body'),
         (['--person', '--skeleton', 'mediapipe'], 'base: '),
