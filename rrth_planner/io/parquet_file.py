@@ -63,7 +63,11 @@ def append_table(path: Path, table: Any) -> None:
 
 def unreadable(path: Path, problem: Exception, what: str) -> RrthError:
     """Return the error of a file that is not what was expected."""
-    return RrthError(f'file {path}: {" ".join(str(problem).split())}; expected {what}')
+    # The libraries' own words for a missing file name it, and its error number, twice.
+    why = ' '.join(str(problem).split())
+    if isinstance(problem, OSError) and problem.errno is not None:
+        why = os.strerror(problem.errno)
+    return RrthError(f'file {path}: {why}; expected {what}')
 
 
 def replace_file(path: Path, write: Callable[[Path], object]) -> None:

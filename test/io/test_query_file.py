@@ -117,7 +117,8 @@ def test_a_bad_csv_file_is_a_sentence(tmp_path, text, words):
         ('texts.parquet', 'column target_x: texts, expected numbers'),
         ('half.parquet', 'expected queries'),
         ('queries.xlsx', 'another kind of file; expected queries, a .csv or .parquet file'),
-        ('none.csv', 'none.csv'),
+        ('none.csv', 'none.csv: No such file or directory; expected queries, '),
+        ('none.parquet', 'none.parquet: No such file or directory; expected queries, '),
     ],
 )
 def test_a_bad_file_of_another_kind_is_a_sentence(tmp_path, name, words):

@@ -1164,31 +1164,6 @@ def test_a_part_that_stays_about_to_move_into_the_way_ends_the_request(start, mo
     assert not stranger.received['joint_trajectory']
 
 
-def test_parts_are_expected_where_they_will_be_by_their_last_bodies(start):
-    planner, stranger = start()
-    say_all(planner, stranger)
-    inputs = inputs_of(planner)
-    assert not inputs.expected_scene().boxes
-    # 20 ms apart, as far as the machine goes: the speed is that of the times at which they came.
-    begin, place = time.monotonic(), 0.0
-    while time.monotonic() < begin + 0.3:
-        place = -2.0 + (time.monotonic() - begin)
-        n = inputs.body.n_good
-        stranger.publishers['body_boxes'].publish(
-            array(box('far hand', center=(-3.0, place, 0.0)))
-        )
-        stranger.wait_until(lambda n=n: inputs.body.n_good > n)
-        time.sleep(0.02)
-    found = inputs.expected_scene().boxes
-    assert [one.name for one in found] == ['far hand/0'] * 3
-    steps = [one.center[1] - place for one in found]
-    np.testing.assert_allclose(steps, (0.1, 0.2, 0.3), rtol=0.6)
-    assert found[0].center[0] == -3.0
-    # At rest it is expected nowhere else.
-    time.sleep(0.3)
-    assert not inputs.expected_scene().boxes
-
-
 @pytest.mark.parametrize('age', [1.0, 3600.0])
 def test_a_body_that_was_measured_long_ago_is_stale_however_new_the_message(start, age):
     planner, stranger = start(body_timeout=0.2)

@@ -328,11 +328,14 @@ class ExecutionMonitor:
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
             self._in_the_way_since = None
             self._extend(now, begin)
-        elif self._may_go_on(phase, now, scene):
-            self._extend(now, begin, partial(self._is_clear, scene, expected))
         else:
-            why = IN_THE_WAY if is_soon_free else SOON_IN_THE_WAY
-            self._stop(phase, now, scene, arrived, why)
+            if self._in_the_way_since is None:
+                self._in_the_way_since = now
+            if self._may_go_on(phase, now, scene):
+                self._extend(now, begin, partial(self._is_clear, scene, expected))
+            else:
+                why = IN_THE_WAY if is_soon_free else SOON_IN_THE_WAY
+                self._stop(phase, now, scene, arrived, why)
         waited = self._elapsed(arrived)
         # The ages of parts count where motions are proven separate.
         if waited > LONGEST_WAIT and not self._commitments.is_active:
@@ -348,10 +351,9 @@ class ExecutionMonitor:
         With separation it has been given nothing but a stretch that ends in a stop. Where that is
         free of him, a further stretch that is free as well may follow, while he moves on.
         """
-        running = self.running
-        assert running is not None
+        running, since = self.running, self._in_the_way_since
+        assert running is not None and since is not None
         planned, planned_phase = self._remaining(phase, now)
-        since = self._in_the_way_since = self._in_the_way_since or now
         return (
             self._commitments.is_active
             and now - since < PATIENCE

@@ -16,7 +16,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import REST_SPEED, Trajectory
@@ -421,29 +420,16 @@ class PlanQueue:
             return False
         trajectory, plan, snapshot = outcome.trajectory, outcome.plan, outcome.snapshot
         assert trajectory is not None and plan is not None and snapshot is not None
-        motion = ExecutingMotion(
-            trajectory=trajectory,
-            start_time=self._now() if outcome.handover is None else outcome.handover.time,
-            target_distance=plan.target_distance,
-            escape_time=plan.escape_time,
-        )
-        if not is_expected_free(
-            motion,
-            0.0,
-            parameters.arm,
-            self._inputs.expected_scene(),
-            margin=parameters.margin,
-            ray_guard_length=parameters.ray_guard_length,
-        ):
-            raise RequestError(
-                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the wearer is about to move into the way of the motion',
-            )
         self._reporter.body_used(self._inputs.body.age(self._now()))
         # From here on the request cannot be cancelled.
         self._open.discard(ticket)
         monitor.begin(
-            motion,
+            ExecutingMotion(
+                trajectory=trajectory,
+                start_time=self._now() if outcome.handover is None else outcome.handover.time,
+                target_distance=plan.target_distance,
+                escape_time=plan.escape_time,
+            ),
             snapshot.goal,
             parameters,
             lambda: self._publishers.publish(msg),

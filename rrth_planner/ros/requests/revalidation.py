@@ -11,6 +11,7 @@ from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -89,13 +90,15 @@ class Revalidation:
         """
         Return the present wearer, of whom the motion is proven free.
 
-        Raise RequestError where it is not, or where the arm is not at the start of the motion.
+        Raise RequestError where it is not, or begins where he will be soon, or where the arm is
+        not at the start of the motion.
         """
         now = self.clock()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
         if not _is_same(present.scene, self.snapshot.scene):
             self._require_proof(present.scene)
+        self._require_room()
         return present.scene
 
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
@@ -138,6 +141,25 @@ class Revalidation:
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 'the wearer moved while the motion was planned: it is not proven free of the '
                 'present body',
+            )
+
+    def _require_room(self) -> None:
+        """Raise RequestError where a moving part is about to come into the way of the motion."""
+        parameters = self.parameters
+        motion = ExecutingMotion(
+            trajectory=self._motion, start_time=0.0, escape_time=self.plan.escape_time
+        )
+        if not is_expected_free(
+            motion,
+            0.0,
+            parameters.arm,
+            self.inputs.expected_scene(),
+            margin=parameters.margin,
+            ray_guard_length=parameters.ray_guard_length,
+        ):
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'the wearer is about to move into the way of the motion',
             )
 
     @property
