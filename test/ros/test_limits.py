@@ -221,15 +221,15 @@ def test_the_documents_say_how_much_is_taken():
     short, long = most(box('torso')), most(*typical)
     said = (
         f'{MOST_BYTES // 1024} KiB (`MOST_BYTES`): some {round(short, -1):,} CUBEs with a short '
-        f'name, {round(long, -1):,} like those of `msg_examples/body.yaml`'
+        f'name, or {round(long, -1):,} like those of `msg_examples/body.yaml`'
     )
     table = SECURITY.read_text(encoding='utf-8')
     assert said in table
     assert f'| {MOST_BOXES:,} (`MOST_BOXES`) |' in table
     assert f'{MOST_BYTES_OF_MOTION // 1024**2} MiB and {MOST_POINTS:,} points' in table
-    files = f'{FILE_BYTES // 2**20} MiB, {MOST_VALUES:,} values, {DEEPEST} in one another'
+    files = f'{FILE_BYTES // 2**20} MiB, {MOST_VALUES:,} values, nested {DEEPEST} deep'
     assert files in table
-    assert f'angles, lengths and coordinates | {FARTHEST:.0f} rad or m' in table
+    assert f'angles, lengths and coordinates | {FARTHEST:,.0f} rad or m' in table
 
 
 def test_an_answer_of_somebody_else_is_one_line():
