@@ -60,14 +60,14 @@ def finished(path: Path, schema: Any) -> Any:
         raise RecordError(f'file {path}: another Parquet file, expected {WHAT}, or none')
     if done is None:
         raise RecordError(
-            f'file {path}: plans of queries with other columns, expected those of now; '
-            'another --output begins anew'
+            f'file {path}: plans of queries with other columns, expected those given; '
+            'another --output starts afresh'
         )
     if origin != schema.metadata[_ORIGIN]:
         differ = ', '.join(_differences(origin, schema.metadata[_ORIGIN]))
         raise RecordError(
-            f'file {path}: planned with other values of {differ}, expected those of now; another '
-            '--output begins anew'
+            f'file {path}: planned with other values of {differ}, expected those given; another '
+            '--output starts afresh'
         )
     return done
 
@@ -97,14 +97,14 @@ def unfinished(path: Path, batches: Iterator[QueryBatch], done: Any) -> Iterator
         batch = next(batches, None)
         if batch is None:
             raise RecordError(
-                f'file {path}: {len(done)} plans, expected at most as many as queries, {begin}'
+                f'file {path}: {len(done)} plans, expected at most {begin}, the number of queries'
             )
         known = done.slice(begin, len(batch.table))
         if not batch.table.slice(0, len(known)).equals(known):
             first = next(k for k in range(len(known)) if _differ(known, batch.table, k))
             raise RecordError(
-                f'file {path}: plan {begin + first} is of another query, arm, wearer or seed, '
-                'expected those of now; another --output begins anew'
+                f'file {path}: plan {begin + first} has another query, arm, wearer or seed, '
+                'expected those given; another --output starts afresh'
             )
         begin += len(known)
         if len(known) < len(batch.table):

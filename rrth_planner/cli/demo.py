@@ -154,7 +154,7 @@ def _run(options: argparse.Namespace) -> None:
         first.close()
         client.wait_for_end_of_planner()
         client.withdraw_body()
-        print('The wearer is now a person at work, as he was recorded.', flush=True)
+        print('The wearer is now a recorded person at work.', flush=True)
         contacts: list[DiagnosticArray] = []
         if options.physics:
             # The same person: in the scene of the physics, which publishes him as well.
@@ -240,7 +240,7 @@ def _beside_a_person(client: DemoClient, frame: str) -> tuple[Separation, float]
     """
     separation = parameters_of_planner(client).separation
     if separation is None:
-        raise DemoError('the planner is without separation, expected one with it')
+        raise DemoError('separation: false, expected a planner with separation')
     client.see_separation()
     client.wait_for(lambda: bool(client.bodies), 'body_boxes of the person at work')
     client.wait_for(lambda: bool(client.statuses), 'rrth_planner/state')
@@ -269,12 +269,12 @@ def _sentences(client: DemoClient, separation: Separation, frame: str, error: fl
         f'Beside a person at work, with separation: {n_targets} of {n_targets} targets reached '
         f'(the ray misses them by at most {1e3 * error:.3f} mm) with {found.n_commitments} '
         f'commitments, protective stops: {n_stops}, least rate {_rates(client)[:, 1].min():.2f}. '
-        f'Parts of him were faster than assumed in {share:.1f} % of {found.n_frames} frames.',
-        'Each commitment ends at rest and is clear of wherever he may be by then (exceptions: '
+        f'Parts of the body were faster than assumed in {share:.1f} % of {found.n_frames} frames.',
+        'Each commitment ends at rest and is clear of wherever the person may be (exceptions: '
         f'{found.n_excused} near parts faster than assumed, {found.n_unknown} where bodies are '
         f'missing). At {found.n_instants} instants no part of the arm above '
-        f'{rules.contact_speed:g} m/s was in contact with him (exceptions: {found.n_contacts} '
-        'with parts faster than assumed).',
+        f'{rules.contact_speed:g} m/s was in contact with the person (exceptions: '
+        f'{found.n_contacts} with parts faster than assumed).',
     ]
 
 
@@ -287,9 +287,9 @@ def _sentence_of_contacts(messages: Sequence[DiagnosticArray]) -> str:
         (force,) = (float(pair.value) for pair in status.values if pair.key == GREATEST_FORCE)
         found[status.name] = max(found.get(status.name, 0.0), force)
     if not found:
-        return 'By the physics the arm was in contact with no part of him.'
+        return 'The simulation had no contact between arm and person.'
     pairs = ', '.join(f'{name} ({force:.0f} N)' for name, force in found.items())
-    return f'By the physics the arm was in contact with him, at most so strongly: {pairs}.'
+    return f'The simulation had contacts between arm and person, greatest forces: {pairs}.'
 
 
 def _rates(client: DemoClient) -> Array:

@@ -48,11 +48,11 @@ Only the target is required; where a value is missing the default in parentheses
 columns are kept as they are.
 
 The output has the columns of the queries, the seed that was used, digests of the files of arm and
-wearer, and the figures of the plan, named as `plan --json` does; end: the joint positions there
+wearer, and the figures of the plan, named as by `plan --json`; end: the joint positions there
 [rad or m]. status is `solved`, the reason why there is no motion, `invalid query`, or `error`;
 sentence says more. An interrupted campaign, started again, continues.
 
-exit codes: 0  all queries are planned, whatever came out
+exit codes: 0  all queries are planned, with or without a motion
             2  wrong usage or input, or a cluster that ended: the error on standard error
           130  interrupted; what was planned is kept
 
@@ -146,7 +146,7 @@ def campaign() -> argparse.ArgumentParser:
     parser = command_parser('campaign', CAMPAIGN, CAMPAIGN_EPILOG)
     add = parser.add_argument
     add('queries', type=Path, nargs='+', metavar='QUERIES', help='.csv or .parquet')
-    output = 'Parquet file of the plans; one that is there is continued'
+    output = 'Parquet file of the plans; an existing one is continued'
     add('--output', type=Path, required=True, metavar='FILE', help=output)
     add_files(
         parser,
@@ -221,7 +221,7 @@ def viewer() -> argparse.ArgumentParser:
         body=WEARER,
         settings='parameters, laid out as config/planner.yaml',
     )
-    add_target(parser, 'initially [m] (1.5 0.1 0.3)', required=False)
+    add_target(parser, 'target at the start [m] (1.5 0.1 0.3)', required=False)
     add = parser.add_argument
     add(
         '--set',
@@ -245,7 +245,7 @@ def viewer() -> argparse.ArgumentParser:
         const='',
         metavar='FILE',
         help='the wearer moves as a recorded person (.bvh, .c3d, .csv), and the arm plans round '
-        'him; without FILE one who comes along',
+        'them; without FILE the packaged recording',
     )
     add(
         '--skeleton',
@@ -297,7 +297,7 @@ def read_urdf() -> argparse.ArgumentParser:
     add(
         '--include-branches',
         action='store_true',
-        help='enclose links that joints beside the chain move, as fingers, in all positions',
+        help='enclose links moved by joints beside the chain, such as fingers, in all positions',
     )
     srdf = 'SRDF whose disable_collisions name pairs of links that may meet'
     add('--srdf', type=Path, metavar='FILE', help=srdf)

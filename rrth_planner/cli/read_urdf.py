@@ -77,7 +77,7 @@ def _with_flesh(found: ImportedArm, options: argparse.Namespace) -> tuple[Import
     lines = []
     if flesh.left_out:
         lines.append(
-            f'left out: {", ".join(flesh.left_out)}, which joints beside the chain move; '
+            f'left out: {", ".join(flesh.left_out)}, moved by joints beside the chain; '
             '--include-branches encloses them in all their positions'
         )
     if not flesh.capsules:

@@ -51,9 +51,9 @@ the ray from the target [m] (null if unknown).
 parameters, from the present joint positions, and with the body of --body or the one received on
 body_boxes (whose publisher must be latched, or repeat it)."""
 WEARER = """\
-Publish a recorded person as the wearer until Ctrl-C, played forwards and backwards, as a tracker
-would: boxes on body_boxes, or what trackers publish. Without FILE he is the one that comes along,
-at construction work. Names are relative; namespaces and remaps go after --ros-args.
+Publish a recorded person as the wearer until Ctrl-C, as a tracker would: boxes on body_boxes, or
+what trackers publish. The recording is played forwards and backwards; without FILE it is the
+packaged one, of construction work. Names are relative; namespaces and remaps go after --ros-args.
 """
 WEARER_EPILOG = """\
 examples:
@@ -70,7 +70,7 @@ how many targets were reached, which contacts there were, and how far the tool l
 SIMULATE_EPILOG = """\
 examples:
   %(prog)s                                  beside a person at work, in the browser
-  %(prog)s --lag 0.03 --payload 1.0         by soft servos
+  %(prog)s --lag 0.03 --payload 1.0         with soft servos
   %(prog)s --seconds 10 --video run.mp4     rendered, without a browser
 """
 RECORD = """\
@@ -159,7 +159,7 @@ def wearer() -> argparse.ArgumentParser:
         help='boxes on body_boxes (default), SPHERE markers on markers, or a PoseArray on poses',
     )
     for name, text, unit, default in (
-        ('rate', 'speed of the motion; 1: as recorded, 0: he stands', '-', 1.0),
+        ('rate', 'speed of the motion; 1: as recorded, 0: standing still', '-', 1.0),
         ('fps', 'measurements per second', '1/s', 60.0),
         ('latency', 'from a measurement until it is published, with the old stamp', 's', 0.0),
         ('drop', 'share of the measurements that are lost, 0 to below 1', '-', 0.0),
@@ -174,7 +174,7 @@ def wearer() -> argparse.ArgumentParser:
             help=f'{text} [{unit}] (%(default)g)',
         )
     add('--end', type=number('s'), metavar='X', help='end of what is played [s]')
-    add('--seed', type=integer, default=0, help='of noise and losses (%(default)s)')
+    add('--seed', type=integer, default=0, help='random seed of noise and losses (%(default)s)')
     add(
         '--skeleton',
         default='cmu_bvh',
@@ -230,22 +230,23 @@ def simulate() -> argparse.ArgumentParser:
         default='recorded',
         help='a person who moves, or boxes that do not (%(default)s)',
     )
-    add('--file', type=Path, metavar='FILE', help='his recording, or his boxes (those that come)')
+    file = "the person's recording, or boxes of one who stands (the packaged ones)"
+    add('--file', type=Path, metavar='FILE', help=file)
     begin = 'start of --file [s] (%(default)g)'
     add('--begin', type=number('s'), default=0.0, metavar='S', help=begin)
-    add('--end', type=number('s'), default=0.0, metavar='S', help='its end [s]; 0: to the end')
-    add('--skeleton', default='cmu_bvh', metavar='NAME', help='of --file (%(default)s)')
+    add('--end', type=number('s'), default=0.0, metavar='S', help='end of --file [s]; 0: its end')
+    add('--skeleton', default='cmu_bvh', metavar='NAME', help='skeleton of --file (%(default)s)')
     add(
         '--lag',
         type=number('m', above=0.0),
         default=0.01,
         metavar='M',
-        help='by so much the servos lag at top speed [m] (%(default)g)',
+        help='lag of the tool behind its motion at top speed [m] (%(default)g)',
     )
-    payload = 'at the tool [kg] (%(default)g)'
+    payload = 'mass at the tool [kg] (%(default)g)'
     add('--payload', type=number('kg'), default=0.2, metavar='KG', help=payload)
     add('--seed', type=integer, default=1, help='random seed of the planner; -1: a new one')
-    seconds = 'how long [s] (until Ctrl-C)'
+    seconds = 'duration [s] (until Ctrl-C)'
     add('--seconds', type=number('s', above=0.0), default=math.inf, metavar='S', help=seconds)
     add('--video', type=Path, metavar='FILE', help='render the run to a .gif or .mp4')
     add(
@@ -254,7 +255,7 @@ def simulate() -> argparse.ArgumentParser:
         default=None,
         help='show it in the browser (unless there is --video)',
     )
-    add('--port', type=integer, default=8081, help='of the viewer (%(default)s)')
+    add('--port', type=integer, default=8081, help='port of the viewer (%(default)s)')
     add(
         '--open',
         action=argparse.BooleanOptionalAction,

@@ -117,7 +117,7 @@ def on_each_worker(client: Any, function: Callable[[Any], Any], argument: Any) -
         return {address: _result(future) for address, future in futures.items()}
     except (ImportError, AttributeError) as problem:
         raise RrthError(
-            f'workers: {problem}; expected this package there, in the version of here'
+            f'workers: {problem}; expected the same version of this package there'
         ) from problem
 
 

@@ -163,8 +163,8 @@ def _guessed_unit(positions: Array) -> str:
         if SMALLEST <= scale * size <= LARGEST:
             return unit
     raise RecordError(
-        f'a skeleton of {size:.3g} from end to end is as large as a person neither in m nor in '
-        'cm or mm, expected a person, or his unit'
+        f'the skeleton measures {size:.3g} from end to end, expected the size of a person in m, '
+        'cm or mm, or a unit'
     )
 
 

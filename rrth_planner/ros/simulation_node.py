@@ -143,7 +143,8 @@ class SimulationNode(Node):
             # Or a simulated clock was set back.
             self._left_out += behind
             self.get_logger().warning(
-                f'{behind:.3f} s behind the clock: left out', throttle_duration_sec=REPORT_PERIOD
+                f'{behind:.3f} s behind the clock: time left out',
+                throttle_duration_sec=REPORT_PERIOD,
             )
         while not self._is_over.is_set():
             with self._lock:

@@ -123,8 +123,8 @@ def servo_for_lag(
     time = lag / speed - delay
     if not 0.0 < time < np.inf:
         raise OptionsError(
-            f'lag: {lag:g}, expected more than {delay * speed:.4f}: so far the tool moves at '
-            f'{speed:.2f} m/s in the delay of {delay:g} s [m]'
+            f'lag: {lag:g}, expected more than {delay * speed:.4f}, which the tool moves at '
+            f'{speed:.2f} m/s within the delay of {delay:g} s [m]'
         )
     width = min(bandwidth, CRITICAL / time)
     inertia = greatest_inertia(arm, mechanics)

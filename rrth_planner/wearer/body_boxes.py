@@ -164,7 +164,7 @@ def _base(
     rotation = rows[0].T
     origin = at + rotation @ base.offset
     if not is_clear[0] or not np.abs(origin).max() <= FARTHEST_POINT:
-        raise SceneError(f'base: "{name}", or what its axes are made of, is lost, expected both')
+        raise SceneError(f'base: "{name}" or a joint of its axes is lost, expected all of them')
     return rotation, origin
 
 

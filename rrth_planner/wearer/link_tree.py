@@ -77,7 +77,7 @@ class LinkTree:
             while above.parent:
                 above, n = names[above.parent], n + 1
                 if n > len(names):
-                    raise ModelError(f'link "{link.name}": above itself, expected a tree')
+                    raise ModelError(f'link "{link.name}": is its own ancestor, expected a tree')
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -196,10 +196,10 @@ def test_queries_that_are_added_at_the_end_are_planned_too(plans, folder, two, t
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
-        (('--margin', '0.03'), 'planned with other values of margin, expected those of now'),
+        (('--margin', '0.03'), 'planned with other values of margin, expected those given'),
         (('--seed', '4'), 'plan 13 is of another query, arm, wearer or seed'),
         (('other.csv',), 'plan 2 is of another query'),
-        (('shorter.csv',), '23 plans, expected at most as many as queries, 5'),
+        (('shorter.csv',), '23 plans, expected at most 5, the number of queries'),
         (('fewer.csv',), 'plans of queries with other columns'),
     ],
 )

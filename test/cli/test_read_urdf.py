@@ -320,7 +320,7 @@ def test_links_with_collision_geometry_become_capsules(tmp_path, capsys):
     said, found = capsys.readouterr().out, load_arm(arm)
     assert 'shape: 3 capsules' in said
     assert '  upper_arm: 1 capsule, radius up to 0.0' in said
-    assert 'left out: finger, which joints beside the chain move' in said
+    assert 'left out: finger, moved by joints beside the chain' in said
     assert 'may meet, by arm.srdf: upper_arm and lamp' in said
     assert [(c.name, c.link) for c in found.capsules] == [
         ('upper_arm', 2),

@@ -81,7 +81,7 @@ def test_the_unit_of_a_bvh_is_guessed_and_said_or_given(tmp_path, bvh, unit, sca
 def test_a_skeleton_of_no_persons_size_needs_a_unit(tmp_path, bvh):
     file = tmp_path / 'tiny.bvh'
     file.write_text(bvh_text(scale=0.1)[0])
-    with pytest.raises(RecordError, match='as large as a person neither in m nor in cm or mm'):
+    with pytest.raises(RecordError, match='from end to end, expected the size of a person'):
         load_person(file)
     assert load_person(file, unit='cm').positions.max() < 0.2
 

@@ -346,7 +346,7 @@ def test_without_the_base_frame_nothing_is_published(start):
     tracker = start('azure_kinect', 'markers')
     posture = person_of('azure_kinect')
     tracker.send(moved(posture, 'SPINE_CHEST', np.nan), NOW)
-    tracker.wait_for_rejection('base: "neck", or what its axes are made of, is lost')
+    tracker.wait_for_rejection('base: "neck" or a joint of its axes is lost')
     expect(tracker.hear(posture, NOW + STEP), tracker.skeleton, posture)
     assert len(tracker.boxes) == 1
     wait_until(lambda: tracker.figures['frames received'] == '2')

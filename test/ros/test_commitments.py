@@ -214,7 +214,7 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
     arm.frames(1, hand)
     status = arm.statuses[-1]
     assert status.state is SeparationState.PROTECTIVE_STOP
-    assert status.cause.startswith('the next body came too late')
+    assert status.cause.startswith('the next body arrived too late')
     trajectory, begin = arm.published[-1]
     arm.frames(30, hand)
     assert arm.published[n][1] >= begin + trajectory.duration

@@ -1132,7 +1132,7 @@ def test_a_second_publisher_of_the_body_is_reported(start, monkeypatch):
     stranger.node.destroy_publisher(other)
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
     (line,) = [line for line in warnings if 'publishers' in line]
-    assert 'body_boxes has 2 publishers: of each marker the last edit counts' in line, line
+    assert 'body_boxes has 2 publishers: for each marker the last edit counts' in line, line
 
 
 def hand_in_the_way():
@@ -1160,7 +1160,7 @@ def test_a_part_that_stays_about_to_move_into_the_way_ends_the_request(start, mo
     monkeypatch.setattr(inputs_of(planner), 'expected_scene', hand_in_the_way)
     message = stranger.answer().message
     assert message.startswith('MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE (-3): '), message
-    assert 'the wearer is about to move into the way of the motion' in message
+    assert 'the wearer is about to move into the path of the arm' in message
     assert not stranger.received['joint_trajectory']
 
 

@@ -378,7 +378,7 @@ def test_a_disk_that_is_full_ends_the_recording_with_one_sentence(tmp_path):
     assert ended.returncode == 0, ended.stderr
     assert not ended.stderr
     (said,) = ended.stdout.splitlines()
-    assert said == f'{path}: File too large, expected to write there'
+    assert said == f'{path}: File too large, expected a writable file'
 
 
 @pytest.mark.parametrize('name', [*dict.fromkeys([*TOPICS.values(), type_name(String)])])

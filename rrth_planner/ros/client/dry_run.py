@@ -37,7 +37,7 @@ def plan_without_moving(
     if body is None:
         client.wait_for(
             lambda: inputs.body.measured is not None or inputs.body.rejection is not None,
-            f'a body on {inputs.body.topic}, and none is given by --body',
+            f'a body on {inputs.body.topic} (none was given with --body)',
         )
     planner = InProcessPlanner()
     planner.warm_up(parameters.arm, parameters.options)

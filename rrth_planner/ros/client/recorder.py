@@ -87,7 +87,7 @@ class RecordingFile:
             yield
         except OSError as problem:
             raise RecordError(
-                f'{self._path}: {problem.strerror}, expected to write there'
+                f'{self._path}: {problem.strerror}, expected a writable file'
             ) from problem
 
 

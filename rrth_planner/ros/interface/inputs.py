@@ -259,8 +259,8 @@ class Inputs:
         if lost:
             raise RequestError(
                 code,
-                f'the body on {source.topic} has lost parts: {lost}; expected each of them again, '
-                'or its DELETE',
+                f'the body on {source.topic} has lost parts: {lost}; expected each of them to be '
+                'published again or deleted (DELETE)',
             )
         if body.n_boxes == 0 and not body.lost:
             raise RequestError(

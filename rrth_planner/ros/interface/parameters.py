@@ -49,18 +49,19 @@ def declared(dof: int) -> tuple[Setting, ...]:
     timeout, given_timeout = (0.0, LONGEST_TIMEOUT), (NOT_GIVEN, LONGEST_TIMEOUT)
     by_default = '0: never; -1: {:g} with separation, else never'
     ray = 'length of the pointing ray kept clear in motion'
-    reserve = 'clearance beyond the margin that is planned with where there is room'
+    reserve = 'clearance kept beyond the margin where there is room'
     escape = 'greatest depth of a bar in a box, margin included, to escape from; 0: none'
     latency = 'age at reception of a body without stamp'
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     second = 'library behind the second check of every motion'
     separate = 'publish only motions that are proven clear of a wearer who moves'
-    meeting = 'no faster part of the arm may meet the wearer'
+    meeting = 'greatest speed of a part of the arm that may meet the wearer'
     moving = (
-        'greatest speeds of parts of the body by words of their names; of several the greatest'
+        'greatest speeds of parts of the body by words of their names; the greatest of those that '
+        'fit'
     )
-    late = 'the controller executes a motion at most so late'
+    late = 'greatest delay with which the controller executes a motion'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
@@ -78,7 +79,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
         ),
         Setting('max_jerk', [40.0] * dof, 'rad/s^3', f'greatest jerk {each}', *limit),
         *(
-            Setting(name, [0.0], unit, f'of fail-safe stops, {each}; 0: as of motions')
+            Setting(name, [0.0], unit, f'of fail-safe stops, {each}; 0: as for motions')
             for name, unit in STOP_LIMITS.items()
         ),
         Setting(

@@ -11,7 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rrth_planner.execution.body_motion import BodyMotion
+from rrth_planner.execution.body_motion import BodyMotion, RAISED, SHARE
 from rrth_planner.model.errors import one_line
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
@@ -132,7 +132,8 @@ class Reporter:
         if body.faster:
             named = ', '.join(f'{one_line(name)}: {v:.1f} m/s' for name, v in body.faster)
             self._node.get_logger().warning(
-                f'faster than body_speeds: {named}; assumed to be that fast for a while',
+                f'faster than body_speeds: {named}; for {RAISED:g} s assumed to be {SHARE:g} '
+                'times as fast',
                 throttle_duration_sec=WARNING_PERIOD,
             )
 
@@ -251,7 +252,8 @@ class Reporter:
         self._n_publishers = n = self._node.count_publishers(topic)
         if n > max(before, 1):
             self._node.get_logger().warning(
-                f'{topic} has {n} publishers: of each marker the last edit counts, whoever sent it'
+                f'{topic} has {n} publishers: for each marker the last edit counts, whoever sends '
+                'it'
             )
 
     def reject(self, code: ErrorCode, sentence: str) -> None:

@@ -49,18 +49,16 @@ SETTINGS = (
     _fixed(
         'urdf', '', 'path of a URDF', 'masses and inertias of the links, in place of link_mass'
     ),
-    _fixed(
-        'link_mass', [1.0], 'kg', f'of what each joint moves up to the next; {EACH}', 1e-3, 1e3
-    ),
+    _fixed('link_mass', [1.0], 'kg', f'of the links up to the next joint; {EACH}', 1e-3, 1e3),
     _fixed('payload', 0.2, 'kg', 'at the origin of the tool', 0.0, 1e3),
     _fixed('max_effort', [20.0], 'N m or N', f'of each motor; {EACH}', 1e-3, 1e5),
     _fixed('friction', [0.1], 'N m or N', f'dry friction; {EACH}', 0.0, 1e4),
     _fixed('damping', [0.5], 'N m s/rad', f'viscous friction; {EACH}', 0.0, 1e4),
     _fixed('armature', [0.1], 'kg m^2', f'of the rotor behind its gear; {EACH}', 0.0, 1e3),
-    _fixed('max_velocity', [1.5], 'rad/s', f'at which the tool lags by lag; {EACH}', 1e-3, 1e6),
-    _fixed('lag', 0.01, 'm', 'by so much the tool lags its motion at top speed', 1e-4, 1.0),
-    _fixed('bandwidth', 60.0, 'rad/s', 'greatest one of a servo', 1.0, 200.0),
-    _fixed('gravity_compensation', 1.0, '-', 'share of the weight that is held', 0.0, 1.0),
+    _fixed('max_velocity', [1.5], 'rad/s', f'speed for which `lag` holds; {EACH}', 1e-3, 1e6),
+    _fixed('lag', 0.01, 'm', 'lag of the tool behind its motion at top speed', 1e-4, 1.0),
+    _fixed('bandwidth', 60.0, 'rad/s', 'greatest bandwidth of a servo', 1.0, 200.0),
+    _fixed('gravity_compensation', 1.0, '-', 'share of the weight compensated', 0.0, 1.0),
     _fixed('encoder_noise', 5e-6, 'rad', 'standard deviation of a measured position', 0.0, 0.1),
     _fixed('command_delay', 0.002, 's', 'from the controller to the servo', 0.0, 1.0),
     _fixed('seed', 0, '-', 'of the noise', 0, 2**31 - 1),
@@ -78,7 +76,7 @@ SETTINGS = (
         'wearer_file',
         '',
         'path of a file',
-        'boxes of one who stands, or a recording; empty: the one that comes along',
+        'boxes of one who stands, or a recording; empty: the packaged one',
     ),
     _fixed('skeleton', 'cmu_bvh', 'name or path', 'what makes boxes of a recording'),
     _fixed('wearer_begin', 0.0, 's', 'where a recording begins', 0.0, 1e6),

@@ -42,7 +42,7 @@ MEANINGS = {
     'or no escape of bars and ray is proven: which part of the arm, which box, how deep',
     ErrorCode.GOAL_IN_COLLISION: 'the target is inside a box, or all goal configurations that '
     'were tried violate the margin: which part of the arm, which box, how deep',
-    ErrorCode.INVALID_GOAL_CONSTRAINTS: 'a request for something that is no target',
+    ErrorCode.INVALID_GOAL_CONSTRAINTS: 'the target of a request is not valid',
     ErrorCode.FRAME_TRANSFORM_FAILURE: 'a message in a frame that is not known',
     ErrorCode.ROBOT_STATE_STALE: 'the joints are older than `joint_timeout` (counted from the '
     'stamp), or the last of them were rejected',
@@ -53,8 +53,8 @@ MEANINGS = {
     'room to stop straight ahead',
     ErrorCode.NO_IK_SOLUTION: 'no configuration within the joint limits aims at the target',
     ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, or '
-    'something broke: the log has it, and the answer names the file of the incident, by which to '
-    'replay it',
+    'an unexpected error occurred: the answer names the file of the incident, by which to replay '
+    'it, and the log has the details',
 }
 
 CODE_OF_STATUS = {

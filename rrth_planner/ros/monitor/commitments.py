@@ -55,7 +55,7 @@ IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
 # long the controller has one that is published [s].
 LATEST, ARRIVAL = 0.02, 0.005
 # Why a stop takes place that nothing made necessary.
-LATE_BODY = 'the next body came too late: the motion goes on from rest'
+LATE_BODY = 'the next body arrived too late: the motion resumes from rest'
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
 
@@ -137,11 +137,11 @@ class Commitments:
         if self.fault:
             raise RequestError(
                 ErrorCode.FAILURE,
-                f'the planner has failed, and does not move the arm until ~/reset: {self.fault}',
+                f'after an error the planner does not move the arm until ~/reset: {self.fault}',
             )
         if self._body is None:
             raise RequestError(
-                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet to keep separate from'
+                ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet, expected one for separation'
             )
         seen = body_at(self._body, planned.start_time, separation.rules)
         settings = self._stretched(separation)
@@ -149,8 +149,8 @@ class Commitments:
         if isinstance(found, Blocked):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                f'the motion cannot begin: {found.bar} is not proven separate from {found.box} '
-                f'{found.time:.2f} s after its start, should that move',
+                f'the motion cannot begin: if {found.box} moves, {found.bar} is not proven '
+                f'separate from it {found.time:.2f} s after the start',
             )
         self._held_until = self._blocked = -np.inf
         self._is_reset = False

@@ -52,12 +52,12 @@ OFF_TRAJECTORY = (
 )
 # Why the arm is stopped for a body.
 IN_THE_WAY = 'the remaining motion is not proven free of the wearer'
-SOON_IN_THE_WAY = 'the wearer is about to move into the way'
+SOON_IN_THE_WAY = 'the wearer is about to move into the path of the arm'
 # With separation it goes on for so long while the wearer is in the way further on [s].
 PATIENCE = 0.3
 # Why a motion is given up.
-TOO_NEAR = 'the wearer is too near for the motion to go on'
-NOT_FOLLOWED = 'the arm rests beside its motion, and does not follow it'
+TOO_NEAR = 'the wearer is too near for the motion to continue'
+NOT_FOLLOWED = 'the arm is at rest off its motion, and does not follow it'
 # So many motions one after the other that an arm ignores from their begin on are the last ones.
 MOST_IGNORED = 3
 # By whether the arm follows the last commanded motion.
@@ -521,7 +521,7 @@ class ExecutionMonitor:
         is_safe = self._holds(is_remaining_free, stopped, 0.0, scene)
         if not is_safe and self._holds(escapes_by_continuing, *self._remaining(phase, now), scene):
             self._extend(now, time.perf_counter())
-            sentence = f'{why}, but it escapes and a stop would not: motion continues'
+            sentence = f'{why}, but the arm escapes, which a stop would prevent: motion continues'
             if self._reporter.monitor_state[1] != sentence:
                 self._node.get_logger().error(sentence)
             self._set_state(MonitorState.MONITORING, sentence)

@@ -40,8 +40,8 @@ def require_long_enough(plan: MotionPlan, goal: PointingGoal) -> None:
         assert plan.trajectory is not None and isinstance(goal, PacedGoal)
         raise RequestError(
             ErrorCode.PLANNING_FAILED,
-            f'the motion from the arm in motion takes {plan.trajectory.duration:.3f} s, expected '
-            f'at least {goal.min_duration:g} s (min_duration)',
+            f'the arm moves, and the motion takes {plan.trajectory.duration:.3f} s from there, '
+            f'expected at least {goal.min_duration:g} s (min_duration)',
         )
 
 

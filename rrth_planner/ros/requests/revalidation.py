@@ -159,7 +159,7 @@ class Revalidation:
         ):
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                'the wearer is about to move into the way of the motion',
+                'the wearer is about to move into the path of the arm',
             )
 
     @property
