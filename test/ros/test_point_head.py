@@ -250,7 +250,7 @@ def test_a_cancelled_goal_stops_the_arm_on_its_way(client):
     client.wait_until(lambda: client.speed() == 0.0)
     assert client.angle(HIGH) > 0.1
     client.wait_for_report('last code', 'PREEMPTED (-7)')
-    client.wait_for_report('last stop', 'the point_head goal was cancelled: fail-safe stop')
+    client.wait_for_report('last stop', 'the goal of point_head was cancelled: fail-safe stop')
     # It is not planned for again, and the next goal is reached.
     n = len(client.states)
     client.wait_until(lambda: len(client.states) > n + 100)
@@ -282,7 +282,7 @@ def test_a_request_of_a_service_replaces_a_goal_but_a_bad_goal_does_not(client, 
     client.plan.call_async(Trigger.Request())
     assert client.status(result) == ABORTED
     # In the log: within a tenth of a second the diagnostics may have the service's own report.
-    replaced = 'another motion has replaced that of the point_head goal'
+    replaced = 'another motion has replaced the one to the goal'
     client.wait_until(lambda: any(replaced in line for line in client.said))
     client.wait_until(lambda: client.speed() == 0.0 and client.angle(FRONT) < POINTING)
 

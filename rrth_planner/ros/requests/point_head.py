@@ -39,8 +39,8 @@ STILL = 1e-4
 EARLIEST = 0.3
 # Results are kept for clients that ask late for so long [s].
 KEPT = 60
-CANCELLED = 'the point_head goal was cancelled'
-REPLACED = 'another motion has replaced that of the point_head goal'
+CANCELLED = 'the goal of point_head was cancelled'
+REPLACED = 'another motion has replaced the one to the goal of point_head'
 
 
 @dataclass(slots=True, eq=False)
@@ -106,7 +106,7 @@ class PointHeadServer:
             goal = paced_goal(handle.request, target, LOWEST_LIMIT)
         except MessageError as problem:
             code = code_of_rejection(problem, ErrorCode.INVALID_GOAL_CONSTRAINTS)
-            self._reporter.reject(code, f'point_head goal: {problem}')
+            self._reporter.reject(code, f'goal of point_head: {problem}')
             handle.abort()
             return PointHead.Result()
         for other in self._pursuits:
