@@ -103,7 +103,7 @@ def unfinished(path: Path, batches: Iterator[QueryBatch], done: Any) -> Iterator
         if not batch.table.slice(0, len(known)).equals(known):
             first = next(k for k in range(len(known)) if _differ(known, batch.table, k))
             raise RecordError(
-                f'file {path}: plan {begin + first} has another query, arm, wearer or seed, '
+                f'file {path}: plan {begin + first} is of another query, arm, wearer or seed, '
                 'expected those given; another --output starts afresh'
             )
         begin += len(known)

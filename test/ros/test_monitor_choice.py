@@ -151,7 +151,7 @@ def test_an_arm_that_violates_the_margin_continues_where_that_escapes(monitored,
     assert monitored.published == []
     state, sentence = monitored.reporter.monitor_state
     assert state == MonitorState.MONITORING.value
-    assert 'it escapes and a stop would not' in sentence
+    assert 'the arm escapes, which a stop would prevent' in sentence
     # But not into something else.
     monitored.see(monitored.hand(0.0, away), monitored.hand(0.6, 0.0))
     assert len(monitored.published) == 1

@@ -100,7 +100,7 @@ def link(name, parent, joint=''):
         ((link('a', ''), link('a', 'a')), 'link "a": given twice'),
         ((link('a', ''), link('b', 'a', 'j'), link('c', 'a', 'j')), 'joint "j": given twice'),
         ((link('a', ''), link('b', 'x')), 'link "b": no parent "x", expected a link'),
-        ((link('a', ''), link('b', 'c'), link('c', 'b')), 'link "b": above itself'),
+        ((link('a', ''), link('b', 'c'), link('c', 'b')), 'link "b": is its own ancestor'),
     ],
 )
 def test_what_is_no_tree_is_rejected_in_one_sentence(links, words):
