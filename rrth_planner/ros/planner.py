@@ -16,11 +16,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.pipeline.worker_process import WorkerProcess
-from rrth_planner.ros.interface.parameters import (
-    current_parameters,
-    declare_parameters,
-    PlannerParameters,
-)
+from rrth_planner.ros.interface.parameters import declare_parameters, PlannerParameters
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.qos import SERVICE
@@ -65,7 +61,7 @@ class PlannerNode(Node):
         """
         super().__init__(NAME, **kwargs)
         self._point_head: PointHeadServer | None = None
-        parameters = declare_parameters(self)
+        parameters = declare_parameters(self, self._on_parameters)
         self._compile()
         from rrth_planner.execution.warm_up import warm_up
         from rrth_planner.pipeline.planning_process import PlanningProcess
@@ -92,7 +88,6 @@ class PlannerNode(Node):
         except BaseException:
             self._planner.close()
             raise
-        self.add_post_set_parameters_callback(self._on_parameters)
         group = ReentrantCallbackGroup()
         for kind, name, callback in (
             (Trigger, '~/plan', self._on_plan),
@@ -163,9 +158,8 @@ class PlannerNode(Node):
 
         prepare_kernels(self.get_logger().info)
 
-    def _on_parameters(self, _: Any) -> None:
-        before = self._reporter.parameters
-        now = self._reporter.parameters = current_parameters(self, before.arm)
+    def _on_parameters(self, now: PlannerParameters) -> None:
+        before, self._reporter.parameters = self._reporter.parameters, now
         if (
             type(now.options) is not type(before.options)
             or now.second_checker != before.second_checker

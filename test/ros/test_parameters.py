@@ -97,6 +97,16 @@ def test_a_change_is_there_for_the_next_plan(started):
     assert before.margin == 0.02
 
 
+def test_pairs_that_are_allowed_no_more_may_not_meet():
+    node, changes = Node('rrth_planner'), []
+    before = declare_parameters(node, changes.append)
+    for pairs in (['link 3: torso'], ['link 4: head'], ['']):
+        assert node.set_parameters([Parameter(name='allowed', value=pairs)])[0].successful
+    node.destroy_node()
+    assert not before.arm.allowed
+    assert [p.arm.allowed for p in changes] == [(('link 3', 'torso'),), (('link 4', 'head'),), ()]
+
+
 @pytest.mark.parametrize(
     ('name', 'value', 'sentence'),
     [

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of the planner: fields of the core's options as ROS parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import Any
@@ -257,9 +257,16 @@ def _with_allowed(arm: ArmModel, pairs: tuple[str, ...]) -> ArmModel:
         raise OptionsError(str(problem)) from problem
 
 
-def declare_parameters(node: Node) -> PlannerParameters:
+def declare_parameters(
+    node: Node, on_change: Callable[[PlannerParameters], None] | None = None
+) -> PlannerParameters:
     """
     Declare all parameters on a node, and let it reject bad values from now on.
+
+    Parameters
+    ----------
+    on_change : callable, optional
+        Called with all of them after each change.
 
     Raises
     ------
@@ -280,6 +287,9 @@ def declare_parameters(node: Node) -> PlannerParameters:
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(reject_bad)
+    if on_change is not None:
+        # Of the arm of the file: pairs that were `allowed` before may not meet any more.
+        node.add_post_set_parameters_callback(lambda _: on_change(current_parameters(node, arm)))
     return current_parameters(node, arm)
 
 
