@@ -46,7 +46,7 @@ class Separated(Monitored):
 
     def __init__(self, node, parameters):
         """Let the motion begin, with a wearer far away."""
-        self.seen = (FAR,)
+        self.seen, self.period = (FAR,), FRAME
         super().__init__(node, parameters)
 
     def begin(self):
@@ -64,9 +64,9 @@ class Separated(Monitored):
         return np.array(sample(trajectory, [time - begin]))[:, 0]
 
     def frames(self, n, *boxes, sees=True):
-        """Let n frames of the tracker come, 1/120 s apart."""
+        """Let n frames of the tracker come, 1/120 s apart by default."""
         for _ in range(n):
-            self.now += FRAME
+            self.now += self.period
             self.read(*self.commanded(self.now)[:2])
             if sees:
                 self.see(*(boxes or (FAR,)))
@@ -479,6 +479,42 @@ def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     assert arm.statuses[-1].state is not SeparationState.NORMAL
 
 
+@pytest.mark.parametrize('clearance', [0.15, 0.3, 0.5])
+def test_where_a_part_is_new_the_whole_rest_of_the_motion_is_taken_back(separated, clearance):
+    arm, hand = separated(), near(clearance)
+    arm.frames(20)
+    assert arm.monitor._commitments.is_whole
+    n = len(arm.published)
+    arm.frames(1, FAR, hand)
+    # By a slower motion that is proven, or by a stop.
+    assert len(arm.published) == n + 1
+    assert arm.statuses[-1].state is not SeparationState.NORMAL
+    assert 'stopped' in arm.said or not arm.monitor._commitments.is_whole
+    arm.frames(900, FAR, hand)
+    assert arm.is_over
+
+
+def test_a_part_that_is_new_and_far_changes_nothing(separated):
+    arm = separated()
+    arm.frames(20)
+    arm.frames(20, FAR, replace(FAR, name='foot', center=-FAR.center))
+    assert len(arm.published) == 1
+
+
+def test_where_a_part_is_faster_than_assumed_the_whole_rest_is_taken_back(separated):
+    hand = Box('hand', [2.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    arm = separated()
+    arm.see(hand)
+    arm.begin()
+    arm.frames(20, hand)
+    assert arm.monitor._commitments.is_whole
+    n = len(arm.published)
+    arm.frames(1, replace(hand, center=hand.center - [0.08, 0.0, 0.0]))
+    assert arm.monitor._commitments._body.n_faster == 1
+    assert len(arm.published) == n + 1
+    assert arm.statuses[-1].state is not SeparationState.NORMAL
+
+
 def test_where_commitments_take_longer_to_find_they_last_longer(separated):
     arm, hand, stretches = separated(), near(0.3), []
     arm.see(hand)
@@ -577,12 +613,25 @@ def test_a_hand_in_the_ray_further_on_stops_the_arm_only_where_it_stays(separate
     assert not arm.commanded(arm.now)[1].any()
 
 
-def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(separated, monkeypatch):
-    arm, hand = beside(separated, 0.3)
-    n, other = len(arm.published), in_the_ray()
-    monkeypatch.setattr(arm.inputs, 'expected_scene', lambda: Scene((other,)))
-    arm.frames(250, hand)
-    check_ray(arm, n, other)
+@pytest.mark.parametrize('rate', [120, 30])
+@pytest.mark.parametrize('clearance', [0.3, 0.7, None])
+def test_a_hand_that_comes_into_the_ray_has_the_arm_slow_down_before(
+    separated, monkeypatch, clearance, rate
+):
+    arm, hand = separated(), FAR if clearance is None else near(clearance)
+    arm.period = 1.0 / rate
+    arm.see(hand)
+    arm.begin()
+    arm.frames(rate // 12, hand)
+    # Without a wearer near the controller has the whole rest of the motion.
+    assert arm.monitor._commitments.is_whole == (clearance is None)
+    expected, way = Scene((in_the_ray(),)), []
+    monkeypatch.setattr(arm.inputs, 'expected_scene', lambda: expected)
+    for _ in range(4 * rate):
+        arm.frames(1, hand)
+        way.append(arm.commanded(arm.now)[0])
+    length, margin = (getattr(arm.reporter.parameters, n) for n in ('ray_guard_length', 'margin'))
+    assert reference_checker.first_contact(ARM, expected, np.array(way), length, margin) is None
     assert not arm.commanded(arm.now)[1].any()
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() > 1e-2
 

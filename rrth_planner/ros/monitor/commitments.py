@@ -10,7 +10,13 @@ import time
 
 import numpy as np
 from rrth_planner.collision.separation import Blocked, first_unproven
-from rrth_planner.execution.body_motion import body_at, BodyMotion, first_sight, seen_again
+from rrth_planner.execution.body_motion import (
+    body_at,
+    BodyMotion,
+    first_sight,
+    places_of,
+    seen_again,
+)
 from rrth_planner.execution.commitment import (
     Commitment,
     extended,
@@ -81,6 +87,9 @@ class Commitments:
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
+        # Whether a part that is new, or was faster than assumed, has come since the present
+        # commitment was proven.
+        self._is_news = False
         # Why no motion may begin until `reset`; and whether the one that stopped may go on.
         self.fault, self._is_reset = '', False
         # When it was last not proven that the motion may go on [s], and what kept it from that.
@@ -119,7 +128,9 @@ class Commitments:
         if self._body is None:
             self._body = first_sight(scene, measured)
         else:
+            is_new = (places_of(self._body.scene, scene) < 0).any()
             self._body = seen_again(self._body, scene, measured, separation.rules)
+            self._is_news = self._is_news or bool(is_new or self._body.faster)
         self._last = body
         with suppress(Exception):
             self._reporter.body_observed(self._body)
@@ -153,7 +164,7 @@ class Commitments:
                 f'separate from it {found.time:.2f} s after the start',
             )
         self._held_until = self._blocked = -np.inf
-        self._is_reset = False
+        self._is_reset = self._is_news = False
         # The controller may reject what replaces a running motion.
         replaced = [] if self.present is None else [self.present]
         self._recent = deque([*replaced, found], maxlen=REMEMBERED)
@@ -207,6 +218,19 @@ class Commitments:
         way = reading.positions - self.planned.trajectory.positions[0]
         return float(np.abs(way).max()) > MOVED
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether the controller was given the whole rest of the motion."""
+        return self.present is not None and self.present.is_whole
+
+    def has_lost_proof(self, now: float) -> bool:
+        """Return whether the whole rest was given and is not proven any more, by a part's news."""
+        if not self._is_news or self.present is None or not self.present.is_whole:
+            return False
+        assert self.planned is not None
+        self._is_news = not self.is_separate(_executing(self.present, self.planned), now)
+        return self._is_news
+
     def waits_for_reset(self, now: float) -> bool:
         """Return whether the motion is on its way, and a stop there lasts until `reset`."""
         parameters = self._parameters
@@ -257,6 +281,13 @@ class Commitments:
             blocked = self._blocked_by if self._blocked >= present.start_time else None
             self._report(blocked, float(path_state(present, now)[1]), True)
             return None
+        elapsed = now - present.start_time
+        if present.is_whole and (
+            self.has_lost_proof(now)
+            or not is_clear(part_of(present.trajectory, elapsed, present.trajectory.duration))
+        ):
+            # From here on the motion is given in stretches.
+            present = replace(present, stretch=elapsed)
         seen = body_at(self._body, now, separation.rules)
         found = extended(present, now, seen, self._stretched(separation), is_clear)
         if found is None:
@@ -272,7 +303,7 @@ class Commitments:
             # The arm is on its way to rest by then: from there the next one goes on.
             return None
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
-        self.present = found
+        self.present, self._is_news = found, False
         self._recent.append(found)
         if is_at_rest:
             self._is_reset = False

@@ -53,6 +53,7 @@ OFF_TRAJECTORY = (
 # Why the arm is stopped for a body.
 IN_THE_WAY = 'the remaining motion is not proven free of the wearer'
 SOON_IN_THE_WAY = 'the wearer is about to move into the path of the arm'
+NOT_SEPARATE = 'the remaining motion is no longer proven separate from the wearer'
 # With separation it goes on for so long while the wearer is in the way further on [s].
 PATIENCE = 0.3
 # Why a motion is given up.
@@ -327,13 +328,21 @@ class ExecutionMonitor:
         if is_free and is_soon_free:
             self._reporter.remaining_motion_checked(time.perf_counter() - begin)
             self._in_the_way_since = None
-            self._extend(now, begin)
+            if planned_phase < planned.escape_time:
+                self._extend(now, begin)
+            else:
+                # So far the arm keeps clear of where he will be; so must what it is given next.
+                self._extend(now, begin, partial(self._is_soon_clear, expected))
+            if self._commitments.has_lost_proof(self._now()):
+                self._stop(phase, now, scene, arrived, NOT_SEPARATE)
         else:
             if self._in_the_way_since is None:
                 self._in_the_way_since = now
-            if self._may_go_on(phase, now, scene):
+            may_go_on = self._may_go_on(phase, now, scene)
+            if may_go_on:
                 self._extend(now, begin, partial(self._is_clear, scene, expected))
-            else:
+            # The whole rest of the motion has no stop ahead of him.
+            if not may_go_on or self._commitments.is_whole:
                 why = IN_THE_WAY if is_soon_free else SOON_IN_THE_WAY
                 self._stop(phase, now, scene, arrived, why)
         waited = self._elapsed(arrived)
@@ -349,7 +358,8 @@ class ExecutionMonitor:
         Return whether the arm may go on although the wearer is in the way further on.
 
         With separation it has been given nothing but a stretch that ends in a stop. Where that is
-        free of him, a further stretch that is free as well may follow, while he moves on.
+        free of him, a further stretch that is free as well may follow, while he moves on. So it
+        may after the whole rest of the motion, which is replaced.
         """
         running, since = self.running, self._in_the_way_since
         assert running is not None and since is not None
@@ -365,9 +375,14 @@ class ExecutionMonitor:
         """Return whether a stretch and its stop are free of the wearer, now and soon."""
         assert self.running is not None
         motion = replace(self.running, trajectory=curve, escape_time=0.0)
-        return self._holds(is_remaining_free, motion, 0.0, scene) and self._holds(
-            is_expected_free, motion, 0.0, expected
-        )
+        is_free = self._holds(is_remaining_free, motion, 0.0, scene)
+        return is_free and self._is_soon_clear(expected, curve)
+
+    def _is_soon_clear(self, expected: Scene, curve: Trajectory) -> bool:
+        """Return whether a stretch and all its stop are free of where the wearer will be soon."""
+        assert self.running is not None
+        motion = replace(self.running, trajectory=curve, target_distance=0.0, escape_time=0.0)
+        return not expected.boxes or self._holds(is_remaining_free, motion, 0.0, expected)
 
     def _remaining(self, phase: float, now: float) -> tuple[ExecutingMotion, float]:
         """Return the motion that the arm is to execute, and the time within it [s]."""
@@ -532,6 +547,7 @@ class ExecutionMonitor:
         self._reporter.stop_published(took)
         self._report_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
         self._record_stop(stopped.trajectory, None if warning else scene)
+        self._commitments.fail(why, is_fault=False)
 
     def _stop_for_failure(self) -> None:
         """Publish the pending stop with as little code as possible; the lock is held."""
