@@ -470,6 +470,17 @@ def test_a_motion_that_stopped_on_its_way_goes_on_by_itself_or_after_reset(separ
     assert np.abs(arm.commanded(arm.now)[0] - end).max() < 1e-6
 
 
+def test_a_reset_of_a_motion_that_runs_does_not_count_for_its_next_stop(separated):
+    arm, hand = beside(separated, 0.2, resume='manual', replan=False)
+    arm.monitor.reset()
+    arm.frames(5, hand)
+    arm.monitor.hold(arm.now + 0.6)
+    arm.frames(200, hand)
+    assert arm.is_over
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() > 0.1
+    assert arm.statuses[-1].cause == 'waits for ~/reset'
+
+
 def test_a_part_that_is_faster_than_assumed_slows_the_arm_down(separated):
     arm, hand = beside(separated, 0.5, 5)
     jumps = [hand, replace(hand, center=hand.center + 0.08)]

@@ -303,10 +303,9 @@ class Commitments:
             # The arm is on its way to rest by then: from there the next one goes on.
             return None
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
-        self.present, self._is_news = found, False
+        # A reset counts for the stop that it follows, and no later one.
+        self.present, self._is_news, self._is_reset = found, False, False
         self._recent.append(found)
-        if is_at_rest:
-            self._is_reset = False
         # An error in the report must not hide what was published.
         with suppress(Exception):
             self._reporter.commitment_published(time.perf_counter() - begin)
