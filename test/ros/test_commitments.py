@@ -583,6 +583,13 @@ def test_the_ray_is_clear_only_while_it_is_known_to_meet_nobody(separated):
     assert not arm.ray_clear[-1]
     arm.frames(2)
     assert arm.ray_clear[-1]
+    # A part that is lost may be anywhere, also where the motion goes on.
+    arm.see(FAR, expires=arm.now + 0.01)
+    arm.frames(4, sees=False)
+    assert not arm.ray_clear[-1]
+    assert arm.monitor.is_monitoring
+    arm.frames(2)
+    assert arm.ray_clear[-1]
     # Older than `body_timeout`.
     arm.frames(30, sees=False)
     assert not arm.ray_clear[-1]

@@ -444,7 +444,8 @@ class ExecutionMonitor:
         """Return whether the pointing ray is known to be clear of the wearer."""
         parameters, now = self._reporter.parameters, self._now()
         try:
-            body = self._inputs.require_fresh(now, parameters)
+            # Where a part is that was lost is not known.
+            body = self._inputs.body_at(now, parameters)
             q = self._inputs.joints_at(now, parameters.joint_timeout).positions
         except RequestError:
             return False
