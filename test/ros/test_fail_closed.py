@@ -261,6 +261,26 @@ def test_after_an_error_nothing_is_planned_by_itself(
     assert stop.is_replanned == (n_again * replan == 1)
 
 
+def test_a_motion_that_is_not_wanted_any_more_is_not_planned_again_for_what_fails_then(
+    monitored, monkeypatch
+):
+    arm = monitored()
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    with monkeypatch.context() as broken:
+        broken.setattr(arm.monitor._publishers, 'publish_motion', lambda *_: 1 / 0)
+        arm.monitor.brake('of the test')
+        arm.monitor.fail('a body is late')
+    arm.monitor._on_timer()
+    assert len(arm.published) == 1
+    (stop,) = arm.monitor.take_stops()
+    assert not stop.is_replanned
+    # The next one may be.
+    arm.begin()
+    arm.monitor.fail('a body is late')
+    (stop,) = arm.monitor.take_stops()
+    assert stop.is_replanned
+
+
 def test_a_planner_that_ends_stops_its_arm(monitored):
     arm = monitored()
     arm.monitor.close()

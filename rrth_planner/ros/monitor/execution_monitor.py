@@ -293,7 +293,9 @@ class ExecutionMonitor:
         """Stop the arm, if it executes a motion; the lock is held."""
         if self.running is not None and self._state is MonitorState.MONITORING:
             self._commitments.fail(why, is_fault)
-            self.pending_stop, self._is_replanned = why, is_replanned
+            # What is not to be planned again does not become so by what fails later.
+            self._is_replanned = is_replanned and (self._is_replanned or not self.pending_stop)
+            self.pending_stop = why
             self._pending_since = time.perf_counter()
             self._stop_for_failure()
 
