@@ -354,6 +354,58 @@ def test_a_stop_comes_after_all_where_the_commitment_is_not_proven_any_more(
     assert arm.is_over
 
 
+def withheld(arm, monkeypatch):
+    """Let a stop be withheld, after which no motion is proven; return how many were published."""
+    unproven = separation.Blocked(0.0, 'bar', 'box')
+    answers = [unproven, None]
+    monkeypatch.setattr(
+        commitments, 'first_unproven', lambda *_: answers.pop(0) if answers else unproven
+    )
+    n = len(arm.published)
+    arm.monitor.fail('of the test')
+    assert len(arm.published) == n
+    return n
+
+
+def test_a_withheld_stop_that_cannot_be_published_is_tried_again(separated, monkeypatch):
+    arm, hand = beside(separated, 0.2)
+    n = withheld(arm, monkeypatch)
+    with monkeypatch.context() as broken:
+        broken.setattr(arm.monitor._publishers, 'publish_motion', lambda *_: 1 / 0)
+        arm.frames(1, hand)
+    arm.frames(1, hand)
+    assert len(arm.published) == n + 1
+
+
+def test_a_motion_that_could_not_be_published_leaves_the_stop_before_it_withheld(
+    separated, monkeypatch
+):
+    arm, hand = beside(separated, 0.2)
+    n = withheld(arm, monkeypatch)
+    with pytest.raises(ZeroDivisionError):
+        arm.command(ExecutingMotion(trajectory=arm.motion, start_time=arm.now), lambda: 1 / 0)
+    arm.frames(1, hand)
+    assert len(arm.published) == n + 1
+
+
+def test_a_stop_of_the_whole_rest_comes_as_soon_as_it_is_proven(separated, monkeypatch):
+    arm = separated()
+    arm.frames(5)
+    unproven = separation.Blocked(0.0, 'bar', 'box')
+    answers = [unproven, None, unproven, None]
+    monkeypatch.setattr(
+        commitments, 'first_unproven', lambda *_: answers.pop(0) if answers else None
+    )
+    arm.monitor.brake('of the test')
+    arm.frames(1)
+    assert len(arm.published) == 1
+    arm.frames(1)
+    assert len(arm.published) == 2
+    arm.frames(60)
+    assert arm.is_over
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() > 0.1
+
+
 def test_a_stop_that_is_proven_separate_comes_at_once(separated):
     arm, hand = beside(separated, 0.3)
     n = len(arm.published)

@@ -179,8 +179,7 @@ class ExecutionMonitor:
                     commanded = with_lead_in(present, phase, commanded, now)
                 self._tracker.begin(commanded, now)
                 self._parameters, self._goal = parameters, goal
-                self._state, self._withheld_stop = MonitorState.MONITORING, None
-                self._in_the_way_since = None
+                self._state, self._in_the_way_since = MonitorState.MONITORING, None
                 publish()
                 if commanded is not running:
                     self._publishers.publish_motion(
@@ -191,6 +190,7 @@ class ExecutionMonitor:
                 self._commitments = commitments
                 raise
             self.n_motions += 1
+            self._withheld_stop = None
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
 
@@ -635,17 +635,21 @@ class ExecutionMonitor:
         )
 
     def _check_withheld_stop(self, now: float) -> None:
-        """Publish a stop after all where the commitment is not proven any more."""
+        """Publish a stop after all where that is proven now, or the commitment not any more."""
         motion = self._withheld_stop
         if motion is None or self._state is not MonitorState.STOPPING:
             return
         if now >= motion.start_time + motion.trajectory.duration:
             self._withheld_stop = None
-        elif not self._is_separate(motion, now):
-            self._withheld_stop = None
-            stop = self._stop_of(motion, 0.0, now)
-            self._tracker.stop(stop)
+            return
+        stop = self._stop_of(motion, 0.0, now)
+        # Other commitments end in a stop of their own.
+        is_proven = self._commitments.is_whole and self._is_separate(stop, now)
+        if is_proven or not self._is_separate(motion, now):
+            # An error here leaves it to the next body.
             self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+            self._tracker.stop(stop)
+            self._withheld_stop = None
 
     def _is_separate(self, motion: ExecutingMotion, now: float) -> bool:
         """Return whether the rest of a motion is proven separate; not after an error."""
