@@ -316,6 +316,19 @@ def test_an_error_moves_the_arm_no_further_than_its_commitment_until_reset(
     assert arm.monitor.running is not None
 
 
+def test_after_an_error_during_a_stop_no_motion_begins_until_reset(separated):
+    arm, hand = beside(separated, 0.3)
+    arm.monitor.fail('a body is late')
+    arm.frames(1, hand)
+    arm.monitor.fail('an error', is_replanned=False)
+    assert arm.statuses[-1].state is SeparationState.FAULT
+    arm.frames(60, hand)
+    with pytest.raises(RequestError, match='does not move the arm until ~/reset: an error'):
+        arm.begin()
+    assert arm.monitor.reset() == 'an error'
+    arm.begin()
+
+
 @pytest.mark.parametrize('is_kept', [True, False])
 def test_a_stop_that_is_not_proven_leaves_the_arm_on_its_commitment_while_that_is(
     separated, monkeypatch, is_kept

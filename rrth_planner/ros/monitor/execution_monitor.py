@@ -298,6 +298,9 @@ class ExecutionMonitor:
             self.pending_stop = why
             self._pending_since = time.perf_counter()
             self._stop_for_failure()
+        elif self.running is not None and is_fault:
+            # The arm stops already; what was planned for after that does not begin.
+            self._commitments.fail(why, is_fault)
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""
