@@ -264,6 +264,21 @@ def test_a_motion_that_its_controller_rejects_is_given_up_where_the_arm_rests(
     assert arm.monitor.running is not None
 
 
+@pytest.mark.parametrize('hand', [FAR, near(0.3)])
+def test_a_late_arm_whose_driver_has_no_velocities_is_followed(separated, hand):
+    arm = separated()
+    arm.see(hand)
+    arm.begin()
+    begin = arm.now
+    while arm.now < begin + 3.0 and not arm.is_over:
+        arm.now += FRAME
+        arm.read(arm.commanded(max(begin, arm.now - 0.03))[0], np.zeros(4))
+        arm.see(hand)
+        arm.monitor._on_timer()
+        assert arm.monitor.running is not None
+    assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
 def test_an_arm_that_sags_or_rests_where_it_is_commanded_is_followed(separated):
     arm = separated()
     hand = near(0.2)

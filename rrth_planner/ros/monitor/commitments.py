@@ -82,8 +82,8 @@ class Commitments:
         self.present: Commitment | None = None
         # The last ones, in their order: a controller may have rejected one.
         self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
-        # Since when the arm rests [s], and what was commanded then.
-        self._rest: tuple[float, Array] | None = None
+        # Since when the arm rests [s], what was commanded then, and where it was.
+        self._rest: tuple[float, Array, Array] | None = None
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
@@ -199,12 +199,14 @@ class Commitments:
         """Take note of where the arm is; return whether it rests while it is to move on."""
         if reading is None or not self.is_active:
             return False
-        if reading.is_moving(reading.taken):
+        place = self._commanded(reading.taken)
+        since, then, here = self._rest or (reading.taken, place, reading.positions)
+        # Not every driver has velocities.
+        way = float(np.abs(reading.positions - here).max())
+        if reading.is_moving(reading.taken) or way > MOVED:
             self._rest = None
             return False
-        place = self._commanded(reading.taken)
-        since, then = self._rest or (reading.taken, place)
-        self._rest = since, then
+        self._rest = since, then, here
         return (
             reading.taken - since > IGNORED_AFTER
             and float(np.abs(place - then).max()) > IGNORED_WAY
