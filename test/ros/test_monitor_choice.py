@@ -71,6 +71,20 @@ def test_parts_are_expected_where_they_will_be_by_their_last_bodies(monkeypatch)
     assert not inputs.expected_scene().boxes
 
 
+@pytest.mark.parametrize('rate', [120, 240, 1000, 3000])
+def test_parts_are_expected_however_often_bodies_come(monkeypatch, rate):
+    inputs, clock = Inputs('body', 'target', 'joints'), SimpleNamespace(now=50.0)
+    monkeypatch.setattr(inputs_module, 'time', SimpleNamespace(monotonic=lambda: clock.now))
+    for k in range(rate // 2):
+        clock.now = 50.0 + k / rate
+        hand = Box('hand', [-3.0, 1.5 * k / rate, 0.0], [0.1, 0.1, 0.1], np.eye(3))
+        inputs.body.value = WearerBody(((('hand', 0), BodyPart((hand,), float('inf'))),))
+        inputs.body_came()
+    steps = [box.center[1] - hand.center[1] for box in inputs.expected_scene().boxes]
+    np.testing.assert_allclose(steps, (0.15, 0.3, 0.45), rtol=1e-6)
+    assert inputs.is_wearer_moving()
+
+
 @pytest.mark.parametrize('ahead', [0.1, 0.2, 0.7])
 def test_an_arm_stops_for_a_part_that_is_about_to_move_into_its_way(monitored, ahead):
     expected = Scene((monitored.hand(ahead, 0.0),))

@@ -198,7 +198,11 @@ class Inputs:
 
     def body_came(self) -> None:
         """Remember the present body, to see whether the wearer moves."""
-        self._bodies.append((time.monotonic(), self.body.value))
+        bodies = self._bodies
+        # Each part may come by itself, in a message of its own: of many bodies a few are enough.
+        if len(bodies) > 1 and bodies[-1][0] - bodies[-2][0] < LATELY / REMEMBERED:
+            bodies.pop()
+        bodies.append((time.monotonic(), self.body.value))
 
     def is_wearer_moving(self) -> bool:
         """Return whether a box has moved lately by more than a tracker's noise."""
