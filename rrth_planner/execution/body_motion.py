@@ -76,12 +76,14 @@ def seen_again(
     moved[known] = _displacements(before.scene.numbers[then], scene.numbers[known])
     # A sight that is no newer says nothing.
     is_new = known & (elapsed > SHORTEST)
-    assumed = np.where(measured <= until, speeds, 0.0)
-    assumed = np.maximum(assumed, stated_speeds(scene, rules))
-    is_faster = is_new & (moved > assumed * elapsed + 2.0 * rules.body_error)
+    stated, raised = stated_speeds(scene, rules), np.where(measured <= until, speeds, 0.0)
+    within = 2.0 * rules.body_error
+    is_faster = is_new & (moved > np.maximum(stated, raised) * elapsed + within)
     found = moved / np.maximum(elapsed, SHORTEST)
-    speeds[is_faster] = np.minimum(SHARE * found[is_faster], FASTEST)
-    until[is_faster] = measured[is_faster] + RAISED
+    # Its bound stays raised as long as it needs that.
+    is_raised = is_new & (moved > stated * elapsed + within)
+    speeds[is_raised] = np.maximum(raised, np.minimum(SHARE * found, FASTEST))[is_raised]
+    until[is_raised] = measured[is_raised] + RAISED
     return BodyMotion(
         scene=scene,
         measured=measured,

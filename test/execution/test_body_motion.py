@@ -128,6 +128,18 @@ def test_a_part_that_is_faster_is_noticed_and_its_bound_is_raised_for_a_while(tu
     assert turned or seen_again(body, again, at(scene, 0.02), RULES).n_faster == 1
 
 
+def test_a_part_that_goes_on_so_fast_keeps_its_raised_bound():
+    name, speed = 'hand', 5.0
+    begin = Box(name, [0.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    body, found = first_sight(Scene((begin,)), np.zeros(1)), []
+    for time in np.arange(0.01, 3.0 * RAISED, 0.01):
+        hand = Scene((replace(begin, center=[speed * time, 0.0, 0.0]),))
+        body = seen_again(body, hand, at(hand, time), RULES)
+        found.append(body_at(body, time + 0.05, RULES).speeds[0])
+    assert np.array(found) == pytest.approx(SHARE * speed)
+    assert body.n_faster == 1
+
+
 def test_a_sight_that_is_no_newer_tells_nothing_of_speeds():
     scene = worlds.wearer()
     body = first_sight(scene, at(scene, 1.0))
