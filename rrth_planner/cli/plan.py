@@ -22,7 +22,7 @@ from rrth_planner.cli.file_question import (
 )
 from rrth_planner.cli.program import run, say
 from rrth_planner.io.arm_file import load_arm
-from rrth_planner.io.motion_file import check_suffix, motion_of, sampled, write_motion
+from rrth_planner.io.motion_file import check_suffix, sampled, write_motion
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.status import PlanStatus
@@ -53,11 +53,11 @@ def _plan(options: argparse.Namespace) -> int:
     plan = plan_of(question, 'plan')
     figures = figures_of(arm, q_start, plan)
     if plan.trajectory is not None and options.output is not None:
-        motion = motion_of(arm, plan.trajectory)
+        motion = plan.trajectory
         if options.period is not None:
             motion = sampled(motion, options.period)
         said = f'Target {_listed(question.goal.target)} m: {plan.sentence}.'
-        write_motion(motion, options.output, [said])
+        write_motion(arm, motion, options.output, [said])
     if options.json:
         print(json.dumps(figures, indent=2))
     elif plan.status is PlanStatus.SOLVED:

@@ -17,7 +17,6 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.incident_file import incident_to_yaml, read_incident
 from rrth_planner.io.map_file import load_map
 from rrth_planner.io.motion_capture_file import load_person
-from rrth_planner.io.motion_file import read_motion, write_motion
 from rrth_planner.io.person_file import write_person
 from rrth_planner.io.settings import load_settings
 from rrth_planner.io.skeleton_file import load_skeleton
@@ -27,7 +26,6 @@ from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import LONGEST_SENTENCE, RrthError
 from rrth_planner.wearer.recorded_person import excerpt
 from test_incident import disagreement
-from test_motion_file import random_motion
 from worlds import examples
 
 ROOT = Path(__file__).parents[2]
@@ -43,13 +41,6 @@ def incident_text():
 def shipped(*names):
     """Return the bytes of files that come along."""
     return [(ROOT / name).read_bytes() for name in names]
-
-
-def motion(folder, suffix):
-    """Return a motion, as it is written."""
-    file = folder / f'written{suffix}'
-    write_motion(random_motion(np.random.default_rng(1), 3), file)
-    return [file.read_bytes()]
 
 
 def read_chain(path):
@@ -93,8 +84,6 @@ READERS = {
     'settings': (lambda p: load_settings(4, p), '.yaml', lambda _: shipped('config/planner.yaml')),
     'skeleton': (load_skeleton, '.yaml', lambda _: shipped(*SKELETONS)),
     'incident': (read_incident, '.yaml', lambda _: [incident_text().encode()]),
-    'motion': (read_motion, '.yaml', lambda folder: motion(folder, '.yaml')),
-    'table': (read_motion, '.csv', lambda folder: motion(folder, '.csv')),
     'chain': (read_chain, '.urdf', lambda _: shipped('config/examples/chest_arm.urdf')),
     **{
         name: (load_person, suffix, functools.partial(recording, suffix=suffix))
@@ -236,7 +225,6 @@ LENGTHS = {
         ('trajectory', 'positions', 0, 0),
         ('violation', 'distance'),
     ],
-    'motion': [('points', 0, 'time'), ('points', 1, 'positions', 0)],
     'messages': [('boxes', 0, 'center', 0)],
 }
 
@@ -266,14 +254,11 @@ def test_names_that_are_not_printable_are_rejected_wherever_they_stand(tmp_path,
     arm['joints'][0]['name'] = name
     named['name'] = name
     fence = {**load_yaml(ROOT / 'config/maps/fence.yaml'), 'name': name}
-    moved = parse_yaml(motion(tmp_path, '.yaml')[0].decode(), 'text')
-    moved['joint_names'][0] = name
     for read, data in (
         (load_body, body),
         (load_arm, arm),
         (load_arm, named),
         (load_map, fence),
-        (read_motion, moved),
     ):
         file = tmp_path / 'named.yaml'
         file.write_text(to_yaml(data))
