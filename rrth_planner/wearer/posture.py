@@ -44,15 +44,3 @@ class Posture:
             value = getattr(self, name)
             if value is not None and np.shape(value) != shape:
                 raise SceneError(f'{name}: shape {np.shape(value)}, expected {shape}')
-
-
-def jumped(before: Posture, after: Posture, most: float) -> tuple[str, ...]:
-    """
-    Return the points that moved by more than a distance [m] between two postures of a tracker.
-
-    Points that are lost, or missing, in either of them are none.
-    """
-    both = [name for name in after.names if name in before.names]
-    here, there = ([p.names.index(name) for name in both] for p in (after, before))
-    moves = np.linalg.norm(after.positions[here] - before.positions[there], axis=1)
-    return tuple(name for name, move in zip(both, moves, strict=True) if move > most)

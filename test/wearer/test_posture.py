@@ -5,7 +5,7 @@
 import numpy as np
 import pytest
 from rrth_planner.model.errors import SceneError
-from rrth_planner.wearer.posture import jumped, Posture
+from rrth_planner.wearer.posture import Posture
 
 
 def test_a_posture_has_a_position_for_each_name():
@@ -22,12 +22,3 @@ def test_a_posture_has_a_rotation_for_each_name_or_none():
 def test_no_point_comes_twice():
     with pytest.raises(SceneError, match='point "head": given twice'):
         Posture(names=('head', 'head'), positions=np.zeros((2, 3)))
-
-
-def test_points_that_jumped_are_named():
-    before = Posture(names=('a', 'b', 'c', 'd'), positions=np.zeros((4, 3)))
-    moved = np.array([[0.0, 0.0, 0.31], [0.2, 0.2, 0.0], [np.nan] * 3, [5.0, 0.0, 0.0]])
-    after = Posture(names=('c', 'a', 'b', 'new'), positions=moved)
-    assert jumped(before, after, 0.3) == ('c',)
-    assert jumped(before, after, 0.28) == ('c', 'a')
-    assert jumped(after, before, 0.3) == ('c',)

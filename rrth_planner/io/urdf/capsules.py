@@ -11,9 +11,10 @@ each slab gets its own.
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from rrth_planner.model.arm import Capsule
 from rrth_planner.model.arrays import Array
 
 # Radii are rounded up to this, after as much again for rounding [m].
@@ -39,18 +40,6 @@ THICKER = np.array([1.0, 1.005, 1.02, 1.04, 1.07, 1.1, 1.15, 1.2, 1.3, 1.45])
 TILTS = 0.4 * 0.6 ** np.arange(12)
 
 
-class Rounded(Protocol):
-    """What has a line, (2, 3), and a radius [m]: an `Enclosure` or a `Capsule` of an arm."""
-
-    @property
-    def ends(self) -> Array:
-        """Return the ends of the line [m]."""
-
-    @property
-    def radius(self) -> float:
-        """Return the radius [m]."""
-
-
 class Enclosure(NamedTuple):
     """
     A capsule around something.
@@ -67,6 +56,10 @@ class Enclosure(NamedTuple):
     ends: Array
     radius: float
     slack: float
+
+
+# What has a line, (2, 3), and a radius [m].
+Rounded: TypeAlias = Enclosure | Capsule
 
 
 def enclosing_capsules(triangles: Array, largest_slack: float, most: int) -> list[Enclosure]:
@@ -118,10 +111,14 @@ def volume(shape: Rounded) -> float:
 
 def enclosed_in(points: Array, shape: Rounded) -> Array:
     """Return which points, (..., 3) [m], lie in a capsule, (...)."""
-    (begin, end), radius = shape.ends, shape.radius
-    step = end - begin
+    return _distances(points, shape.ends) <= shape.radius
+
+
+def _distances(points: Array, ends: Array) -> Array:
+    """Return the distances of points, (..., 3), from a line, (2, 3), (...) [m]."""
+    begin, step = ends[0], ends[1] - ends[0]
     share = np.clip((points - begin) @ step / max(float(step @ step), 1e-300), 0.0, 1.0)
-    result: Array = np.linalg.norm(points - begin - share[..., None] * step, axis=-1) <= radius
+    result: Array = np.linalg.norm(points - begin - share[..., None] * step, axis=-1)
     return result
 
 
@@ -253,9 +250,7 @@ def _capsule_around(points: Array) -> Enclosure:
     k = int(_volumes(centres, axes, radii, ends).argmin())
     line = centres[k] + ends[k][:, None] * axes[k]
     # Few of the points were looked at: what they miss, the radius makes up for.
-    step = line[1] - line[0]
-    share = np.clip((points - line[0]) @ step / max(float(step @ step), 1e-300), 0.0, 1.0)
-    farthest = np.linalg.norm(points - line[0] - share[:, None] * step, axis=1).max()
+    farthest = _distances(points, line).max()
     radius = round(STEP * (math.ceil(farthest / STEP) + 1), 9)
     return Enclosure(line, radius, _slack(few, line, radius))
 

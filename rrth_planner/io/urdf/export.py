@@ -9,7 +9,7 @@ import numpy as np
 from rrth_planner.model.arm import ArmModel, Capsule, link_poses, NO_BARS
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import ModelError
-from rrth_planner.model.rotation import roll_pitch_yaw
+from rrth_planner.model.rotation import roll_pitch_yaw, turned_to
 
 MOUNT, TOOL = 'mount', 'tool'
 # How much of the pointing ray is drawn, and how thick it is beside the bars.
@@ -149,7 +149,9 @@ def _add_capsule(link: ElementTree.Element, capsule: Capsule) -> None:
     ]
     if length > SHORTEST:
         size = {'radius': radius, 'length': _text([length])}
-        solids.insert(0, (0.5 * (begin + end), _z_along((end - begin) / length), 'cylinder', size))
+        solids.insert(
+            0, (0.5 * (begin + end), turned_to((end - begin) / length), 'cylinder', size)
+        )
     for tag in ('visual', 'collision'):
         for centre, rotation, solid, size in solids:
             element = ElementTree.SubElement(link, tag)
@@ -158,13 +160,6 @@ def _add_capsule(link: ElementTree.Element, capsule: Capsule) -> None:
             ElementTree.SubElement(geometry, solid, size)
             if tag == 'visual':
                 ElementTree.SubElement(element, 'material', name='bar')
-
-
-def _z_along(direction: Array) -> Array:
-    """Return a rotation that turns z into a unit vector, (3,) -> (3, 3)."""
-    x = np.cross(np.eye(3)[np.abs(direction).argmin()], direction)
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(direction, x), direction], axis=1)
 
 
 def _add_origin(

@@ -79,7 +79,10 @@ def playback_rules(node: Node, arm: ArmModel) -> PlaybackRules:
         start_tolerance=node.get_parameter('start_tolerance').value,
         time_scale=node.get_parameter('time_scale').value,
         limits=MotionLimits(
-            **{name: _per_joint(node, arm, name) for name in ('velocity', 'acceleration', 'jerk')}
+            **{
+                name: of_each_joint(node, arm, f'max_{name}')
+                for name in ('velocity', 'acceleration', 'jerk')
+            }
         ),
     )
 
@@ -100,11 +103,12 @@ def initial_positions(node: Node, arm: ArmModel) -> Sequence[float]:
     return list(q)
 
 
-def _per_joint(node: Node, arm: ArmModel, name: str) -> Array:
-    values = node.get_parameter(f'max_{name}').value
+def of_each_joint(node: Node, arm: ArmModel, name: str) -> Array:
+    """Return what a parameter says of each joint, (dof,), or raise OptionsError."""
+    values = node.get_parameter(name).value
     if len(values) not in (1, arm.dof):
         raise OptionsError(
-            f'max_{name}: {len(values)} values, expected {arm.dof}, one for each of '
+            f'{name}: {len(values)} values, expected {arm.dof}, one for each of '
             f'{list(arm.joint_names)}, or one for all'
         )
     return np.broadcast_to(np.asarray(values, dtype=np.float64), (arm.dof,))

@@ -3,7 +3,7 @@
 """The parameters of the simulation."""
 
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 from rclpy.node import Node
@@ -12,10 +12,14 @@ from rrth_planner.io.motion_capture_file import load_person
 from rrth_planner.io.skeleton_file import load_skeleton
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import ArmModel
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.scene import Scene
-from rrth_planner.ros.interface.playback_parameters import EACH, FOLDED, initial_positions
+from rrth_planner.ros.interface.playback_parameters import (
+    EACH,
+    FOLDED,
+    initial_positions,
+    of_each_joint,
+)
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 from rrth_planner.simulation.mechanics import Mechanics
 from rrth_planner.simulation.moving_body import MovingBody, recorded_body, scene_at, standing_body
@@ -30,17 +34,7 @@ from rrth_planner.wearer.skeleton import Skeleton
 NOBODY, STANDING, RECORDED = 'none', 'standing', 'recorded'
 
 
-def _fixed(
-    name: str,
-    default: Any,
-    unit: str,
-    description: str,
-    low: float | None = None,
-    high: float | None = None,
-) -> Setting:
-    return Setting(name, default, unit, description, low, high, is_read_only=True)
-
-
+_fixed = partial(Setting, is_read_only=True)
 SETTINGS = (
     ARM,
     _fixed('base_frame', 'torso', 'frame id', 'frame of the boxes of the wearer'),
@@ -138,16 +132,7 @@ def simulated_arm(
 ) -> SimulatedArm:
     """Return the arm that the parameters of a node describe at a time [s], or raise RrthError."""
     value = {setting.name: node.get_parameter(setting.name).value for setting in SETTINGS}
-
-    def each(name: str) -> Array:
-        given = value[name]
-        if len(given) not in (1, arm.dof):
-            raise OptionsError(
-                f'{name}: {len(given)} values, expected {arm.dof}, one for each of '
-                f'{list(arm.joint_names)}, or one for all'
-            )
-        return np.broadcast_to(np.asarray(given, dtype=np.float64), (arm.dof,))
-
+    each = partial(of_each_joint, node, arm)
     names = ('link_mass', 'max_effort', 'friction', 'damping', 'armature')
     mechanics = Mechanics(
         **{name: each(name) for name in names},

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parameters of the node that makes boxes of a tracked skeleton."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 from rclpy.node import Node
 from rrth_planner.io.skeleton_file import load_skeleton
@@ -18,24 +19,16 @@ NUMBERED = ('markers', 'poses')
 NAME = '{name}'
 
 # None changes while the node runs.
-SETTINGS = tuple(
-    replace(setting, is_read_only=True)
-    for setting in (
-        Setting(
-            'skeleton', 'azure_kinect', 'name or path', 'of config/skeletons, or a .yaml file'
-        ),
-        Setting('input', 'markers', ' or '.join(INPUTS), 'what the tracker publishes'),
-        Setting(
-            'person', ONLY, '-', 'number of the wearer among markers; -1: the only one', -1, 10**7
-        ),
-        Setting(
-            'pose_topic', f'{NAME}/pose', 'name', 'topic of each rigid body; {name} is its name'
-        ),
-        Setting('rate', 120.0, 'Hz', 'how often TF is looked up', 1.0, 1000.0),
-        Setting('base_frame', 'torso', 'frame id', 'frame of the boxes'),
-        Setting('lifetime', 0.2, 's', 'a part that is not seen for so long is lost', 0.001, 60.0),
-        Setting('max_jump', 0.3, 'm', 'a point that moves further is held back', 0.01, 100.0),
-    )
+_fixed = partial(Setting, is_read_only=True)
+SETTINGS = (
+    _fixed('skeleton', 'azure_kinect', 'name or path', 'of config/skeletons, or a .yaml file'),
+    _fixed('input', 'markers', ' or '.join(INPUTS), 'what the tracker publishes'),
+    _fixed('person', ONLY, '-', 'number of the wearer among markers; -1: the only one', -1, 10**7),
+    _fixed('pose_topic', f'{NAME}/pose', 'name', 'topic of each rigid body; {name} is its name'),
+    _fixed('rate', 120.0, 'Hz', 'how often TF is looked up', 1.0, 1000.0),
+    _fixed('base_frame', 'torso', 'frame id', 'frame of the boxes'),
+    _fixed('lifetime', 0.2, 's', 'a part that is not seen for so long is lost', 0.001, 60.0),
+    _fixed('max_jump', 0.3, 'm', 'a point that moves further is held back', 0.01, 100.0),
 )
 
 
