@@ -7,7 +7,7 @@ import functools
 from importlib import import_module
 from importlib.util import find_spec
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from rrth_planner.model.errors import ModelError
 from rrth_planner.model.scene import Box
@@ -20,12 +20,11 @@ LIBRARIES = {'fcl': 'python-fcl', 'coal': 'coal'}
 THINNEST, DOUBT = 1e-6, 1e-3
 
 
-class Shape:
+class Shape(NamedTuple):
     """A geometry of a library and its object, pooled for reuse."""
 
-    def __init__(self, geometry: Any, item: Any) -> None:
-        """Keep both."""
-        self.geometry, self.item = geometry, item
+    geometry: Any
+    item: Any
 
 
 class DistanceLibrary:

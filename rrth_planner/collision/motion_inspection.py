@@ -22,6 +22,9 @@ PERIOD = 0.0005
 # Clearance costs more, so only every so many samples are checked for it.
 CLEARANCE_STRIDE = 8
 CONTACT_SLACK = 1e-6
+# Greatest distance of the start from the present configuration [rad], and of the last ray from
+# its target [m].
+START_TOLERANCE, POINTING_TOLERANCE = 1e-4, 1e-3
 LIMIT_EXCESS = 0.01
 REST = 1e-6
 BOUND_TOLERANCE = 1e-6
@@ -56,8 +59,6 @@ def inspect_motion(
     target: Array,
     margin: float,
     ray_guard_length: float,
-    start_tolerance: float = 1e-4,
-    pointing_tolerance: float = 1e-3,
 ) -> Inspection:
     """
     Return the figures of a motion, as a quintic-interpolating controller executes it.
@@ -65,8 +66,7 @@ def inspect_motion(
     Scene and target (3,) are in the base frame [m]; q_present (dof,) is the present configuration
     [rad]. Velocities and accelerations must keep the limits, with a tolerance of 1 %. margin,
     ray_guard_length: clearance from every box, and how much of the ray keeps it in motion [m]; at
-    the end the ray keeps it as far as the target. start_tolerance, pointing_tolerance: greatest
-    distance from the present configuration [rad], and from the target [m].
+    the end the ray keeps it as far as the target.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def inspect_motion(
 
     """
     gap = float(np.abs(trajectory.positions[0] - q_present).max())
-    if not gap <= start_tolerance:
+    if not gap <= START_TOLERANCE:
         raise UnsafeMotionError(
             f'the motion starts {gap:.2e} from the present configuration [rad]'
         )
@@ -95,7 +95,7 @@ def inspect_motion(
     tool = frames(arm, q[-1:])[0, -1]
     reach = float(np.linalg.norm(target - tool[:3, 3]))
     error = float(np.linalg.norm(tool[:3, 3] + reach * tool[:3, 2] - target))
-    if not error <= pointing_tolerance:
+    if not error <= POINTING_TOLERANCE:
         raise UnsafeMotionError(f'the ray misses the target by {1e3 * error:.2f} mm')
     for instants, ray in ((q, ray_guard_length), (q[-1:], reach)):
         contact = first_contact(arm, scene, instants, ray, margin - CONTACT_SLACK)

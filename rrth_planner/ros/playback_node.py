@@ -16,7 +16,6 @@ import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rrth_planner.execution.playback import accept, Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
@@ -30,7 +29,7 @@ from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg, pose_to_msg
 from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded
-from rrth_planner.ros.middleware.qos import SERVICE, SUPERVISED
+from rrth_planner.ros.middleware.qos import COMMITTED, SERVICE, SUPERVISED
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -62,14 +61,11 @@ class PlaybackNode(Node):
         self._pose = PoseStamped()
         # Since when the messages above hold the final state of the arm [s].
         self._rest_published = float('inf')
-        # Volatile: an old latched motion must not start by itself.
-        reliable = QoSProfile(
-            depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
-        )
         self._joint_states = self.create_publisher(JointState, 'joint_states', 10)
         self._tool_pose = self.create_publisher(PoseStamped, '~/tool_pose', 10)
+        # Volatile: an old latched motion must not start by itself.
         self.create_subscription(
-            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
+            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, COMMITTED, raw=True
         )
         # Only for the liveliness of the planner: messages come by the subscription above.
         self.create_subscription(

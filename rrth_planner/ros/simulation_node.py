@@ -16,7 +16,7 @@ import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.errors import MessageError, SceneError
@@ -33,6 +33,7 @@ from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.tracked_person import LIFETIME
 from rrth_planner.ros.middleware.node_process import run_node
 from rrth_planner.ros.middleware.open_subscription import decoded
+from rrth_planner.ros.middleware.qos import COMMITTED
 from rrth_planner.simulation.physics_model import RATE
 from rrth_planner.simulation.simulated_arm import PERIOD
 from sensor_msgs.msg import JointState
@@ -76,14 +77,11 @@ class SimulationNode(Node):
         self._every = max(1, round(RATE / value['rate']))
         self._n_steps = 0
         self._lock, self._is_over = Lock(), Event()
-        reliable = QoSProfile(
-            depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
-        )
         self._states = self.create_publisher(JointState, 'joint_states', 10)
         self._contacts = self.create_publisher(DiagnosticArray, '~/contacts', 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_subscription(
-            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, reliable, raw=True
+            JointTrajectory, 'joint_trajectory', self._on_raw_trajectory, COMMITTED, raw=True
         )
         self._bodies, self._body_period = None, np.inf
         if self._wearer is not None and value['body_rate'] > 0.0:

@@ -111,10 +111,10 @@ def volume(shape: Rounded) -> float:
 
 def enclosed_in(points: Array, shape: Rounded) -> Array:
     """Return which points, (..., 3) [m], lie in a capsule, (...)."""
-    return _distances(points, shape.ends) <= shape.radius
+    return line_distances(points, shape.ends) <= shape.radius
 
 
-def _distances(points: Array, ends: Array) -> Array:
+def line_distances(points: Array, ends: Array) -> Array:
     """Return the distances of points, (..., 3), from a line, (2, 3), (...) [m]."""
     begin, step = ends[0], ends[1] - ends[0]
     share = np.clip((points - begin) @ step / max(float(step @ step), 1e-300), 0.0, 1.0)
@@ -250,7 +250,7 @@ def _capsule_around(points: Array) -> Enclosure:
     k = int(_volumes(centres, axes, radii, ends).argmin())
     line = centres[k] + ends[k][:, None] * axes[k]
     # Few of the points were looked at: what they miss, the radius makes up for.
-    farthest = _distances(points, line).max()
+    farthest = line_distances(points, line).max()
     radius = round(STEP * (math.ceil(farthest / STEP) + 1), 9)
     return Enclosure(line, radius, _slack(few, line, radius))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import math
 
 import numpy as np
+from rrth_planner.io.urdf.capsules import line_distances
 from rrth_planner.io.urdf.chain import UrdfChain
 from rrth_planner.io.urdf.dh_parameters import rows_of_axes
 from rrth_planner.model.arm import ArmModel, Capsule, forward_kinematics, NO_BARS, tool_pose
@@ -138,7 +139,7 @@ def _cover_radii(arm: ArmModel, points: Array, radius: float) -> Array:
         begin, end = (points[i : i + 2] - T[i, :3, 3]) @ T[i, :3, :3]
         share = np.linspace(0.0, 1.0, POINTS)[:, None]
         link = begin + share * (end - begin)
-        distances = [_distances(link, *bar) for bar in _bars(arm, i, end)]
+        distances = [line_distances(link, bar) for bar in _bars(arm, i, end)]
         farthest = float(np.min(distances, axis=0).max())
         if farthest < 1e-9:
             continue
@@ -152,8 +153,8 @@ def _cover_radii(arm: ArmModel, points: Array, radius: float) -> Array:
     return np.asarray(np.round(radius + extra, 6))
 
 
-def _bars(arm: ArmModel, i: int, tip: Array) -> list[tuple[Array, Array]]:
-    """Return the bars next to link i as they are shortest, in its frame."""
+def _bars(arm: ArmModel, i: int, tip: Array) -> Array:
+    """Return the bars next to link i as they are shortest, in its frame, (3, 2, 3) [m]."""
     alpha, a, _, _ = arm.dh[i + 1]
     zero, corner = np.zeros(3), np.array([a, 0.0, 0.0])
     outwards = np.array([0.0, -math.sin(alpha), math.cos(alpha)])
@@ -163,11 +164,9 @@ def _bars(arm: ArmModel, i: int, tip: Array) -> list[tuple[Array, Array]]:
     else:
         # As much of the ray as there is of the tool.
         ahead = max(0.0, float((tip - corner) @ outwards))
-    return [
-        (np.array([0.0, 0.0, -behind]), zero),
-        (zero, corner),
-        (corner, corner + ahead * outwards),
-    ]
+    return np.array(
+        [[[0.0, 0.0, -behind], zero], [zero, corner], [corner, corner + ahead * outwards]]
+    )
 
 
 def _shortest(arm: ArmModel, row: int) -> float:
@@ -176,10 +175,3 @@ def _shortest(arm: ArmModel, row: int) -> float:
     if not arm.is_prismatic[row]:
         return d
     return d + float(np.clip(-d, *arm.bounds[:, row]))
-
-
-def _distances(points: Array, begin: Array, end: Array) -> Array:
-    """Return the distances of points, (n, 3), from the line between two others, (n,) [m]."""
-    along = end - begin
-    share = np.clip((points - begin) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - begin - share[:, None] * along, axis=1))

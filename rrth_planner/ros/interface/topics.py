@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 
 class Direction(Enum):
@@ -43,20 +44,8 @@ class Interface:
     values: tuple[object, ...] = ()
 
 
-def _subscribed(name: str, kind: str, meaning: str, **only: object) -> Interface:
-    return _interface(Direction.SUBSCRIBES, name, kind, meaning, only)
-
-
-def _published(name: str, kind: str, meaning: str, **only: object) -> Interface:
-    return _interface(Direction.PUBLISHES, name, kind, meaning, only)
-
-
-def _served(name: str, meaning: str, kind: str = 'std_srvs/srv/Trigger') -> Interface:
-    return _interface(Direction.SERVES, name, kind, meaning, {})
-
-
 def _interface(
-    direction: Direction, name: str, kind: str, meaning: str, only: dict[str, object]
+    direction: Direction, name: str, kind: str, meaning: str, **only: object
 ) -> Interface:
     (parameter, values), *_ = [*only.items(), ('', ())]
     return Interface(
@@ -69,8 +58,12 @@ def _interface(
     )
 
 
+_subscribed = partial(_interface, Direction.SUBSCRIBES)
+_published = partial(_interface, Direction.PUBLISHES)
+_served = partial(_interface, Direction.SERVES)
 MARKERS, MOTION = 'visualization_msgs/msg/MarkerArray', 'trajectory_msgs/msg/JointTrajectory'
 JOINTS, DIAGNOSTICS = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+TRIGGER = 'std_srvs/srv/Trigger'
 
 # By the names of the nodes.
 INTERFACES = {
@@ -95,25 +88,26 @@ INTERFACES = {
         ),
         _served(
             '~/plan',
+            TRIGGER,
             'plan from the present joints to the present target round the present body; publish, '
             'then answer',
         ),
         _served(
             '~/get_plan',
-            'the same, target in `goal.pose.position` (`start` empty); answers the tool path',
             'nav_msgs/srv/GetPlan',
+            'the same, target in `goal.pose.position` (`start` empty); answers the tool path',
         ),
-        _served('~/cancel', 'ends a plan in progress'),
+        _served('~/cancel', TRIGGER, 'ends a plan in progress'),
         _interface(
             Direction.PERFORMS,
             '~/point_head',
             'control_msgs/action/PointHead',
             'a request as a goal, which ends once the arm has arrived, and stops it where it is '
             'cancelled; where control_msgs is installed',
-            {},
         ),
         _served(
             '~/reset',
+            TRIGGER,
             'with `separation`: allows motions again after a FAULT, and with `resume: manual` '
             'lets a stopped one go on',
         ),
@@ -159,7 +153,7 @@ INTERFACES = {
         ),
         _published('joint_states', JOINTS, 'the state of the arm, at `rate`'),
         _published('~/tool_pose', 'geometry_msgs/msg/PoseStamped', 'the tool, at `rate`'),
-        _served('~/stop', 'brakes along the path'),
+        _served('~/stop', TRIGGER, 'brakes along the path'),
     ),
     'arm_simulation': (
         _subscribed(

@@ -3,17 +3,16 @@
 """Messages to joint_trajectory_controller, accepted and rejected as it does in ROS 2 Jazzy."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
-from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of, numbers
+from rrth_planner.ros.messages.fields import NANOSECONDS, nanoseconds_of
 from rrth_planner.ros.messages.trajectory import (
     check_end,
     check_times,
     MOST_POINTS,
     REST_VELOCITY,
+    rows_of,
     UNITS,
 )
 from rrth_planner.simulation.trajectory_controller import TimedPoints
@@ -52,23 +51,11 @@ def controller_points_from_msg(
     if any(len(point.effort) for point in msg.points):
         raise MessageError('effort: given, expected none: the arm follows positions')
     columns = [names.index(name) for name in joint_names]
-    rows = {field: _rows(msg.points, field, columns) for field in UNITS}
+    rows = {
+        field: rows_of(msg.points, field, columns, may_lack=field != 'positions')
+        for field in UNITS
+    }
     last = rows['velocities'][-1]
     if (np.abs(last) > REST_VELOCITY).any():
         raise MessageError(f'velocity of the last point: {last.tolist()}, expected 0 [rad/s]')
     return TimedPoints(times=np.array(times) / NANOSECONDS, **rows)
-
-
-def _rows(points: Sequence[Any], field: str, columns: Sequence[int]) -> Array:
-    """Return a field of all points, (n, dof); NaN where a point has none."""
-    found = np.full((len(points), len(columns)), np.nan)
-    for i, point in enumerate(points):
-        name, row = f'points[{i}].{field}', getattr(point, field)
-        if not len(row) and field != 'positions':
-            continue
-        if len(row) != len(columns):
-            raise MessageError(
-                f'{name}: {len(row)} values, expected {len(columns)}, one a joint [{UNITS[field]}]'
-            )
-        found[i] = numbers(list(row), name, UNITS[field])[list(columns)]
-    return found

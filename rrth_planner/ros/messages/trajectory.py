@@ -97,7 +97,7 @@ def joint_trajectory_from_msg(
     if any(len(point.effort) for point in msg.points):
         raise MessageError('effort: given, expected none: the arm follows positions')
     columns = [names.index(name) for name in joint_names]
-    values = {field: _rows(msg.points, field, columns) for field in UNITS}
+    values = {field: rows_of(msg.points, field, columns) for field in UNITS}
     if (np.abs(values['velocities'][-1]) > REST_VELOCITY).any():
         raise MessageError(
             f'velocity of the last point: {values["velocities"][-1].tolist()}, expected 0 [rad/s]'
@@ -148,10 +148,16 @@ def check_times(times: Sequence[int]) -> None:
             )
 
 
-def _rows(points: Sequence[Any], field: str, columns: Sequence[int]) -> Array:
+def rows_of(
+    points: Sequence[Any], field: str, columns: Sequence[int], *, may_lack: bool = False
+) -> Array:
+    """Return a field of all points, (n, dof), NaN where one lacks it and may; or MessageError."""
     rows = []
     for i, point in enumerate(points):
         name, row = f'points[{i}].{field}', getattr(point, field)
+        if may_lack and not len(row):
+            rows.append(np.full(len(columns), np.nan))
+            continue
         if len(row) != len(columns):
             raise MessageError(
                 f'{name}: {len(row)} values, expected {len(columns)}, one a joint [{UNITS[field]}]'
