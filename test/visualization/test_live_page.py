@@ -21,7 +21,7 @@ from rrth_planner.ros.interface.separation_status import (  # noqa: E402
     SeparationStatus,
 )
 from rrth_planner.visualization.viewer.live_page import LivePage, STATE_COLOURS  # noqa: E402
-from rrth_planner.visualization.viewer.rate_chart import PERIOD, RateChart, SPAN  # noqa: E402
+from rrth_planner.visualization.viewer.panel import PERIOD, RateChart, SPAN  # noqa: E402
 from rrth_planner.visualization.viewer.scene_view import TIMED  # noqa: E402
 import sample_motions  # noqa: E402
 

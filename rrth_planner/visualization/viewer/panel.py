@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The controls of the page, and its description of a response."""
 
+from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from html import escape
 from typing import Any
 
+import numpy as np
 from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
 from rrth_planner.visualization.viewer.planning_worker import Response
-from rrth_planner.visualization.viewer.rate_chart import RateChart
 from rrth_planner.visualization.viewer.scene_view import FIRST, SHORT, TIMED, TREES
 import viser
 
@@ -28,6 +29,9 @@ BRAND = (59, 111, 182)
 GOOD, BAD = '#14804a', '#b3261e'
 SPEEDS = ('0.1', '0.25', '0.5', '1')
 MOST_SEEDS, STEP_SIZES, MOST_MARGIN, FARTHEST = 99, (0.05, 1.5), 0.1, 5.0
+# What the chart shows [s], and how long after each other it is drawn [s].
+SPAN, PERIOD = 20.0, 0.1
+STROKE = '#3b6fb6'
 
 
 def response_html(response: Response) -> str:
@@ -68,6 +72,45 @@ def _page(title: str, colour: str, sentence: str, rows: list[tuple[Any, str]]) -
         f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em;line-height:1.35">'
         f'<b style="color:{colour}">{title}</b><div>{sentence}</div>{lines}</div>'
     )
+
+
+class RateChart:
+    """The rate of the last SPAN seconds, from 0 to 1; there is no chart until there is a rate."""
+
+    def __init__(self, folder: viser.GuiFolderHandle, gui: viser.GuiApi) -> None:
+        """Create nothing yet; the chart appears in the folder."""
+        self._folder, self._gui = folder, gui
+        # Times [s] and rates [-]: the least one since the time before.
+        self._rates: deque[tuple[float, float]] = deque()
+        self._least = np.inf
+        self.plot: Any = None
+
+    def draw(self, rate: float, now: float) -> None:
+        """Draw the rate that is permitted now [s]."""
+        self._least = min(self._least, rate)
+        if self._rates and now < self._rates[-1][0] + PERIOD:
+            return
+        self._rates.append((now, self._least))
+        self._least = np.inf
+        while self._rates[0][0] < now - SPAN:
+            self._rates.popleft()
+        times, rates = np.array(self._rates).T
+        data = (times - now, rates)
+        if self.plot is not None:
+            self.plot.data = data
+            return
+        with self._folder:
+            self.plot = self._gui.add_uplot(
+                data,
+                ({'label': 'time [s]'}, {'label': 'rate [-]', 'stroke': STROKE, 'width': 2.0}),
+                title='rate of the motion [-], last 20 s',
+                scales={
+                    'x': {'time': False, 'range': (-SPAN, 0.0)},
+                    'y': {'range': (0.0, 1.05)},
+                },
+                legend={'show': False},
+                aspect=2.5,
+            )
 
 
 class Panel:

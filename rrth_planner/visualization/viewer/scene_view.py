@@ -19,8 +19,8 @@ from rrth_planner.visualization.viewer.curves import (
     tree_segments,
     wxyz,
 )
-from rrth_planner.visualization.viewer.robot_meshes import NAME, RobotMeshes
 import viser
+from viser.extras import ViserUrdf
 
 Color = tuple[int, int, int]
 CLOTH, SKIN, SHELL = (126, 147, 178), (227, 184, 152), (70, 110, 170)
@@ -110,10 +110,13 @@ class SceneView:
         self.layers = {
             name: server.scene.add_frame(f'/{name}', show_axes=False) for name in LAYERS
         }
-        self._meshes = None
+        self._robot = robot
         if robot is not None:
-            self._meshes = RobotMeshes(server, robot)
-            self.layers[NAME] = self._meshes.layer
+            T = robot.T_base_root
+            self.layers['meshes'] = server.scene.add_frame(
+                '/meshes', show_axes=False, position=T[:3, 3], wxyz=wxyz(T[:3, :3])
+            )
+            self._meshes = ViserUrdf(server, robot.model, root_node_name='/meshes')
         self.arm = ArmShape(server, '/arm', arm, None if robot is None else 0.45)
         self.start = ArmShape(server, '/start', arm, 0.35)
         self._ray = server.scene.add_cylinder('/ray', RAY_RADIUS, 1.0, RAY, cast_shadow=False)
@@ -160,8 +163,8 @@ class SceneView:
     def show_configuration(self, q: Array, target: Array | None) -> None:
         """Draw the arm and its ray, (dof,) [rad]; up to the target (3,) [m] where it is aimed."""
         self.arm.move(q)
-        if self._meshes is not None:
-            self._meshes.move(q)
+        if self._robot is not None:
+            self._meshes.update_cfg(self._robot.values(q))
         pose, length = tool_pose(self._arm, q), self._ray_length
         if target is not None and pointing_error(self._arm, q, target) < AIMED:
             length = float(np.linalg.norm(target - pose[:3, 3]))
