@@ -116,18 +116,18 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         radii=np.array([row.get('radius', unsaid) for row in joints] + [rows[-1]['radius']]),
         T_base_mount=pose_matrix(position, quaternion),
         capsules=tuple(capsules),
-        allowed=allowed_from(given.get('allowed', []), 'allowed'),
+        allowed=_allowed(given.get('allowed', [])),
     )
 
 
-def allowed_from(data: Any, label: str) -> tuple[tuple[str, str], ...]:
+def _allowed(data: Any) -> tuple[tuple[str, str], ...]:
     """Return pairs of names, of a part of the arm and of another part or a box, or raise."""
     pairs = []
-    for i, pair in enumerate(sequence(data, label, ModelError)):
-        names = sequence(pair, f'{label}[{i}]', ModelError)
+    for i, pair in enumerate(sequence(data, 'allowed', ModelError)):
+        names = sequence(pair, f'allowed[{i}]', ModelError)
         if len(names) != 2 or not all(isinstance(name, str) for name in names):
             raise ModelError(
-                f'{label}[{i}]: {shown(pair)}, expected a part of the arm and another part or box'
+                f'allowed[{i}]: {shown(pair)}, expected a part of the arm and another part or box'
             )
         pairs.append((names[0], names[1]))
     return tuple(pairs)

@@ -2,29 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Incidents as YAML files, every number to the bit; a folder keeps the last hundred."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
 import os
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, get_args, get_origin
 import uuid
 
 import numpy as np
-from rrth_planner.collision.violation import Violation
-from rrth_planner.io.arm_file import allowed_from
 from rrth_planner.io.entries import mapping, number, sequence, text, whole
 from rrth_planner.io.incident import Incident, IncidentKind
 from rrth_planner.io.settings import LENGTHS
 from rrth_planner.io.text_file import load_yaml, naming_file, to_yaml
-from rrth_planner.model.arm import ArmModel, Capsule
 from rrth_planner.model.arrays import frozen_array
-from rrth_planner.model.errors import one_line, printable, RecordError, shown
-from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import SeparationRules
-from rrth_planner.model.trajectory import MotionLimits, MotionState, StartState, Trajectory
+from rrth_planner.model.errors import one_line, RecordError, shown
+from rrth_planner.model.trajectory import MotionState
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 
@@ -32,6 +27,12 @@ from rrth_planner.planning.options import ALGORITHMS, TreeOptions
 FORMAT = 5
 MOST_FILES = 100
 PATTERN = 'incident-*.yaml'
+# Of the numbers of a record, by the names of their fields.
+UNITS = {
+    **dict.fromkeys((*LENGTHS, 'distance', 'radius', 'body_error'), 'm'),
+    **dict.fromkeys(('time', 'escape_time', 'body_age', 'controller_delay'), 's'),
+    **dict.fromkeys(('contact_speed', 'body_speeds'), 'm/s'),
+}
 HEADER = '# An incident of rrth_planner. To replay it: ./run exec replay FILE\n'
 
 
@@ -85,34 +86,12 @@ def incident_from_mapping(data: Any) -> Incident:
         An entry that is missing, unknown or out of its range.
 
     """
-    if isinstance(data, Mapping) and data.get('format') != FORMAT:
-        raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
-    given = _fields_of(data, Incident, 'incident', ('format',))
-    kinds = [kind.value for kind in IncidentKind]
-    if given['kind'] not in kinds:
-        raise RecordError(f'kind: {shown(given["kind"])}, expected {" or ".join(kinds)}')
-    if not isinstance(given['versions'], Mapping):
-        raise RecordError(f'versions: {shown(given["versions"])}, expected a mapping')
-    present, violation = given['present'], given['violation']
-    return Incident(
-        kind=IncidentKind(given['kind']),
-        question=_question(given['question']),
-        trajectory=_trajectory(given['trajectory'], 'trajectory'),
-        violation=None if violation is None else _violation(violation),
-        present=None if present is None else _scene(present, 'present'),
-        escape_time=number(given['escape_time'], 'escape_time', 's', RecordError),
-        traceback=text(given['traceback'], 'traceback', RecordError),
-        versions={
-            _line(key, 'versions'): _line(value, f'versions: {key}')
-            for key, value in given['versions'].items()
-        },
-        **{name: _line(given[name], name) for name in ('sentence', 'time', 'error')},
-    )
-
-
-def _line(value: Any, name: str) -> str:
-    """Return a text as a line that may be printed, or raise RecordError."""
-    return one_line(text(value, name, RecordError))
+    if isinstance(data, Mapping):
+        if data.get('format') != FORMAT:
+            raise RecordError(f'format: {shown(data.get("format"))}, expected {FORMAT}')
+        data = {key: value for key, value in data.items() if key != 'format'}
+    incident: Incident = _value(Incident, data, 'incident')
+    return incident
 
 
 def plain(value: Any) -> Any:
@@ -148,121 +127,63 @@ def _plain_fields(value: Any) -> dict[str, Any]:
     return {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.init}
 
 
-def _question(data: Any) -> PlanQuestion:
-    """Return the question that `plain` wrote, or raise RrthError."""
-    given = _fields_of(data, PlanQuestion, 'question')
-    arm = _arm(given['arm'])
-    lengths = {name: number(given[name], name, 'm', RecordError) for name in LENGTHS}
-    return PlanQuestion(
-        arm=arm,
-        scene=_scene(given['scene'], 'scene'),
-        q_start=given['q_start'],
-        goal=PointingGoal(**_fields_of(given['goal'], PointingGoal, 'goal')),
-        limits=_limits(given['limits'], 'limits'),
-        options=_options(given['options']),
-        seed=whole(given['seed'], 'seed', RecordError),
-        second_checker=text(given['second_checker'], 'second_checker', RecordError),
-        moving=None if given['moving'] is None else _start_state(given['moving'], arm.dof),
-        rules=None if given['rules'] is None else _rules(given['rules']),
-        stop_limits=(
-            None if given['stop_limits'] is None else _limits(given['stop_limits'], 'stop_limits')
-        ),
-        body_age=number(given['body_age'], 'body_age', 's', RecordError),
-        **lengths,
-    )
+def _value(kind: Any, data: Any, label: str) -> Any:
+    """Return the value of a type that `plain` wrote, or raise RrthError; label: for sentences."""
+    if isinstance(kind, UnionType):
+        return None if data is None else _value(get_args(kind)[0], data, label)
+    if kind is TreeOptions:
+        return _options(data)
+    if kind is MotionState:
+        return _motion_state(data, label)
+    if is_dataclass(kind):
+        types = {field.name: field.type for field in fields(kind) if field.init}
+        given = mapping(data, label, types, RecordError)
+        # The entries of a record and of its question are called by their names alone.
+        owner = '' if kind in (Incident, PlanQuestion) else f'{label}: '
+        return kind(**{name: _value(types[name], given[name], owner + name) for name in types})
+    if get_origin(kind) is tuple:
+        items, kinds = sequence(data, label, RecordError), get_args(kind)
+        kinds = kinds[:1] * len(items) if kinds[-1] is Ellipsis else kinds
+        if len(items) != len(kinds):
+            raise RecordError(f'{label}: {shown(items)}, expected {len(kinds)} values')
+        pairs = enumerate(zip(kinds, items, strict=True))
+        return tuple(_value(one, item, f'{label}[{k}]') for k, (one, item) in pairs)
+    if get_origin(kind) is Mapping:
+        if not isinstance(data, Mapping):
+            raise RecordError(f'{label}: {shown(data)}, expected a mapping')
+        return {_value(str, k, label): _value(str, v, f'{label}: {k}') for k, v in data.items()}
+    return _scalar(kind, data, label)
 
 
-def _limits(data: Any, name: str) -> MotionLimits:
-    """Return the limits that `plain` wrote, or raise RrthError."""
-    return MotionLimits(**_fields_of(data, MotionLimits, name))
+def _scalar(kind: Any, data: Any, label: str) -> Any:
+    """Return a text, a number or a word; of an array what was given: its owner checks it."""
+    if kind is IncidentKind:
+        kinds = [one.value for one in IncidentKind]
+        if data not in kinds:
+            raise RecordError(f'{label}: {shown(data)}, expected {" or ".join(kinds)}')
+        return IncidentKind(data)
+    if kind is str:
+        value = text(data, label, RecordError)
+        # All others are printed in a line.
+        return value if label == 'traceback' else one_line(value)
+    if kind is bool and not isinstance(data, bool):
+        raise RecordError(f'{label}: {shown(data)}, expected true or false')
+    if kind is int:
+        return whole(data, label, RecordError)
+    if kind is float:
+        name = label.rpartition(': ')[2].partition('[')[0]
+        return number(data, label, UNITS[name], RecordError)
+    return data
 
 
-def _rules(data: Any) -> SeparationRules:
-    """Return the rules that `plain` wrote, or raise RrthError."""
-    given = _fields_of(data, SeparationRules, 'rules')
-    speeds = sequence(given['body_speeds'], 'rules: body_speeds', RecordError)
-    if not all(isinstance(item, list) and len(item) == 2 for item in speeds):
-        raise RecordError(
-            f'rules: body_speeds {shown(speeds)}, expected pairs of words and a speed [m/s]'
-        )
-    return SeparationRules(
-        body_speeds=tuple(
-            (
-                text(words, 'rules: body_speeds', RecordError),
-                number(speed, 'rules: body_speeds', 'm/s', RecordError),
-            )
-            for words, speed in speeds
-        ),
-        **{
-            name: number(given[name], f'rules: {name}', unit, RecordError)
-            for name, unit in (
-                ('contact_speed', 'm/s'),
-                ('body_error', 'm'),
-                ('controller_delay', 's'),
-            )
-        },
-    )
-
-
-def _arm(data: Any) -> ArmModel:
-    """Return the arm that `plain` wrote; `arm_file.arm_from_mapping` reads arm files."""
-    given = _fields_of(data, ArmModel, 'arm')
-    for name, kind in (('joint_names', str), ('is_prismatic', bool)):
-        values = given[name]
-        if not isinstance(values, list) or not all(isinstance(v, kind) for v in values):
-            raise RecordError(f'arm: {name} {shown(values)}, expected a list of {kind.__name__}')
-    capsules = sequence(given['capsules'], 'arm: capsules', RecordError)
-    given['capsules'] = tuple(
-        _capsule(item, f'arm: capsule {i}') for i, item in enumerate(capsules)
-    )
-    given['allowed'] = allowed_from(given['allowed'], 'arm: allowed')
-    return ArmModel(**given)
-
-
-def _capsule(data: Any, name: str) -> Capsule:
-    """Return the capsule that `plain` wrote, or raise RrthError."""
-    given = _fields_of(data, Capsule, name)
-    return Capsule(
-        name=text(given['name'], f'{name}: name', RecordError),
-        link=whole(given['link'], f'{name}: link', RecordError),
-        ends=given['ends'],
-        radius=number(given['radius'], f'{name}: radius', 'm', RecordError),
-    )
-
-
-def _scene(data: Any, name: str) -> Scene:
-    """Return the scene that `plain` wrote, or raise RrthError."""
-    boxes = sequence(_fields_of(data, Scene, name)['boxes'], f'{name}: boxes', RecordError)
-    return Scene(
-        tuple(Box(**_fields_of(box, Box, f'{name}: box {i}')) for i, box in enumerate(boxes))
-    )
-
-
-def _trajectory(data: Any, name: str) -> Trajectory | None:
-    """Return the trajectory that `plain` wrote, None for None, or raise RrthError."""
-    return None if data is None else Trajectory(**_fields_of(data, Trajectory, name))
-
-
-def _violation(data: Any) -> Violation:
-    """Return the violation that `plain` wrote, or raise RrthError."""
-    given = _fields_of(data, Violation, 'violation')
-    if not isinstance(given['is_of_arm'], bool):
-        raise RecordError(
-            f'violation: is_of_arm {shown(given["is_of_arm"])}, expected true or false'
-        )
-    return Violation(
-        time=number(given['time'], 'violation: time', 's', RecordError),
-        distance=number(given['distance'], 'violation: distance', 'm', RecordError),
-        bar=printable(given['bar'], 'violation: bar', RecordError),
-        box=printable(given['box'], 'violation: box', RecordError),
-        is_of_arm=given['is_of_arm'],
-    )
-
-
-def _fields_of(data: Any, kind: Any, name: str, more: Collection[str] = ()) -> dict[str, Any]:
-    """Return the entries of a mapping with exactly the fields of a dataclass, and `more`."""
-    wanted = [*(field.name for field in fields(kind) if field.init), *more]
-    return mapping(data, name, wanted, RecordError)
+def _motion_state(data: Any, label: str) -> MotionState:
+    names = [field.name for field in fields(MotionState)]
+    given, arrays = mapping(data, label, names, RecordError), {}
+    dof: int | None = None
+    for name in names:
+        arrays[name] = frozen_array(given[name], (dof,), f'{label}: {name}', 'rad, s', RecordError)
+        dof = len(arrays[name])
+    return MotionState(**arrays)
 
 
 def _options(data: Any) -> TreeOptions:
@@ -272,19 +193,7 @@ def _options(data: Any) -> TreeOptions:
             f'options: algorithm {shown(algorithm)}, expected one of {", ".join(ALGORITHMS)}'
         )
     kind = ALGORITHMS[algorithm]
-    given = _fields_of(data, kind, 'options', ('algorithm',))
+    wanted = ('algorithm', *(field.name for field in fields(kind)))
+    given = mapping(data, 'options', wanted, RecordError)
     del given['algorithm']
     return kind(**given)
-
-
-def _start_state(data: Any, dof: int) -> StartState:
-    given = _fields_of(data, StartState, 'moving')
-    state = {
-        name: frozen_array(value, (dof,), f'moving: {name}', 'rad, s', RecordError)
-        for name, value in _fields_of(given['state'], MotionState, 'moving: state').items()
-    }
-    return StartState(
-        state=MotionState(**state),
-        running=_trajectory(given['running'], 'moving: running'),
-        time=number(given['time'], 'moving: time', 's', RecordError),
-    )
