@@ -62,9 +62,6 @@ class PhysicsModel:
     Parameters
     ----------
     model : mujoco.MjModel
-    arm : ArmModel
-    parts : tuple of str
-        Of the wearer.
     names : dict of int to str
         What messages call each shape that may meet another, by its number.
     tool : int
@@ -77,8 +74,6 @@ class PhysicsModel:
     """
 
     model: Any
-    arm: ArmModel
-    parts: tuple[str, ...]
     names: dict[int, str]
     tool: int
     is_standing: bool
@@ -145,8 +140,6 @@ def physics_model(
             names[k] = name.rpartition('/')[0]
     return PhysicsModel(
         model=model,
-        arm=arm,
-        parts=() if body is None else body.names,
         names=names,
         tool=model.body('tool').id,
         is_standing=body is None or body.is_standing,

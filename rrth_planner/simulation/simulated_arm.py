@@ -98,7 +98,6 @@ class ArmReading:
     efforts: Array
     wanted: MotionState
     true_positions: Array
-    true_velocities: Array
 
 
 class SimulatedArm:
@@ -156,15 +155,13 @@ class SimulatedArm:
     @property
     def reading(self) -> ArmReading:
         """What is known of the arm now."""
-        dof = self.arm.dof
         return ArmReading(
             time=self.time,
             positions=self._positions.copy(),
             velocities=self._velocities.copy(),
             efforts=np.array(self.data.ctrl).clip(-self._max_effort, self._max_effort),
             wanted=self._wanted,
-            true_positions=self.data.qpos[:dof].copy(),
-            true_velocities=self.data.qvel[:dof].copy(),
+            true_positions=self.data.qpos[: self.arm.dof].copy(),
         )
 
     def execute(self, points: TimedPoints, stamp: float) -> None:
