@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of the running nodes: it shows their topics, and sends requests to the planner."""
 
-from html import escape
 import time
 from typing import Any, NoReturn
 
@@ -10,8 +9,7 @@ import numpy as np
 from rrth_planner.io.urdf.placed_robot import PlacedRobot
 from rrth_planner.ros.client.viewer_feed import ViewerFeed
 from rrth_planner.visualization.viewer.curves import tool_positions, trajectory_curve
-from rrth_planner.visualization.viewer.examples import example_target
-from rrth_planner.visualization.viewer.panel import OWN, Panel
+from rrth_planner.visualization.viewer.panel import Panel
 from rrth_planner.visualization.viewer.scene_view import SceneView
 import viser
 
@@ -34,8 +32,7 @@ class LivePage:
         self.view.layers['start'].visible = False
         self.panel = Panel(server, self.view.layers, is_live=True)
         self.view.target.on_update(self._on_drag)
-        self.panel.target.on_update(self._on_numbers)
-        self.panel.target_example.on_update(self._on_example)
+        self.panel.on_target(lambda target: feed.ask(target))
         self.panel.plan.on_click(lambda _: feed.ask())
 
     def run(self) -> NoReturn:
@@ -69,9 +66,7 @@ class LivePage:
         said = feed.said
         if self._drawn.get('said') != said:
             self._drawn['said'] = said
-            self.panel.said.content = (
-                f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em">{escape(said)}</div>'
-            )
+            self.panel.say(said)
 
     def _is_new(self, what: str, value: Any) -> bool:
         is_new = what not in self._drawn or self._drawn[what] is not value
@@ -81,11 +76,3 @@ class LivePage:
     def _on_drag(self, event: Any) -> None:
         self._is_dragged = event.phase != 'end'
         self._feed.ask(np.asarray(self.view.target.position, dtype=np.float64))
-
-    def _on_numbers(self, event: Any) -> None:
-        if event.client is not None:
-            self._feed.ask(np.array(self.panel.target.value))
-
-    def _on_example(self, event: Any) -> None:
-        if event.client is not None and self.panel.target_example.value != OWN:
-            self._feed.ask(example_target(self.panel.target_example.value))

@@ -3,13 +3,14 @@
 """The controls of the page, and its description of a response."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from html import escape
 from typing import Any
 
 import numpy as np
-from rrth_planner.visualization.viewer.examples import BODIES, TARGETS
+from rrth_planner.model.arrays import Array
+from rrth_planner.visualization.viewer.examples import BODIES, example_target, TARGETS
 from rrth_planner.visualization.viewer.planning_worker import Response
 from rrth_planner.visualization.viewer.scene_view import FIRST, SHORT, TIMED, TREES
 import viser
@@ -165,6 +166,26 @@ class Panel:
                 if not is_live or name in ('margin', 'timed'):
                     box = gui.add_checkbox(SHOWN[name], True)
                     box.on_update(partial(_show, layer))
+
+    def say(self, sentence: str) -> None:
+        """Show a sentence in place of a response."""
+        self.said.content = (
+            f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em">{escape(sentence)}</div>'
+        )
+
+    def on_target(self, take: Callable[[Array], object]) -> None:
+        """Have each target taken that is typed, or chosen of the examples, (3,) [m]."""
+
+        def typed(event: Any) -> None:
+            if event.client is not None:
+                take(np.array(self.target.value))
+
+        def chosen(event: Any) -> None:
+            if event.client is not None and self.target_example.value != OWN:
+                take(example_target(self.target_example.value))
+
+        self.target.on_update(typed)
+        self.target_example.on_update(chosen)
 
 
 def _show(layer: Any, event: Any) -> None:

@@ -3,10 +3,9 @@
 """The page of a recorded person at work: the arm moves beside him, and plans again and again."""
 
 from contextlib import suppress
-from html import escape
 from threading import Lock
 import time
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
@@ -16,8 +15,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 from rrth_planner.pipeline.request import PlanQuestion
 from rrth_planner.visualization.viewer.curves import trajectory_curve
-from rrth_planner.visualization.viewer.examples import example_target
-from rrth_planner.visualization.viewer.panel import OWN, Panel
+from rrth_planner.visualization.viewer.panel import Panel
 from rrth_planner.visualization.viewer.planning_worker import Response, ViewerModel
 from rrth_planner.visualization.viewer.scene_view import SceneView
 from rrth_planner.wearer.body_boxes import body_boxes
@@ -71,8 +69,7 @@ class PersonPage:
         self.panel.target.value = tuple(self._target.tolist())
         self.view.target.position = self._target
         self.view.target.on_update(lambda _: self.aim(np.asarray(self.view.target.position)))
-        self.panel.target.on_update(self._on_numbers)
-        self.panel.target_example.on_update(self._on_example)
+        self.panel.on_target(self._move_target)
         self.model = ViewerModel(question)
 
     def run(self) -> NoReturn:
@@ -126,10 +123,7 @@ class PersonPage:
         if not self.asked or response.number != self.asked or response is self._read:
             return
         self._read, self.asked = response, 0
-        self.panel.said.content = (
-            f'<div style="padding:0.2em 0.8em 0.6em;font-size:0.85em">'
-            f'{escape(response.sentence)}</div>'
-        )
+        self.panel.say(response.sentence)
         plan = response.plan
         if plan is None or plan.trajectory is None:
             self._next = now + PAUSE
@@ -143,14 +137,6 @@ class PersonPage:
         self._state = started(self._state, motion, self._scene, now)
         curve = trajectory_curve(self._arm, plan.trajectory)
         self.view.show_path('timed', curve, np.empty((0, 3)))
-
-    def _on_numbers(self, event: Any) -> None:
-        if event.client is not None:
-            self._move_target(np.array(self.panel.target.value))
-
-    def _on_example(self, event: Any) -> None:
-        if event.client is not None and self.panel.target_example.value != OWN:
-            self._move_target(example_target(self.panel.target_example.value))
 
     def _move_target(self, target: Array) -> None:
         self.view.target.position = target
