@@ -135,7 +135,7 @@ def _value(kind: Any, data: Any, label: str) -> Any:
         return _options(data)
     if kind is MotionState:
         return _motion_state(data, label)
-    if is_dataclass(kind):
+    if isinstance(kind, type) and is_dataclass(kind):
         types = {field.name: field.type for field in fields(kind) if field.init}
         given = mapping(data, label, types, RecordError)
         # The entries of a record and of its question are called by their names alone.

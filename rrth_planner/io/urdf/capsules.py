@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.model.arm import Capsule
 from rrth_planner.model.arrays import Array
 
@@ -109,9 +110,10 @@ def volume(shape: Rounded) -> float:
     return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
 
 
-def enclosed_in(points: Array, shape: Rounded) -> Array:
+def enclosed_in(points: Array, shape: Rounded) -> NDArray[np.bool_]:
     """Return which points, (..., 3) [m], lie in a capsule, (...)."""
-    return line_distances(points, shape.ends) <= shape.radius
+    result: NDArray[np.bool_] = line_distances(points, shape.ends) <= shape.radius
+    return result
 
 
 def line_distances(points: Array, ends: Array) -> Array:
