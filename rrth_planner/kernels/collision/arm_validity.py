@@ -93,12 +93,12 @@ def is_in_contact(points, at, n_bars, dof, robot, boxes):
     return False
 
 
-@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT))
+@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT), inline='always')
 def collides(points, at, n_bars, dof, robot, boxes):
     """Return whether the arm at points[at] is in contact with a box, or with itself: exact."""
-    return (
-        is_in_contact(points, at, n_bars, dof, robot, boxes)
-        or colliding_pair(points, at, dof, robot) >= 0
+    # Where there are no pairs, the call alone would cost as much as a box.
+    return is_in_contact(points, at, n_bars, dof, robot, boxes) or (
+        robot[dof + 1, FIRST_PAIR] < robot.shape[0] and colliding_pair(points, at, dof, robot) >= 0
     )
 
 
@@ -141,7 +141,10 @@ def cut_bar(points, a, b, n_parts, part, piece):
     piece[7] = piece[15] = points[a + 7]
 
 
-@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, int64, MAT, MAT, OUT_POOL, int64))
+@kernel(
+    int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, int64, MAT, MAT, OUT_POOL, int64),
+    inline='always',
+)
 def open_bar(points, a, b, bow, bows, k, dof, robot, boxes, pool, n_open):
     """
     Append to the pool the groups of boxes that are open to bar k; return its new length.

@@ -39,7 +39,7 @@ SEEN_ROOM = 4 * BAR_SIZE
 POINT = 1e-24
 
 
-@kernel(float64(OUT_VEC, int64, OUT_VEC, int64, OUT_VEC))
+@kernel(float64(OUT_VEC, int64, OUT_VEC, int64, OUT_VEC), inline='always')
 def segment_gap(first, i, second, j, gap):
     """
     Return the squared distance of two lines [m^2], and write the vector of it [m].
@@ -128,7 +128,7 @@ def nearest_pair(points, at, dof, robot, least):
     return least
 
 
-@kernel(float64(MAT, int64, int64, int64, VEC, VEC))
+@kernel(float64(MAT, int64, int64, int64, VEC, VEC), inline='always')
 def curvature_bound(robot, row, end, first, speed, curvature):
     """
     Return a bound of the second derivative of one end of a bar, seen from a link.
@@ -169,7 +169,7 @@ def pair_bounds(robot, speed, bows):
         bows[n + SPEED] = fastest[(dof + 1) * inner + body] + fastest[(dof + 1) * outer + body]
 
 
-@kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64))
+@kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64), inline='always')
 def seen_from(points, bar, frame, seen, to):
     """Write both ends of points[bar] in the frame at points[frame], < 0: as is, to seen[to]."""
     for end in range(2):
@@ -194,7 +194,7 @@ def turned_to(points, frame, v):
         v[k] = points[row] * x + points[row + 1] * y + points[row + 2] * z
 
 
-@kernel(boolean(OUT_VEC, float64, OUT_VEC, OUT_VEC, int64, float64, float64))
+@kernel(boolean(OUT_VEC, float64, OUT_VEC, OUT_VEC, int64, float64, float64), inline='always')
 def keeps_apart(gap, length, seen, bows, n, bow, radius):
     """
     Return whether a direction, `gap` of some length, separates the hulls of two moving bars.
@@ -214,7 +214,10 @@ def keeps_apart(gap, length, seen, bows, n, bow, radius):
     return low - high > length * radius
 
 
-@kernel(boolean(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, int64, MAT))
+@kernel(
+    boolean(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, int64, MAT),
+    inline='always',
+)
 def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
     """
     Return whether a pair of bars is not proven apart between two instants.
