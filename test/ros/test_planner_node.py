@@ -24,11 +24,13 @@ from nav_msgs.srv import GetPlan  # noqa: E402
 from rclpy.duration import Duration  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
+from rclpy.parameter_client import AsyncParameterClient  # noqa: E402
 from rclpy.qos import (  # noqa: E402
     DurabilityPolicy,
     QoSProfile,
     ReliabilityPolicy,
 )
+from rclpy.task import Future  # noqa: E402
 from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
@@ -44,6 +46,7 @@ from rrth_planner.pipeline import in_process_planner  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
 from rrth_planner.ros import planner as planner_module  # noqa: E402
+from rrth_planner.ros.client import planner_client  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
@@ -1133,6 +1136,25 @@ def test_a_second_publisher_of_the_body_is_reported(start, monkeypatch):
     stranger.wait_until(lambda: stranger.value('publishers of the body') == '1')
     (line,) = [line for line in warnings if 'publishers' in line]
     assert 'body_boxes has 2 publishers: for each marker the last edit counts' in line, line
+
+
+def test_parameters_are_asked_for_again_where_an_answer_is_lost(start, monkeypatch):
+    planner, _ = start(margin=0.03)
+    n_asked = []
+
+    class Lossy(AsyncParameterClient):
+        def get_parameters(self, names, callback=None):
+            n_asked.append(len(names))
+            return Future() if len(n_asked) % 2 else super().get_parameters(names, callback)
+
+    monkeypatch.setattr(planner_client, 'AsyncParameterClient', Lossy)
+    monkeypatch.setattr(planner_client, 'ASK_AGAIN', 0.1)
+    client = planner_client.PlannerClient(namespace=planner.get_namespace())
+    try:
+        assert planner_client.parameters_of_planner(client).margin == 0.03
+    finally:
+        client.destroy_node()
+    assert len(n_asked) >= 4
 
 
 def hand_in_the_way():

@@ -20,6 +20,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
@@ -50,6 +51,8 @@ NODE = 'rrth_planner'
 LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE_STALE')
 # Between two requests to a planner that lacks an input [s].
 PAUSE = 0.3
+# What changes nothing is asked for again where no answer has come for so long [s].
+ASK_AGAIN = 2.0
 # Acknowledgements are waited for so long at a time [s].
 ACKNOWLEDGED = 0.01
 # Pause between two looks for messages while other tasks run [s].
@@ -435,9 +438,18 @@ def parameters_of_planner(client: PlannerClient) -> PlannerParameters:
     client.wait_for(asking.services_are_ready, f'the parameter services of {node}')
 
     def values_of(names: Sequence[str]) -> dict[str, Any]:
-        future = asking.get_parameters(list(names))
-        client.wait_for(future.done, f'the parameters of {node}')
-        found = [parameter_value_to_python(value) for value in future.result().values]
+        begin = time.monotonic()
+        futures: list[Future] = []
+
+        def is_answered() -> bool:
+            # The answer of a planner that does not know its client yet is lost.
+            if time.monotonic() >= begin + ASK_AGAIN * len(futures):
+                futures.append(asking.get_parameters(list(names)))
+            return any(future.done() for future in futures)
+
+        client.wait_for(is_answered, f'the parameters of {node}')
+        answer = next(future.result() for future in futures if future.done())
+        found = [parameter_value_to_python(value) for value in answer.values]
         values = dict(zip(names, found, strict=False))
         missing = [name for name in names if values.get(name) is None]
         if missing:
