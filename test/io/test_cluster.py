@@ -61,7 +61,9 @@ def test_each_worker_answers(client):
     found = on_each_worker(client, squared, 3)
     assert set(found) == set(client.nthreads())
     assert set(found.values()) == {9}
-    with pytest.raises(RrthError, match="No module named 'rrth_planner'; expected this package"):
+    with pytest.raises(
+        RrthError, match="No module named 'rrth_planner'; expected the same version"
+    ):
         on_each_worker(client, missing, 0)
 
 

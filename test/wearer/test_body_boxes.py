@@ -198,7 +198,7 @@ def test_a_lost_rotation_loses_what_is_placed_by_it():
 def test_without_the_base_frame_there_are_no_boxes(tracker, name):
     posture = seen_by(tracker, person_of(7))
     for call in (body_boxes, base_pose):
-        with pytest.raises(SceneError, match='^base: .* lost, expected both$'):
+        with pytest.raises(SceneError, match='^base: .* lost, expected all of them$'):
             call(load_skeleton(tracker), replaced(posture, name, np.nan))
 
 
