@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.kernels.collision.boxes import pack
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_ROWS, LANES
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import SceneError
 
@@ -18,7 +18,7 @@ def pack_boxes(rows: Array) -> tuple[Array, Indices]:
     """
     Return the groups of boxes that the kernels read, and where each box went.
 
-    rows (16, m): as from `boxes.rows_of` [m]. Groups (n_groups, 8 * 16): as in `kernels.layout`, a
+    rows (18, m): as from `boxes.rows_of` [m]. Groups (n_groups, 8 * 18): as in `kernels.layout`, a
     full tree, each lane of an inner group the bound of a group below. Lanes (m,): which lane of
     the last level holds box i.
     """
@@ -47,10 +47,10 @@ def grown_groups(groups: Array, by: float) -> Array:
     """
     grown = groups.reshape(len(groups), BOX_ROWS, LANES).copy()
     first = (len(groups) - 1) // LANES
-    half = grown[first:, BOX_HALF:BOX_CLASS]
+    half = grown[first:, BOX_HALF:BOX_ALLOWED]
     half += by
     if ((half <= 0.0) & np.isfinite(half)).any():
         raise SceneError(f'growth: {by}, expected a value that leaves every box a size > 0 [m]')
     # A box grows by as much along its own axes, its corners by up to the diagonal of a cube.
-    grown[:first, BOX_HALF:BOX_CLASS] += max(0.0, math.sqrt(3.0) * by)
+    grown[:first, BOX_HALF:BOX_ALLOWED] += max(0.0, math.sqrt(3.0) * by)
     return grown.reshape(groups.shape)

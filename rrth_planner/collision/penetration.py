@@ -11,9 +11,9 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.world import without_ray, World
 from rrth_planner.kernels.collision.bar_box import depths
 from rrth_planner.kernels.layout import (
-    ALLOWED,
+    ALLOWED_BITS,
     BAR_SIZE,
-    BOX_CLASS,
+    BOX_ALLOWED,
     BOX_HALF,
     BOX_ROWS,
     LANES,
@@ -55,10 +55,9 @@ def _is_checked(world: World) -> NDArray[np.bool_]:
     """Return which bars must keep clear of which boxes, (n_bars, m)."""
     rows, lanes = _places(world)
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES)
-    first = world.bounds.shape[1] + 2
-    allowed = world.robot[first : first + len(world.bar_names), ALLOWED].astype(np.int64)
-    classes = obstacles[rows, BOX_CLASS, lanes].astype(np.int64)
-    checked: NDArray[np.bool_] = (allowed[:, None] >> classes) % 2 == 0
+    number, bit = np.divmod(np.arange(len(world.bar_names))[:, None], ALLOWED_BITS)
+    allowed = obstacles[rows, BOX_ALLOWED + number, lanes].astype(np.int64)
+    checked: NDArray[np.bool_] = (allowed >> bit) % 2 == 0
     return checked
 
 
@@ -80,9 +79,9 @@ def relaxed(world: World, by: Array) -> World:
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES).copy()
     rows, lanes = _places(world)
     # The groups above bound the larger boxes, hence the smaller ones too.
-    halves = obstacles[rows, BOX_HALF:BOX_CLASS, lanes] - by[:, None]
+    halves = obstacles[rows, BOX_HALF:BOX_ALLOWED, lanes] - by[:, None]
     is_left = (halves > 0.0).all(axis=1, keepdims=True)
-    obstacles[rows, BOX_HALF:BOX_CLASS, lanes] = np.where(is_left, halves, -np.inf)
+    obstacles[rows, BOX_HALF:BOX_ALLOWED, lanes] = np.where(is_left, halves, -np.inf)
     return replace(world, obstacles=obstacles.reshape(world.obstacles.shape))
 
 
@@ -96,7 +95,7 @@ def half_widths(world: World) -> Array:
     """Return by how much each grown box may shrink until it vanishes, (m,) [m]."""
     rows, lanes = _places(world)
     obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES)
-    halves: Array = obstacles[rows, BOX_HALF:BOX_CLASS, lanes].min(axis=1)
+    halves: Array = obstacles[rows, BOX_HALF:BOX_ALLOWED, lanes].min(axis=1)
     return halves
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4
-from rrth_planner.collision.world import arm_rows, box_classes, mount_inverse, SLACK
+from rrth_planner.collision.world import allowed_bars, arm_rows, mount_inverse, SLACK
 from rrth_planner.kernels.collision.separation import first_blocked, permitted_rates
 from rrth_planner.model.arm import ArmModel, bars_of
 from rrth_planner.model.arrays import Array
@@ -96,8 +96,8 @@ def permitted_ahead(
 def _numbers_of(arm: ArmModel, body: SeenBody, growths: Array) -> tuple[Any, ...]:
     """Return arm and wearer as the kernels take them; growths (m,): of the boxes [m]."""
     robot, chain = arm_rows(arm, 0.0)
-    numbers, classes = body.scene.numbers, box_classes(arm, body.scene)
-    sight = numbers, classes, mount_inverse(arm), growths, body.speeds
+    numbers, allowed = body.scene.numbers, allowed_bars(arm, body.scene)
+    sight = numbers, allowed, mount_inverse(arm), growths, body.speeds
     return moving_joints(arm), chain, robot, *sight
 
 

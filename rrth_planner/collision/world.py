@@ -8,6 +8,7 @@ import functools
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rrth_planner.collision.bar_pairs import pair_names, pairs_of
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.kernels import jit, layout
@@ -24,7 +25,7 @@ from rrth_planner.model.arm import (
     mount_bars,
 )
 from rrth_planner.model.arrays import Array, check_dof, FARTHEST
-from rrth_planner.model.errors import ModelError, OptionsError
+from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
 
@@ -187,8 +188,7 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
             raise OptionsError(f'{name}: {value}, expected a length from 0 to {FARTHEST:g} [m]')
     robot, compiled_chain = arm_rows(arm, ray_guard_length)
     rows = np.empty((layout.BOX_ROWS, len(scene.boxes)))
-    rows_of(scene.numbers, mount_inverse(arm), margin + SLACK, rows)
-    rows[layout.BOX_CLASS] = box_classes(arm, scene)
+    rows_of(scene.numbers, allowed_bars(arm, scene), mount_inverse(arm), margin + SLACK, rows)
     obstacles, lanes = pack_boxes(rows)
     return World(
         bounds=arm.bounds,
@@ -260,36 +260,31 @@ def robot_rows(arm: ArmModel, ray_length: float) -> Array:
             row[layout.LINK] = layout.NO_BAR
             i, end = bar.source
             dh[i, layout.RADIUS_A if end == 'a' else layout.RADIUS_D] = bar.radius
-        row[layout.ALLOWED] = sum(
-            2.0 ** (c + 1)
-            for c, name in enumerate(_box_names(arm))
-            if (bar.name, name) in arm.allowed
-        )
     for k, pair in enumerate(pairs):
         slot = frames.index(pair.body) if pair.body > 0 else -1
         rows[first_pair + k, :4] = pair.inner, pair.outer, slot, pair.body
     return np.asarray(rows)
 
 
-def box_classes(arm: ArmModel, scene: Scene) -> Array:
-    """Return the class of each box, (m,): 0, or one more than the index of its name."""
-    names = _box_names(arm)
-    classes = np.zeros(len(scene.boxes))
-    for c, name in enumerate(names):
-        classes[[is_called(box.name, name) for box in scene.boxes]] = c + 1
-    return classes
+def allowed_bars(arm: ArmModel, scene: Scene) -> NDArray[np.int64]:
+    """Return which bars may meet each box, (m,): bit k for bar k."""
+    allowed = np.zeros(len(scene.boxes), np.int64)
+    for name, bars in _bars_by_name(arm).items():
+        allowed[[is_called(box.name, name) for box in scene.boxes]] |= bars
+    return allowed
 
 
 @functools.lru_cache(maxsize=16)
-def _box_names(arm: ArmModel) -> tuple[str, ...]:
-    """Return the names of boxes that some bar may meet, without repetition."""
-    parts = {bar.name for bar in (*bars_of(arm), *mount_bars(arm))}
-    names = tuple(dict.fromkeys(name for _, name in arm.allowed if name not in parts))
-    if len(names) > layout.MAX_CLASSES:
-        raise ModelError(
-            f'allowed: {len(names)} different names, expected at most {layout.MAX_CLASSES} [-]'
-        )
-    return names
+def _bars_by_name(arm: ArmModel) -> dict[str, int]:
+    """Return which bars may meet the boxes of each name, bit k for bar k."""
+    bars = [bar.name for bar in (*bars_of(arm), *mount_bars(arm))]
+    found: dict[str, int] = {}
+    for part, name in arm.allowed:
+        # Two bars that may meet each other are no pair.
+        if name not in bars:
+            met = sum(1 << k for k, bar in enumerate(bars) if bar == part)
+            found[name] = found.get(name, 0) | met
+    return found
 
 
 @functools.lru_cache(maxsize=16)

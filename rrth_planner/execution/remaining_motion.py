@@ -9,9 +9,9 @@ from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
 from rrth_planner.collision.penetration import gets_no_deeper, leads_out
 from rrth_planner.collision.world import (
+    allowed_bars,
     arm_rows,
     arm_world,
-    box_classes,
     mount_inverse,
     RESOLUTION,
     SLACK,
@@ -111,7 +111,7 @@ def is_remaining_free(
             chain,
             robot,
             scene.numbers,
-            box_classes(arm, scene),
+            allowed_bars(arm, scene),
             mount_inverse(arm),
             margin + SLACK,
             tree_depth(len(scene.boxes)),
@@ -179,7 +179,7 @@ def is_place_free(
             chain,
             robot,
             boxes,
-            box_classes(arm, scene),
+            allowed_bars(arm, scene),
             T_arm_base,
             margin + SLACK,
             depth,

@@ -22,11 +22,8 @@ NO_BAR = -1.0
 N_BARS, STRIDE, FRAMES, FIRST_PAIR = range(4)
 # Then a row for each bar, those of the mount last. Of a capsule: the frame of its link (0: the
 # mount's, dof + 1: the tool's), its radius, its two ends in that frame; of an offset: NO_BAR.
-# Then the sum of 2^c over the classes c of boxes that it may meet. From REACH on, dof columns
-# with the reach of its start and dof with that of its end.
-LINK, RADIUS, ENDS, ALLOWED = 0, 1, 2, 8
-# More classes a floating-point number does not hold.
-MAX_CLASSES = 50
+# From REACH on, dof columns with the reach of its start and dof with that of its end.
+LINK, RADIUS, ENDS = 0, 1, 2
 # Then a row for each pair of bars that must not collide: the inner and the outer one, where among
 # the frames that of the inner one's link is, and how many joints move that link.
 INNER, OUTER, FRAME, BODY = range(4)
@@ -39,8 +36,10 @@ MAX_PAIRS, MAX_FRAMES = 2048, 64
 # `boxes`: a row for each group of LANES boxes, their numbers side by side, so that the compiler
 # works on them all at once: number r of box l stands in column LANES r + l. The numbers: the
 # rotation into the box's own axes (9), the position of the arm's base in them (3), the half
-# extents grown by margin and slack (3), the class of the box, 0: none (1). The groups form a tree:
-# lane l of group g bounds the whole group LANES g + l + 1, if there is such a row; the last ones
-# hold the boxes themselves. Unused lanes have half extents of minus infinity: they never collide.
-LANES = 8
-BOX_OFFSET, BOX_HALF, BOX_CLASS, BOX_ROWS = 9, 12, 15, 16
+# extents grown by margin and slack (3), and which bars may meet the box (2): bar k where bit
+# k % ALLOWED_BITS of number k // ALLOWED_BITS is set. Then, in the first lane of one more, a
+# number other than 0 where a bar may meet any box of the group. The groups form a tree: lane l of
+# group g bounds the whole group LANES g + l + 1, if there is such a row; the last ones hold the
+# boxes themselves. Unused lanes have half extents of minus infinity: they never collide.
+LANES, ALLOWED_BITS = 8, 32
+BOX_OFFSET, BOX_HALF, BOX_ALLOWED, ANY_ALLOWED, BOX_ROWS = 9, 12, 15, 17, 18

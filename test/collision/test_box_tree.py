@@ -10,7 +10,7 @@ import pytest
 from rrth_planner.collision.box_tree import grown_groups, pack_boxes
 from rrth_planner.collision.reference_checker import bar_box_contact, bars
 from rrth_planner.collision.world import arm_world
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.scene import Scene
 from worlds import (
@@ -36,7 +36,7 @@ def random_rows(rng, n):
         axes = common if is_common else random_rotation(rng)
         rows[:BOX_OFFSET, i] = axes.ravel()
         rows[BOX_OFFSET:BOX_HALF, i] = -axes @ rng.uniform(-2.0, 2.0, 3)
-        rows[BOX_HALF:BOX_CLASS, i] = rng.uniform(0.01, 0.4, 3)
+        rows[BOX_HALF:BOX_ALLOWED, i] = rng.uniform(0.01, 0.4, 3)
     return rows
 
 
@@ -48,13 +48,13 @@ def lanes_of(groups):
 def corners_of(box):
     """Return the corners of a box, (8, 3) [m]."""
     axes, offset = box[:BOX_OFFSET].reshape(3, 3), box[BOX_OFFSET:BOX_HALF]
-    return (CORNERS * box[BOX_HALF:BOX_CLASS] - offset) @ axes
+    return (CORNERS * box[BOX_HALF:BOX_ALLOWED] - offset) @ axes
 
 
 def holds(bound, points):
     """Return whether a bound holds all points (n, 3)."""
     axes, offset = bound[:BOX_OFFSET].reshape(3, 3), bound[BOX_OFFSET:BOX_HALF]
-    return bool((np.abs(points @ axes.T + offset) <= bound[BOX_HALF:BOX_CLASS]).all())
+    return bool((np.abs(points @ axes.T + offset) <= bound[BOX_HALF:BOX_ALLOWED]).all())
 
 
 def boxes_below(lanes, g):
@@ -71,7 +71,7 @@ def check_bounds(groups):
         for lane in range(LANES):
             below = boxes_below(lanes, LANES * g + lane + 1)
             if not below:
-                assert np.isneginf(lanes[g, lane, BOX_HALF:BOX_CLASS]).all()
+                assert np.isneginf(lanes[g, lane, BOX_HALF:BOX_ALLOWED]).all()
                 continue
             assert holds(lanes[g, lane], np.concatenate([corners_of(box) for box in below]))
             n += 1
@@ -90,7 +90,7 @@ def test_every_box_is_in_exactly_one_lane_below_its_bounds(seed, n):
     assert len(set(places.tolist())) == n
     assert np.array_equal(leaves[places], rows.T)
     empty = np.delete(leaves, places, axis=0)
-    assert np.isneginf(empty[:, BOX_HALF:BOX_CLASS]).all()
+    assert np.isneginf(empty[:, BOX_HALF:BOX_ALLOWED]).all()
     assert np.isfinite(empty[:, :BOX_HALF]).all()
     n_bounds = check_bounds(groups)
     assert n_bounds >= (np.ceil(n / LANES) if n > LANES else 0)
@@ -103,7 +103,7 @@ def test_bounds_are_no_larger_than_a_few_boxes_need():
     axes = rows[:BOX_OFFSET].T.reshape(-1, 3, 3)
     rows[BOX_OFFSET:BOX_HALF, 32:] -= axes[32:, :, 0].T * 50.0
     lanes = lanes_of(pack_boxes(rows)[0])
-    assert lanes[0, :, BOX_HALF:BOX_CLASS].max() < 10.0
+    assert lanes[0, :, BOX_HALF:BOX_ALLOWED].max() < 10.0
 
 
 @examples(40)
@@ -117,9 +117,12 @@ def test_grown_groups_hold_the_grown_boxes(seed, n, by):
     leaves = lanes_of(grown)[(len(grown) - 1) // LANES :].reshape(-1, BOX_ROWS)
     assert np.array_equal(leaves[places, :BOX_HALF], rows[:BOX_HALF].T)
     assert np.allclose(
-        leaves[places, BOX_HALF:BOX_CLASS], rows[BOX_HALF:BOX_CLASS].T + by, rtol=0.0, atol=1e-15
+        leaves[places, BOX_HALF:BOX_ALLOWED],
+        rows[BOX_HALF:BOX_ALLOWED].T + by,
+        rtol=0.0,
+        atol=1e-15,
     )
-    assert np.isneginf(np.delete(leaves, places, axis=0)[:, BOX_HALF:BOX_CLASS]).all()
+    assert np.isneginf(np.delete(leaves, places, axis=0)[:, BOX_HALF:BOX_ALLOWED]).all()
     check_bounds(grown)
 
 

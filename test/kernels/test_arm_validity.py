@@ -27,7 +27,7 @@ from rrth_planner.kernels.collision.arm_validity import (
     prove_curve,
 )
 from rrth_planner.kernels.jit import CHAIN, first_class, kernel, MAT, VEC
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, D
+from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_OFFSET, BOX_ROWS, D
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.planning.options import RRTHOptions
 from rrth_planner.planning.planner import plan
@@ -355,8 +355,8 @@ def test_a_box_with_a_number_that_is_none_is_never_passed():
     # One box that fills the space where the arm is, broken row by row.
     rows = np.zeros((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = np.eye(3).ravel()
-    rows[BOX_HALF:BOX_CLASS] = 5.0
-    for row in range(BOX_CLASS):
+    rows[BOX_HALF:BOX_ALLOWED] = 5.0
+    for row in range(BOX_ALLOWED):
         for value in (np.nan, np.inf) if row >= BOX_HALF else (np.nan,):
             broken = rows.copy()
             broken[row] = value

@@ -3,12 +3,15 @@
 """An arm against itself: exact at a configuration, proven along a motion."""
 
 from dataclasses import replace
+import functools
+import itertools
 
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.collision.bar_pairs import pairs_of
 from rrth_planner.collision.certificate import derivative_bounds
+from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.collision.world import arm_world
 from rrth_planner.kernels.collision.arm_validity import prove_curve
@@ -172,6 +175,26 @@ def test_a_bar_that_may_touch_a_box_ignores_that_box_and_nothing_else():
     assert np.isinf(worlds[2].clearances(q[0])).sum() == 1
 
 
+@examples(25)
+@given(seed=SEEDS)
+def test_any_of_many_bars_may_meet_any_of_many_boxes(seed):
+    arm, rng = many_bars(), np.random.default_rng(seed)
+    # In two levels of groups.
+    scene = random_boxes(rng, 12)
+    bars, boxes = bar_names(arm), [box.name for box in scene.boxes]
+    may_meet = rng.random((len(bars), len(boxes))) < rng.choice([0.1, 0.9])
+    named = tuple((bars[k], boxes[j]) for k, j in np.argwhere(may_meet))
+    every = arm_world(arm, scene, 0.0, RAY)
+    some = arm_world(replace(arm, allowed=arm.allowed + named), scene, 0.0, RAY)
+    for q in rng.uniform(*arm.bounds, (10, arm.dof)):
+        expected = np.where(may_meet, np.inf, every.clearances(q))
+        assert np.array_equal(some.clearances(q), expected)
+        depths = np.where(may_meet, -np.inf, box_depths(every, q))
+        assert np.array_equal(box_depths(some, q), depths)
+        assert some.is_valid(q) == (depths < 0.0).all()
+        assert some.is_edge_valid(q, q + 1e-9) == some.is_valid(q)
+
+
 def test_boxes_and_the_arm_itself_are_both_avoided():
     arm, rng = seeded_capsule_arm(1), np.random.default_rng(9)
     scene = random_boxes(rng, 12, spread=0.8)
@@ -180,6 +203,21 @@ def test_boxes_and_the_arm_itself_are_both_avoided():
     alone = arm_world(free, scene, 0.01, RAY)
     for q in rng.uniform(*arm.bounds, (500, arm.dof)):
         assert both.is_valid(q) == (boxes.is_valid(q) and alone.is_valid(q))
+
+
+@functools.cache
+def many_bars():
+    """Return an arm of more bars than one number of a box has room for."""
+    rng = np.random.default_rng(0)
+    links = np.arange(40) % 4 + 1
+    capsules = tuple(
+        Capsule(name=f'part {k}', link=int(link), ends=ends, radius=0.02)
+        for k, (link, ends) in enumerate(
+            zip(links, rng.uniform(-0.2, 0.2, (40, 2, 3)), strict=True)
+        )
+    )
+    arm = replace(table_1_arm(), capsules=capsules)
+    return replace(arm, allowed=tuple(itertools.combinations(names_of(arm), 2)))
 
 
 def names_of(arm):

@@ -5,8 +5,8 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels.collision.boxes import first_bad, place, rows_of
-from rrth_planner.kernels.layout import NUMBERS
+from rrth_planner.kernels.collision.boxes import first_bad, may_meet, place, rows_of
+from rrth_planner.kernels.layout import BOX_ROWS, MAX_BARS, NUMBERS
 from rrth_planner.model.arrays import FARTHEST
 from rrth_planner.model.errors import SceneError
 from rrth_planner.model.rotation import pose_matrix, quaternion_xyzw, rotation_matrix
@@ -85,8 +85,10 @@ def test_rows_tell_which_points_are_inside(seed, n, growth):
     rng = np.random.default_rng(seed)
     scene = random_boxes(rng, n)
     T = pose_matrix(rng.normal(size=3), quaternion_xyzw(random_rotation(rng)))
-    rows = np.empty((16, n))
-    rows_of(scene.numbers, T, growth, rows)
+    rows = np.empty((BOX_ROWS, n))
+    # Any of the 63 bars.
+    allowed = rng.integers(0, 1 << MAX_BARS, size=n)
+    rows_of(scene.numbers, allowed, T, growth, rows)
     for k, box in enumerate(scene.boxes):
         # Points in the box's own axes, none of them within rounding of its faces.
         half = 0.5 * box.size + growth
@@ -95,4 +97,5 @@ def test_rows_tell_which_points_are_inside(seed, n, growth):
         seen = points @ rows[:9, k].reshape(3, 3).T + rows[9:12, k]
         assert np.allclose(seen, own, rtol=0.0, atol=1e-12)
         assert np.array_equal(rows[12:15, k], half)
-        assert rows[15, k] == 0.0
+        found = sum(1 << bar for bar in range(MAX_BARS) if may_meet(rows, k, bar))
+        assert found == allowed[k]

@@ -17,7 +17,7 @@ from rrth_planner.kernels.collision.edge_contacts import (
     SHARE,
     SPACING,
 )
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from rrth_planner.model.scene import Scene
 from worlds import (
     compiled_chain,
@@ -37,7 +37,7 @@ def kernel_gap(a, b, radius, center, rotation, half):
     rows = np.zeros((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = rotation.T.ravel()
     rows[BOX_OFFSET:BOX_HALF, 0] = -rotation.T @ center
-    rows[BOX_HALF:BOX_CLASS, 0] = half
+    rows[BOX_HALF:BOX_ALLOWED, 0] = half
     gaps = np.empty(LANES)
     bar_gaps(np.array([*a, 0.0, *b, radius]), 0, pack_boxes(rows)[0], 0, gaps)
     # Lanes that hold no box are never close.

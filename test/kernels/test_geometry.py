@@ -10,7 +10,7 @@ import pytest
 from rrth_planner.collision.box_tree import pack_boxes
 from rrth_planner.collision.reference_checker import bar_box_contact
 from rrth_planner.kernels.collision.bar_box import bar_box_distance, contact_lanes, open_lanes
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
+from rrth_planner.kernels.layout import BOX_ALLOWED, BOX_HALF, BOX_OFFSET, BOX_ROWS, LANES
 from worlds import examples, random_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -21,7 +21,7 @@ def packed(center, rotation, half):
     rows = np.zeros((BOX_ROWS, 1))
     rows[:BOX_OFFSET, 0] = rotation.T.ravel()
     rows[BOX_OFFSET:BOX_HALF, 0] = -rotation.T @ center
-    rows[BOX_HALF:BOX_CLASS, 0] = half
+    rows[BOX_HALF:BOX_ALLOWED, 0] = half
     return pack_boxes(rows)[0]
 
 
@@ -116,7 +116,7 @@ def test_each_lane_is_checked_as_if_it_were_alone(cases):
             for lane, group in enumerate(groups[first : first + n]):
                 together[:, lane] = group.reshape(BOX_ROWS, LANES)[:, 0]
             alone = [touches(p, q, 0.0, group) for group in groups[first : first + n]]
-            together[:BOX_HALF, n:] = together[BOX_CLASS] = 0.0
+            together[:BOX_HALF, n:] = together[BOX_ALLOWED:] = 0.0
             points = np.array([*p, 0.0, *q, 0.0])
             bits = contact_lanes(points, 0, together.reshape(1, -1), 0)
             assert [bool(bits >> lane & 1) for lane in range(LANES)] == [*alone, False]
@@ -271,7 +271,7 @@ def test_a_number_that_is_none_counts_as_contact():
         ends[k] = np.nan
         assert touches(ends[:3], ends[3:], 0.0, boxes)
     # Of the rotation one axis may still prove that the bar is apart.
-    for row in range(BOX_OFFSET, BOX_CLASS):
+    for row in range(BOX_OFFSET, BOX_ALLOWED):
         close = packed(np.zeros(3), np.eye(3), np.ones(3))
         close[0, LANES * row] = np.nan
         assert touches(np.zeros(3), [0.5, 0.1, 0.1], 0.0, close)

@@ -4,21 +4,15 @@
 
 import math
 
-from numba.core.types import boolean, float64, int64, void
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.arm_validity import checked_lanes, ENDS_ROOM
+from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM
 from rrth_planner.kernels.collision.bar_bar import nearest_pair
-from rrth_planner.kernels.collision.bar_box import nearer
+from rrth_planner.kernels.collision.bar_box import checked_lanes, nearer
 from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.layout import BAR_SIZE, BOX_HALF, D, LANES, REACH
 from rrth_planner.kernels.trajectory.quintics import state_at
-
-
-@kernel(boolean(MAT, int64, MAT, int64, int64))
-def counts(robot, row, boxes, g, j):
-    """Return whether a bar, row in `robot`, must keep clear of lane j of a last group."""
-    return checked_lanes(robot, row, boxes, g, 1 << j) != 0
 
 
 @kernel(void(MAT, float64, CHAIN, MAT, MAT, OUT_MAT))
@@ -38,21 +32,21 @@ def clearances(positions, ray_length, chain, robot, boxes, distances):
             for g in range(first, boxes.shape[0]):
                 for j in range(LANES):
                     lane = LANES * (g - first) + j
-                    if not counts(robot, positions.shape[1] + 2 + k, boxes, g, j):
+                    if checked_lanes(boxes, g, k, 1 << j) == 0:
                         continue
                     distances[k, lane] = nearer(
                         points, BAR_SIZE * k, boxes, g, j, distances[k, lane]
                     )
 
 
-@kernel(float64(OUT_VEC, int64, int64, MAT, MAT, float64))
-def nearest(points, n_bars, dof, robot, boxes, least):
+@kernel(float64(OUT_VEC, int64, MAT, float64))
+def nearest(points, n_bars, boxes, least):
     """Return the least distance of the bars of an arm from the boxes, where it is less [m]."""
     for k in range(n_bars):
         for g in range((boxes.shape[0] - 1) // LANES, boxes.shape[0]):
             for j in range(LANES):
                 is_box = boxes[g, LANES * BOX_HALF + j] > 0.0
-                if is_box and counts(robot, dof + 2 + k, boxes, g, j):
+                if is_box and checked_lanes(boxes, g, k, 1 << j) != 0:
                     least = nearer(points, BAR_SIZE * k, boxes, g, j, least)
     return least
 
@@ -67,12 +61,12 @@ def least_along(curves, times, begin, n, chain, robot, boxes):
     """
     points = scratch.floats(ENDS_ROOM)
     q, v = np.empty(curves.shape[2]), np.empty(curves.shape[2])
-    last, dof = times[curves.shape[0]], curves.shape[2]
+    last = times[curves.shape[0]]
     least = math.inf
     for i in range(n):
         state_at(curves, times, begin + (last - begin) * (i / (n - 1)), q, v)
-        n_bars = chain(q, robot[dof, D], points, 0)
-        least = nearest(points, n_bars, dof, robot, boxes, least)
+        n_bars = chain(q, robot[curves.shape[2], D], points, 0)
+        least = nearest(points, n_bars, boxes, least)
     return least
 
 
@@ -88,7 +82,7 @@ def free_radius(q, chain, robot, boxes):
     dof = q.shape[0]
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, robot[dof, D], points, 0)
-    least = nearest(points, n_bars, dof, robot, boxes, math.inf)
+    least = nearest(points, n_bars, boxes, math.inf)
     least = nearest_pair(points, 0, dof, robot, least)
     squared = 0.0
     for k in range(dof):

@@ -11,24 +11,24 @@ from rrth_planner.kernels.collision.bar_bar import (
     BOW_SIZE,
     BOWS_ROOM,
     colliding_pair,
-    curvature_bound,
     is_pair_in_contact,
     is_pair_open,
     pair_bounds,
 )
-from rrth_planner.kernels.collision.bar_box import contact_lanes, open_lanes
+from rrth_planner.kernels.collision.bar_box import checked_lanes, contact_lanes, open_lanes
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import (
-    ALLOWED,
     BAR_SIZE,
-    BOX_CLASS,
     D,
     FIRST_PAIR,
     FRAME_SIZE,
+    KIND,
     LANES,
     MAX_BARS,
     MAX_DOF,
     MAX_FRAMES,
+    PRISMATIC,
+    REACH,
     STRIDE,
 )
 
@@ -53,26 +53,24 @@ SPLIT, MAX_PARTS = 0.05, 64
 FIRST_INTERVAL = 1.0
 
 
-@kernel(int64(MAT, int64, MAT, int64, int64))
-def checked_lanes(robot, row, boxes, g, lanes):
-    """Return those of some boxes of a group that a bar, row in `robot`, must keep clear of."""
-    classes = int64(robot[row, ALLOWED])
-    if classes != 0:
-        for j in range(LANES):
-            if (classes >> int64(boxes[g, LANES * BOX_CLASS + j])) & 1:
-                lanes &= ~(1 << j)
-    return lanes
+@kernel(int64(OUT_VEC, int64, int64, MAT), inline='always')
+def group_contact(points, at, n_bars, boxes):
+    """Return 0 where no bar of the arm at points[at] is in contact with one group of boxes."""
+    found = 0
+    for k in range(n_bars - 1, -1, -1):
+        hit = contact_lanes(points, at + BAR_SIZE * k, boxes, 0)
+        if hit != 0:
+            found += checked_lanes(boxes, 0, k, hit)
+            if found != 0:
+                break
+    return found
 
 
-@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT))
-def is_in_contact(points, at, n_bars, dof, robot, boxes):
+@kernel(boolean(OUT_VEC, int64, int64, MAT))
+def is_in_contact(points, at, n_bars, boxes):
     """Return whether any bar of the arm at points[at] is in contact with a box: exact."""
     if boxes.shape[0] == 1:
-        for k in range(n_bars - 1, -1, -1):
-            hit = contact_lanes(points, at + BAR_SIZE * k, boxes, 0)
-            if hit != 0 and checked_lanes(robot, dof + 2 + k, boxes, 0, hit) != 0:
-                return True
-        return False
+        return group_contact(points, at, n_bars, boxes) != 0
     waiting = scratch.ints(MAX_GROUPS)
     n_waiting, waiting[0] = 1, 0
     while n_waiting > 0:
@@ -83,7 +81,7 @@ def is_in_contact(points, at, n_bars, dof, robot, boxes):
         for k in range(n_bars - 1, -1, -1):
             hit |= contact_lanes(points, at + BAR_SIZE * k, boxes, g)
             if is_leaf and hit != 0:
-                if checked_lanes(robot, dof + 2 + k, boxes, g, hit) != 0:
+                if checked_lanes(boxes, g, k, hit) != 0:
                     return True
                 hit = 0
         for j in range(LANES):
@@ -93,30 +91,38 @@ def is_in_contact(points, at, n_bars, dof, robot, boxes):
     return False
 
 
-@kernel(boolean(OUT_VEC, int64, int64, int64, MAT, MAT), inline='always')
-def collides(points, at, n_bars, dof, robot, boxes):
-    """Return whether the arm at points[at] is in contact with a box, or with itself: exact."""
-    # Where there are no pairs, the call alone would cost as much as a box.
-    return is_in_contact(points, at, n_bars, dof, robot, boxes) or (
-        robot[dof + 1, FIRST_PAIR] < robot.shape[0] and colliding_pair(points, at, dof, robot) >= 0
-    )
-
-
 @kernel(boolean(VEC, float64, CHAIN, MAT, MAT))
 def is_configuration_free(q, ray_length, chain, robot, boxes):
     """Return whether the arm at q, with a ray that long [m], is clear of all boxes and itself."""
     points = scratch.floats(ENDS_ROOM)
     n_bars = chain(q, ray_length, points, 0)
-    return not collides(points, 0, n_bars, q.shape[0], robot, boxes)
+    # Written out, where there is one group: a call costs as much as a bar.
+    if boxes.shape[0] == 1:
+        if group_contact(points, 0, n_bars, boxes) != 0:
+            return False
+    elif is_in_contact(points, 0, n_bars, boxes):
+        return False
+    # Further rows: of bars of the mount, and of pairs.
+    dof = q.shape[0]
+    if robot.shape[0] > dof + 2 + n_bars:
+        return colliding_pair(points, 0, dof, robot) < 0
+    return True
 
 
 @kernel(void(MAT, int64, VEC, VEC, OUT_VEC))
 def curvature_bounds(robot, n_bars, speed, curvature, bows):
     """Write `curvature_bound` for both ends of each bar, seen from the base."""
-    first = speed.shape[0] + 2
+    dof, inner, factors = speed.shape[0], 0.0, scratch.floats(MAX_DOF)
+    for j in range(dof):
+        turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
+        factors[j] = speed[j] * (turns + 2.0 * inner) + curvature[j]
+        inner += turns
     for k in range(n_bars):
-        for end in range(2):
-            bows[2 * k + end] = curvature_bound(robot, first + k, end, 0, speed, curvature)
+        start, end, row = 0.0, 0.0, dof + 2 + k
+        for j in range(dof):
+            start += robot[row, REACH + j] * factors[j]
+            end += robot[row, REACH + dof + j] * factors[j]
+        bows[2 * k], bows[2 * k + 1] = start, end
 
 
 @kernel(void(MAT, float64, OUT_VEC))
@@ -142,10 +148,10 @@ def cut_bar(points, a, b, n_parts, part, piece):
 
 
 @kernel(
-    int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, int64, MAT, MAT, OUT_POOL, int64),
+    int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64),
     inline='always',
 )
-def open_bar(points, a, b, bow, bows, k, dof, robot, boxes, pool, n_open):
+def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
     """
     Append to the pool the groups of boxes that are open to bar k; return its new length.
 
@@ -166,7 +172,7 @@ def open_bar(points, a, b, bow, bows, k, dof, robot, boxes, pool, n_open):
                     waiting[n_waiting] = LANES * g + j + 1
                     n_waiting += 1
             continue
-        lanes = checked_lanes(robot, dof + 2 + k, boxes, g, lanes)
+        lanes = checked_lanes(boxes, g, k, lanes)
         if lanes == 0:
             continue
         if n_open >= MAX_OPEN:
@@ -208,16 +214,31 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     return n_open
 
 
-@kernel(int64(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, MAT, OUT_POOL, int64))
-def open_pair(points, a, b, p, width, speed, curvature, bows, robot, pool, n_open):
-    """Append pair p to the pool if it is open; return the new length; -1: there is no room."""
-    row = int64(robot[speed.shape[0] + 1, FIRST_PAIR]) + p
-    if not is_pair_open(points, a, b, row, width, speed, curvature, bows, BOW_SIZE * p, robot):
-        return n_open
-    if n_open >= MAX_OPEN:
-        return -1
-    pool[ENTRY * n_open] = -1 - p
-    return n_open + 1
+@kernel(
+    int64(OUT_VEC, int64, int64, int64, int64, float64, VEC, VEC, OUT_VEC, MAT, OUT_POOL, int64)
+)
+def open_pairs(points, a, b, first, last, width, speed, curvature, bows, robot, pool, n_open):
+    """
+    Append to the pool those of some pairs that are open; return its new length.
+
+    The pairs: those in the pool from entry `first` to `last`; last < 0: all. points[a], points[b]:
+    the arm at two instants, that far apart in the curve's parameter. -1: the pool has no room.
+    """
+    first_pair = int64(robot[speed.shape[0] + 1, FIRST_PAIR])
+    is_every = last < 0
+    if is_every:
+        first, last = 0, robot.shape[0] - first_pair
+    for k in range(first, last):
+        p = k if is_every else -1 - int64(pool[ENTRY * k])
+        if p < 0 or not is_pair_open(
+            points, a, b, first_pair + p, width, speed, curvature, bows, BOW_SIZE * p, robot
+        ):
+            continue
+        if n_open >= MAX_OPEN:
+            return -1
+        pool[ENTRY * n_open] = -1 - p
+        n_open += 1
+    return n_open
 
 
 @kernel(boolean(OUT_VEC, int64, int64, MAT, OUT_POOL, int64, int64))
@@ -268,7 +289,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
     u[0] = 1.0
     curve_point(curve, 1.0, q)
     n_bars = chain(q, ray_length, points, 0)
-    if is_in_contact(points, 0, n_bars, dof, robot, boxes):
+    if is_in_contact(points, 0, n_bars, boxes):
         return 0
     max_nodes = min(MAX_NODES, POINTS_ROOM // stride)
     n_pieces = int64(length / FIRST_INTERVAL) + 1
@@ -280,7 +301,7 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         curve_point(curve, u[i], q)
         chain(q, ray_length, points, i * stride)
         # The start is checked below: mostly it is known to be free.
-        if i > 1 and is_in_contact(points, i * stride, n_bars, dof, robot, boxes):
+        if i > 1 and is_in_contact(points, i * stride, n_bars, boxes):
             return 0
         queue[tail], queue[tail + 1] = i, i + 1 if i < n_pieces else 0
         queue[tail + 2], queue[tail + 3] = 0, -1
@@ -298,58 +319,45 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         if last < 0:
             for k in range(n_bars):
                 n_open = open_bar(
-                    points, a * stride, b * stride, bow, bows, k, dof, robot, boxes, pool, n_open
-                )
-                if n_open < 0:
-                    return -1
-            for p in range(n_pairs):
-                n_open = open_pair(
-                    points,
-                    a * stride,
-                    b * stride,
-                    p,
-                    width,
-                    speed,
-                    curvature,
-                    pair_bows,
-                    robot,
-                    pool,
-                    n_open,
+                    points, a * stride, b * stride, bow, bows, k, boxes, pool, n_open
                 )
                 if n_open < 0:
                     return -1
         is_split = width * length < SPLIT and last - first < MAX_PARTS
         for row in range(first, last):
-            if pool[ENTRY * row] < 0:
-                p = -1 - int64(pool[ENTRY * row])
-                n_open = open_pair(
-                    points,
-                    a * stride,
-                    b * stride,
-                    p,
-                    width,
-                    speed,
-                    curvature,
-                    pair_bows,
-                    robot,
-                    pool,
-                    n_open,
-                )
-            else:
+            if pool[ENTRY * row] >= 0:
                 n_open = open_again(
                     points, a * stride, b * stride, bow, bows, row, is_split, boxes, pool, n_open
                 )
+                if n_open < 0:
+                    return -1
+        if n_pairs > 0:
+            n_open = open_pairs(
+                points,
+                a * stride,
+                b * stride,
+                first,
+                last,
+                width,
+                speed,
+                curvature,
+                pair_bows,
+                robot,
+                pool,
+                n_open,
+            )
             if n_open < 0:
                 return -1
         if n_open == start:
             continue
         if last < 0:
-            if is_open_pair_in_contact(points, b * stride, dof, robot, pool, start, n_open):
-                return 0
-            if a == 1 and (
-                is_in_contact(points, stride, n_bars, dof, robot, boxes)
-                or is_open_pair_in_contact(points, stride, dof, robot, pool, start, n_open)
+            if n_pairs > 0 and (
+                is_open_pair_in_contact(points, b * stride, dof, robot, pool, start, n_open)
+                or a == 1
+                and is_open_pair_in_contact(points, stride, dof, robot, pool, start, n_open)
             ):
+                return 0
+            if a == 1 and is_in_contact(points, stride, n_bars, boxes):
                 return 0
         if width * length < resolution or n_nodes >= max_nodes or tail > QUEUE_ROOM - 8:
             return -1
@@ -357,8 +365,9 @@ def prove_curve(curve, speed, curvature, resolution, chain, robot, boxes):
         curve_point(curve, u[n_nodes], q)
         chain(q, ray_length, points, n_nodes * stride)
         middle = n_nodes * stride
-        if is_in_contact(points, middle, n_bars, dof, robot, boxes) or is_open_pair_in_contact(
-            points, middle, dof, robot, pool, start, n_open
+        if is_in_contact(points, middle, n_bars, boxes) or (
+            n_pairs > 0
+            and is_open_pair_in_contact(points, middle, dof, robot, pool, start, n_open)
         ):
             return 0
         queue[tail], queue[tail + 1], queue[tail + 2], queue[tail + 3] = a, n_nodes, start, n_open

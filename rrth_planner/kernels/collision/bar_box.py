@@ -8,7 +8,14 @@ from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC
-from rrth_planner.kernels.layout import BOX_HALF, BOX_OFFSET, LANES
+from rrth_planner.kernels.layout import (
+    ALLOWED_BITS,
+    ANY_ALLOWED,
+    BOX_ALLOWED,
+    BOX_HALF,
+    BOX_OFFSET,
+    LANES,
+)
 
 # Bars nearer than this are in contact [m].
 CONTACT = 1e-12
@@ -16,6 +23,24 @@ CONTACT = 1e-12
 PARALLEL = 1e-12
 # Up to four points in the axes of LANES boxes.
 LOCAL_ROOM = 12 * LANES
+
+
+@kernel(int64(MAT, int64, int64, int64))
+def without_allowed(boxes, g, bar, lanes):
+    """Return those of some boxes of a last group that a bar may not meet."""
+    first, bit = LANES * (BOX_ALLOWED + bar // ALLOWED_BITS), bar % ALLOWED_BITS
+    for j in range(LANES):
+        if (int64(boxes[g, first + j]) >> bit) & 1:
+            lanes &= ~(1 << j)
+    return lanes
+
+
+@kernel(int64(MAT, int64, int64, int64), inline='always')
+def checked_lanes(boxes, g, bar, lanes):
+    """Return the same; mostly no bar may meet any box, and a look at one number is enough."""
+    if boxes[g, LANES * ANY_ALLOWED] != 0.0:
+        lanes = without_allowed(boxes, g, bar, lanes)
+    return lanes
 
 
 @kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')

@@ -4,14 +4,15 @@
 
 import math
 
-from numba.core.types import float64, int64, void
+from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_INTS, OUT_MAT, OUT_VEC, READ_INTS
 from rrth_planner.kernels.layout import (
-    BOX_CLASS,
+    ALLOWED_BITS,
+    ANY_ALLOWED,
+    BOX_ALLOWED,
     BOX_HALF,
     BOX_OFFSET,
-    BOX_ROWS,
     LANES,
     ORTHOGONAL,
     ROTATION,
@@ -20,6 +21,8 @@ from rrth_planner.kernels.layout import (
 
 # Numbers of a marker: position, quaternion x y z w, scale, and a point in its own axes.
 QUATERNION, SCALE, POINT, POSED = 3, 7, 10, 13
+# The bits of one number of BOX_ALLOWED.
+LOW_BITS = (1 << ALLOWED_BITS) - 1
 # A bound holds its boxes with this to spare [m].
 SPARE = 1e-9
 
@@ -80,13 +83,14 @@ def first_bad(boxes, farthest):
     return -1
 
 
-@kernel(void(MAT, MAT, float64, OUT_MAT), is_short=True)
-def rows_of(boxes, T_arm_base, growth, rows):
+@kernel(void(MAT, READ_INTS, MAT, float64, OUT_MAT), is_short=True)
+def rows_of(boxes, allowed, T_arm_base, growth, rows):
     """
-    Write the rows of boxes, (16, n), each grown by that much on every side [m].
+    Write the rows of boxes, (18, n), each grown by that much on every side [m].
 
-    boxes (n, 15) in the base frame. A box's column: its axes in the arm's frame row by row, the
-    position of that frame in them, its half extents, and 0: it is of no class.
+    boxes (n, 15) in the base frame; allowed (n,): which bars may meet each, bit k for bar k. A
+    box's column: its axes in the arm's frame row by row, the position of that frame in them, its
+    half extents, the bars that may meet it, as in `kernels.layout`, and 1 where there are some.
     """
     for i in range(boxes.shape[0]):
         for k in range(3):
@@ -101,7 +105,16 @@ def rows_of(boxes, T_arm_base, growth, rows):
                 offset -= along * center
             rows[BOX_OFFSET + k, i] = offset
             rows[BOX_HALF + k, i] = 0.5 * boxes[i, SIZE + k] + growth
-        rows[BOX_CLASS, i] = 0.0
+        for n in range(2):
+            rows[BOX_ALLOWED + n, i] = (allowed[i] >> ALLOWED_BITS * n) & LOW_BITS
+        rows[ANY_ALLOWED, i] = 0.0 if allowed[i] == 0 else 1.0
+
+
+@kernel(boolean(MAT, int64, int64))
+def may_meet(rows, box, bar):
+    """Return whether a bar may meet a box, column of `rows`."""
+    bars = int64(rows[BOX_ALLOWED + bar // ALLOWED_BITS, box])
+    return (bars >> bar % ALLOWED_BITS) & 1 != 0
 
 
 @kernel(void(MAT, READ_INTS, int64, int64, OUT_MAT, int64, int64))
@@ -181,13 +194,13 @@ def pack(rows, depth, groups, lanes):
     """
     Write the tree of groups of boxes, and which lane of its last level holds box i.
 
-    rows (16, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 16) as in
+    rows (18, n) as from `rows_of`; depth: levels of the tree; groups (n_groups, 8 * 18) as in
     `kernels.layout`; lanes (n,). On every level the boxes are halved three times, each time along
     the axis that their centres spread most along.
     """
     n = rows.shape[1]
     groups[:] = 0.0
-    groups[:, LANES * BOX_HALF : LANES * BOX_CLASS] = -math.inf
+    groups[:, LANES * BOX_HALF : LANES * BOX_ALLOWED] = -math.inf
     order, keys = np.arange(n), np.empty(n)
     # Ends of the parts of the present level, each a group of it.
     ends = np.full(1, n)
@@ -213,6 +226,7 @@ def pack(rows, depth, groups, lanes):
         for k in range(begin, ends[p]):
             lane = k - begin
             lanes[order[k]] = LANES * p + lane
-            for row in range(BOX_ROWS):
+            for row in range(ANY_ALLOWED):
                 groups[first + p, LANES * row + lane] = rows[row, order[k]]
+            groups[first + p, LANES * ANY_ALLOWED] += rows[ANY_ALLOWED, order[k]]
         begin = ends[p]

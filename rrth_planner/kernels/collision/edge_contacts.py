@@ -6,7 +6,8 @@ import math
 
 from numba.core.types import float64, int64, void
 from rrth_planner.kernels import scratch
-from rrth_planner.kernels.collision.arm_validity import checked_lanes, ENDS_ROOM, MAX_GROUPS
+from rrth_planner.kernels.collision.arm_validity import ENDS_ROOM, MAX_GROUPS
+from rrth_planner.kernels.collision.bar_box import checked_lanes
 from rrth_planner.kernels.jit import CHAIN, kernel, MAT, OUT_MAT, OUT_POOL, OUT_VEC, VEC
 from rrth_planner.kernels.layout import BAR_SIZE, D, LANES, MAX_DOF
 from rrth_planner.kernels.vectors import distance
@@ -151,7 +152,7 @@ def edge_contacts(q_from, q_to, chain, robot, boxes, contacts):
                         waiting[n_waiting] = LANES * g + j + 1
                         n_waiting += 1
                         continue
-                    if checked_lanes(robot, dof + 2 + bar, boxes, g, 1 << j) == 0:
+                    if checked_lanes(boxes, g, bar, 1 << j) == 0:
                         continue
                     row = 0
                     while row < n_pairs and not (

@@ -9,12 +9,10 @@ import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.collision.arm_validity import BARS_ROOM, curvature_bounds, ENDS_ROOM
 from rrth_planner.kernels.collision.bar_box import bar_box_distance
-from rrth_planner.kernels.collision.boxes import rows_of
+from rrth_planner.kernels.collision.boxes import may_meet, rows_of
 from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, OUT_VEC, READ_INTS, VEC
 from rrth_planner.kernels.layout import (
-    ALLOWED,
     BAR_SIZE,
-    BOX_CLASS,
     BOX_HALF,
     BOX_OFFSET,
     BOX_ROWS,
@@ -39,9 +37,10 @@ STEPS, STEP = 6, 1e-4
 # Smallest velocities that are divided by [rad/s].
 TINY, SLOW = 1e-6, 1e-3
 
-# A wearer as he was seen: boxes (m, 15) and classes (m,) as in `layout`, T_arm_base (4, 4), by how
-# much each box is grown at time 0 (m,) [m], and its greatest speed (m,) [m/s].
-BODY = (MAT, VEC, MAT, VEC, VEC)
+# A wearer as he was seen: boxes (m, 15), allowed (m,) and T_arm_base (4, 4) as for
+# `boxes.rows_of`, by how much each box is grown at time 0 (m,) [m], and its greatest speed (m,)
+# [m/s].
+BODY = (MAT, READ_INTS, MAT, VEC, VEC)
 
 
 @kernel(void(MAT, float64, float64, OUT_MAT))
@@ -70,7 +69,7 @@ def within_distance(points, at, low, high, distance, rows, box):
     """
     Return how far a part of a line is from a box; where that is more than a distance, more [m].
 
-    The line from points[at] to points[at + 4], of it the part between two shares; rows (16, m) as
+    The line from points[at] to points[at + 4], of it the part between two shares; rows (18, m) as
     from `boxes.rows_of`. Signed: < 0 inside.
     """
     start, step, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
@@ -116,7 +115,7 @@ def blocking_box(
 
     part (6, dof): the motion between two times [s], over u from 0 to 1; contact: speed up to which
     a point of the arm counts as at rest [m/s]; bodies (n_bars,): how many joints move each bar,
-    the pointing ray left out; rows (16, m), growths at time 0 and speeds (m,): the boxes; quartic
+    the pointing ray left out; rows (18, m), growths at time 0 and speeds (m,): the boxes; quartic
     and cubic as for `quintics.bound`. With dp the way of an end of a bar and b the bound of its
     second derivative by u, it is no faster than |dp| + b / 2, and within |dp| / 2 + b / 8 of the
     mean of its two places (`docs/algorithms.md`).
@@ -162,23 +161,14 @@ def blocking_box(
             s = share[i]
             way, bent = (1.0 - s) * moved[0] + s * moved[1], (1.0 - s) * bow + s * other
             strays = max(strays, 0.5 * way + 0.125 * bent)
-        classes = int64(robot[dof + 2 + bar, ALLOWED])
         for box in range(m):
-            if (classes >> int64(rows[BOX_CLASS, box])) & 1:
+            if may_meet(rows, box, bar):
                 continue
             needed = radius + strays + growths[box] + speeds[box] * end
             # Also for NaN, which must never count as apart.
             if not (within_distance(middle, at, share[0], share[1], needed, rows, box) > needed):
                 return bar * m + box
     return -1
-
-
-@kernel(void(MAT, VEC, MAT, OUT_MAT))
-def seen_rows(boxes, classes, T_arm_base, rows):
-    """Write the rows of boxes as they were seen, (16, m), as `boxes.rows_of` does."""
-    rows_of(boxes, T_arm_base, 0.0, rows)
-    for i in range(boxes.shape[0]):
-        rows[BOX_CLASS, i] = classes[i]
 
 
 @kernel(
@@ -199,7 +189,7 @@ def first_blocked(
     chain,
     robot,
     boxes,
-    classes,
+    allowed,
     T_arm_base,
     growths,
     speeds,
@@ -219,7 +209,7 @@ def first_blocked(
     curves, part = np.empty((n_pieces, 6, dof)), np.empty((6, dof))
     rows = np.empty((BOX_ROWS, boxes.shape[0]))
     fit(times, positions, velocities, accelerations, curves)
-    seen_rows(boxes, classes, T_arm_base, rows)
+    rows_of(boxes, allowed, T_arm_base, 0.0, rows)
     for i in range(n_pieces):
         length = times[i + 1] - times[i]
         share = min(max(0.0, (begin - times[i]) / length), 1.0)
@@ -289,13 +279,12 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
     """
     m = rows.shape[1]
     for bar in range(bodies.shape[0]):
-        classes = int64(robot[dof + 2 + bar, ALLOWED])
         at, radius = BAR_SIZE * bar, points[BAR_SIZE * bar + 7]
         for section in range(SECTIONS):
             low, high = section / SECTIONS, (section + 1) / SECTIONS
             best = LATEST
             for box in range(m):
-                if (classes >> int64(rows[BOX_CLASS, box])) & 1:
+                if may_meet(rows, box, bar):
                     continue
                 # Nearer than this it matters.
                 within = radius + growths[box] + speeds[box] * best
@@ -375,7 +364,7 @@ def permitted_rates(
     chain,
     robot,
     boxes,
-    classes,
+    allowed,
     T_arm_base,
     growths,
     speeds,
@@ -396,7 +385,7 @@ def permitted_rates(
     points, other = scratch.floats(ENDS_ROOM), scratch.floats(ENDS_ROOM)
     rows, latest = np.empty((BOX_ROWS, boxes.shape[0])), np.empty((m, n_bars * SECTIONS))
     ends, stops = np.empty((m, 2 * n_bars)), np.empty((m, 4))
-    seen_rows(boxes, classes, T_arm_base, rows)
+    rows_of(boxes, allowed, T_arm_base, 0.0, rows)
     piece, step = 0, places[1] - places[0]
     for i in range(m):
         while piece < curves.shape[0] - 1 and times[piece + 1] <= places[i]:

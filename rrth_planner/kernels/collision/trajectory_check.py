@@ -6,13 +6,13 @@ from numba.core.types import boolean, float64, int64, void
 import numpy as np
 from rrth_planner.kernels.collision.arm_validity import is_configuration_free, prove_curve
 from rrth_planner.kernels.collision.boxes import pack, rows_of
-from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, VEC
-from rrth_planner.kernels.layout import BOX_CLASS, BOX_ROWS, D, LANES
+from rrth_planner.kernels.jit import CHAIN, CUBE, kernel, MAT, OUT_MAT, READ_INTS, VEC
+from rrth_planner.kernels.layout import BOX_ROWS, D, LANES
 from rrth_planner.kernels.trajectory.quintics import bound, fit
 
-# Newly received boxes: boxes, their classes, T_arm_base, growth, depth. Points of a motion: times,
-# positions, velocities, accelerations.
-NEW, POINTS = (MAT, VEC, MAT, float64, int64), (VEC, MAT, MAT, MAT)
+# Newly received boxes: boxes, the bars that may meet each, T_arm_base, growth, depth. Points of a
+# motion: times, positions, velocities, accelerations.
+NEW, POINTS = (MAT, READ_INTS, MAT, float64, int64), (VEC, MAT, MAT, MAT)
 
 
 @kernel(void(MAT, float64, OUT_MAT))
@@ -56,22 +56,20 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
 
 
 @kernel(OUT_MAT(*NEW))
-def packed(boxes, classes, T_arm_base, growth, depth):
+def packed(boxes, allowed, T_arm_base, growth, depth):
     """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]
     rows, lanes = np.empty((BOX_ROWS, n)), np.empty(n, dtype=np.int64)
     groups = np.empty(((LANES**depth - 1) // (LANES - 1), BOX_ROWS * LANES))
-    rows_of(boxes, T_arm_base, growth, rows)
-    for i in range(n):
-        rows[BOX_CLASS, i] = classes[i]
+    rows_of(boxes, allowed, T_arm_base, growth, rows)
     pack(rows, depth, groups, lanes)
     return groups
 
 
 @kernel(boolean(VEC, float64, CHAIN, MAT, *NEW), is_short=True)
-def is_place_free(q, ray_length, chain, robot, boxes, classes, T_arm_base, growth, depth):
+def is_place_free(q, ray_length, chain, robot, boxes, allowed, T_arm_base, growth, depth):
     """Return whether the arm at q (dof,) is free of newly received boxes and itself, as below."""
-    groups = packed(boxes, classes, T_arm_base, growth, depth)
+    groups = packed(boxes, allowed, T_arm_base, growth, depth)
     return is_configuration_free(q, ray_length, chain, robot, groups)
 
 
@@ -87,7 +85,7 @@ def is_remaining_motion_free(
     chain,
     robot,
     boxes,
-    classes,
+    allowed,
     T_arm_base,
     growth,
     depth,
@@ -99,14 +97,14 @@ def is_remaining_motion_free(
 
     In one call, since it decides about a stop. At the end a ray of length `reach` has to be free
     too [m]. times (n,) [s], positions, velocities and accelerations (n, dof), n > 1: points of
-    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15), classes (m,) as
-    in `layout`, T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`;
+    the motion, of which only what comes after `begin` counts [s]; boxes (m, 15),
+    allowed (m,), T_arm_base (4, 4), growth [m] and depth as for `rows_of` and `pack` in `boxes`;
     quartic and cubic as for `quintics.bound`.
     """
     n_pieces, dof = positions.shape[0] - 1, positions.shape[1]
     curves = np.empty((n_pieces, 6, dof))
     fit(times, positions, velocities, accelerations, curves)
-    groups = packed(boxes, classes, T_arm_base, growth, depth)
+    groups = packed(boxes, allowed, T_arm_base, growth, depth)
     q_end = np.empty(dof)
     for k in range(dof):
         q_end[k] = 0.0

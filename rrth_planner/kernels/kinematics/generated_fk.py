@@ -126,10 +126,10 @@ def chain_source(rows: Any) -> str:
 
     rows: `robot` as in `layout`; Craig's T = Rx(alpha) Tx(a) Rz(theta) Tz(d) each.
     The kernel `chain(q, ray_length, points, at)` writes BAR_SIZE numbers a bar from points[at] on,
-    in the order of their rows: its start in the arm's base frame, half its length where there are
-    pairs, else 0, its end, and its radius [m]; then FRAME_SIZE numbers for each link whose frame a
-    pair of bars needs: its origin [m] and its axes. It returns the number of bars that are checked
-    against boxes.
+    in the order of their rows: its start in the arm's base frame, half its length (only where
+    there are pairs, which need it), its end, and its radius [m]; then FRAME_SIZE numbers for each
+    link whose frame a pair of bars needs: its origin [m] and its axes. It returns the number of
+    bars that are checked against boxes.
     """
     source = _Source()
     dof = (rows.shape[1] - REACH) // 2
@@ -149,14 +149,16 @@ def chain_source(rows: Any) -> str:
         for k, value in enumerate(values):
             source.lines.append(f'    points[at + {at + k}] = {value}')
 
-    def half(length: Term) -> Term:
-        """Return half a length, which only pairs of bars need."""
-        if not len(pairs):
-            return 0.0
-        return 0.5 * abs(length) if isinstance(length, float) else f'0.5 * abs({length})'
+    def write_bar(n: int, start: list[Term], end: list[Term], length: Term, radius: float) -> None:
+        write(BAR_SIZE * n, *start)
+        write(BAR_SIZE * n + 4, *end, radius)
+        if len(pairs):
+            is_known = isinstance(length, float)
+            half = 0.5 * abs(length) if is_known else f'0.5 * abs({length})'
+            write(BAR_SIZE * n + 3, half)
 
     def write_offset(start: list[Term], length: Term, radius: float) -> None:
-        write(BAR_SIZE * offsets.pop(0), *start, half(length), *p, radius)
+        write_bar(offsets.pop(0), start, p, length, radius)
 
     def write_link(link: int) -> None:
         """Write the capsules of a link, and its frame where it is needed."""
@@ -175,7 +177,7 @@ def chain_source(rows: Any) -> str:
                     for c in (bar[ENDS : ENDS + 3], bar[ENDS + 3 : ENDS + 6])
                 ]
                 length = math.dist(bar[ENDS : ENDS + 3], bar[ENDS + 3 : ENDS + 6])
-                write(BAR_SIZE * n, *ends[0], half(length), *ends[1], float(bar[RADIUS]))
+                write_bar(n, ends[0], ends[1], length, float(bar[RADIUS]))
         if link in slots:
             write(int(sizes[FRAMES]) + FRAME_SIZE * slots[link], *p, *x, *y, *z)
 
