@@ -1,10 +1,12 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The parts of the site that are made from the code: a line of a page says where, and what.
+The parts of pages that are made from the code: a line of a page says where, and what.
 
 `<!-- generated: parameters rrth_planner -->` becomes a table of the parameters of that node, as
-they are declared. What is generated is Markdown, which is then read as the rest of the page.
+they are declared. What is generated is Markdown, which is then read as the rest of the page. Where
+`<!-- end -->` follows, the page itself holds it too, for those who browse the files: run as a
+script, this writes it anew.
 """
 
 import argparse
@@ -29,7 +31,9 @@ ROOT = Path(__file__).resolve().parents[2]
 ARRAY = re.compile(
     r'~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[[~\w.]+\]\]'
 )
-LINE = re.compile(r'^<!-- generated: (\w+) ?(\w*) -->$', re.MULTILINE)
+LINE = re.compile(
+    r'^<!-- generated: (\w+) ?(\w*) -->$(\n(?:(?!<!-- ).*\n)*<!-- end -->$)?', re.MULTILINE
+)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -69,6 +73,18 @@ def generated(what: str, of: str, page: str = '') -> str:
     if what not in PARTS:
         raise ExtensionError(f'{page}: "{what}", expected one of {", ".join(PARTS)}')
     return PARTS[what](*([of] if of else []))
+
+
+def written(text: str) -> str:
+    """Return a page with what it holds of the generated parts as it is now."""
+
+    def part(match: re.Match[str]) -> str:
+        line = match[0].partition('\n')[0]
+        if match[3] is None:
+            return line
+        return f'{line}\n\n{generated(match[1], match[2])}\n\n<!-- end -->'
+
+    return LINE.sub(part, text)
 
 
 def settings_of(node: str) -> tuple[Any, ...]:
@@ -249,3 +265,8 @@ PARTS: dict[str, Callable[..., str]] = {
     'run': _run,
     'api': _api,
 }
+
+
+if __name__ == '__main__':
+    for page in sorted((ROOT / 'docs' / 'reference').glob('*.md')):
+        page.write_text(written(page.read_text(encoding='utf-8')), encoding='utf-8')

@@ -3,14 +3,14 @@
 """Have the arm point at two targets by the planner's service, as a call and by asyncio."""
 
 import asyncio
+import sys
 
 import rclpy
+from rrth_planner import RrthError
 from rrth_planner.ros.client import PlannerClient
 
 rclpy.init()
 client = PlannerClient(timeout=30.0)
-answer = client.point_at((1.5, 0.1, 0.3))
-print(f'{answer.code.name}: {answer.sentence}')
 
 
 async def point_and_count() -> None:
@@ -23,6 +23,13 @@ async def point_and_count() -> None:
     print(f'{pointing.result().code.name} after {n_rounds} rounds of another task')
 
 
-asyncio.run(point_and_count())
-client.destroy_node()
-rclpy.shutdown()
+try:
+    answer = client.point_at((1.5, 0.1, 0.3))
+    print(f'{answer.code.name}: {answer.sentence}')
+    asyncio.run(point_and_count())
+except RrthError as problem:
+    # No planner, or none that has a body and joint states, within the timeout.
+    sys.exit(str(problem))
+finally:
+    client.destroy_node()
+    rclpy.shutdown()

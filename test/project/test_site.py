@@ -145,16 +145,31 @@ def started(text):
             yield match[1], match[2]
 
 
+def reference():
+    """Return the module that makes the reference of the code."""
+    sys.path.insert(0, str(ROOT / 'docs' / 'extension'))
+    module = pytest.importorskip('reference')
+    sys.path.pop(0)
+    return module
+
+
 def helps():
     """Return the help of each command, with that of its own commands."""
-    sys.path.insert(0, str(ROOT / 'docs' / 'extension'))
-    reference = pytest.importorskip('reference')
-    sys.path.pop(0)
     found = {}
-    for name, parser in reference.parsers():
+    for name, parser in reference().parsers():
         first = name.split()[0]
         found[first] = found.get(first, '') + parser.format_help()
     return found
+
+
+def test_pages_hold_the_tables_that_are_made_from_the_code():
+    for needed in ('sphinx', 'rclpy'):
+        pytest.importorskip(needed)
+    written, n = reference().written, 0
+    for page, text in pages().items():
+        assert written(text) == text, f'{page}: another table now; ./run docs writes it anew'
+        n += text.count('<!-- end -->')
+    assert n == 2 * len(NODES) + 2
 
 
 def test_pages_start_no_command_and_give_no_option_that_there_is_not():
