@@ -48,9 +48,9 @@ def frozen_array(
         raise error(
             f'{name}: {shown(value)}, expected numbers of shape {_wanted(shape)} [{unit}]'
         ) from problem
-    is_fit = len(array.shape) == len(shape) and all(
-        wanted in (None, given) for given, wanted in zip(array.shape, shape, strict=True)
-    )
+    is_fit = len(array.shape) == len(shape)
+    for n, wanted in zip(array.shape, shape, strict=False):
+        is_fit = is_fit and wanted in (None, n)
     if not is_fit:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
     # A sum of squares is finite where all elements are, unless it overflows.
@@ -66,6 +66,8 @@ def frozen_array(
 
 def are_numbers(value: Any) -> bool:
     """Return whether an array, or nested lists of numbers, hold numbers only."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in 'fiu'
     if isinstance(value, list | tuple):
         return all(map(are_numbers, value))
     if isinstance(value, int | float):

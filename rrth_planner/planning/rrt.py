@@ -58,11 +58,11 @@ def search(
         drawn += rrt.advance(
             world.space, settings, np.inf, club, n_draws, bits, *trees, room.meeting
         )
-    path = None
+    n = 0
     if room.meeting[0] >= 0:
         n = tree.trace_path(tree_q, parents, *room.meeting, room.paths[rrt_h.WORK])
-        path = Path(room.paths[rrt_h.WORK, :n]) if n else None
     moment = deadline.elapsed()
+    path = Path(room.paths[rrt_h.WORK, :n]) if n else None
     return PlanResult(
         status=(stopped or PlanStatus.SAMPLE_LIMIT) if path is None else PlanStatus.SOLVED,
         path=path,
