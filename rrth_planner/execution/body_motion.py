@@ -17,6 +17,9 @@ from rrth_planner.model.separation import FASTEST, SeenBody, SeparationRules, sp
 SHARE, RAISED = 1.2, 2.0
 # Two sights of a part less than this apart do not give its speed [s].
 SHORTEST = 2e-3
+# Each sight is compared with one up to so long before, too [s]: between neighbouring ones, 120 Hz,
+# twice an error of 1 cm hides 2.4 m/s.
+WINDOW = 0.1
 # Clocks may differ by so much; the age of what was measured later than that [s].
 CLOCK_STEP, UNKNOWN_AGE = 0.1, 1e3
 # The corners of a box, in halves of its size.
@@ -32,6 +35,8 @@ class BodyMotion:
     ----------
     measured : ndarray, shape (m,)
         When each box of the scene was measured [s].
+    earlier : Scene, ndarray
+        A sight up to `WINDOW` before, and its `measured`, which the next are compared with too.
     speeds, until : ndarray, shape (m,)
         Greatest speeds of parts that have been faster than assumed [m/s], and until when these
         count [s].
@@ -44,6 +49,7 @@ class BodyMotion:
 
     scene: Scene
     measured: Array
+    earlier: tuple[Scene, Array]
     speeds: Array
     until: Array
     n_seen: int = 0
@@ -54,7 +60,9 @@ class BodyMotion:
 def first_sight(scene: Scene, measured: Array) -> BodyMotion:
     """Return a wearer who was never seen before, measured (m,) [s]."""
     nothing = np.zeros(len(scene.boxes))
-    return BodyMotion(scene=scene, measured=measured, speeds=nothing, until=nothing)
+    return BodyMotion(
+        scene=scene, measured=measured, earlier=(scene, measured), speeds=nothing, until=nothing
+    )
 
 
 def seen_again(
@@ -64,35 +72,54 @@ def seen_again(
     Return the wearer at his next sight; measured (m,): when each box of the scene was [s].
 
     A part moved faster than assumed where a corner of its box went further than its greatest speed
-    and two errors explain. Its bound is raised for a while then. Parts are known by their names.
+    and two errors explain, since the sight before or since an earlier one. Its bound is raised for
+    a while then. Parts are known by their names.
     """
     old, names = places_of(before.scene, scene), _names(scene)
     known = old >= 0
     then, n = old[known], len(names)
     speeds, until = np.zeros(n), np.zeros(n)
     speeds[known], until[known] = before.speeds[then], before.until[then]
-    elapsed, moved = np.zeros(n), np.zeros(n)
-    elapsed[known] = measured[known] - before.measured[then]
-    moved[known] = _displacements(before.scene.numbers[then], scene.numbers[known])
-    # A sight that is no newer says nothing.
-    is_new = known & (elapsed > SHORTEST)
     stated, raised = stated_speeds(scene, rules), np.where(measured <= until, speeds, 0.0)
-    within = 2.0 * rules.body_error
-    is_faster = is_new & (moved > np.maximum(stated, raised) * elapsed + within)
-    found = moved / np.maximum(elapsed, SHORTEST)
-    # Its bound stays raised as long as it needs that.
-    is_raised = is_new & (moved > stated * elapsed + within)
+    bound, within, found = np.maximum(stated, raised), 2.0 * rules.body_error, np.zeros(n)
+    is_faster, is_raised = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+    for since in (before.earlier, (before.scene, before.measured)):
+        elapsed, moved = _moved_since(since, scene, measured)
+        # A sight that is no newer says nothing.
+        is_new = elapsed > SHORTEST
+        is_faster |= is_new & (moved > bound * elapsed + within)
+        # Its bound stays raised as long as it needs that.
+        needs = is_new & (moved > stated * elapsed + within)
+        is_raised |= needs
+        found[needs] = np.maximum(found, moved / np.maximum(elapsed, SHORTEST))[needs]
     speeds[is_raised] = np.maximum(raised, np.minimum(SHARE * found, FASTEST))[is_raised]
     until[is_raised] = measured[is_raised] + RAISED
+    newest, earliest = (float(m.max(initial=-np.inf)) for m in (measured, before.earlier[1]))
+    # A clock that was set back begins another window, and so does a wearer who was not there.
+    is_within = 0.0 <= newest - earliest < WINDOW
     return BodyMotion(
         scene=scene,
         measured=measured,
+        earlier=before.earlier if is_within else (scene, measured),
         speeds=speeds,
         until=until,
         n_seen=before.n_seen + int(is_new.sum()),
         n_faster=before.n_faster + int(is_faster.sum()),
         faster=tuple((names[i], float(found[i])) for i in np.flatnonzero(is_faster)),
     )
+
+
+def _moved_since(
+    before: tuple[Scene, Array], scene: Scene, measured: Array
+) -> tuple[Array, Array]:
+    """Return how long ago parts were at a sight [s], 0: never, and how far they moved [m]."""
+    (then, times), n = before, len(scene.boxes)
+    old = places_of(then, scene)
+    known = old >= 0
+    elapsed, moved = np.zeros(n), np.zeros(n)
+    elapsed[known] = measured[known] - times[old[known]]
+    moved[known] = _displacements(then.numbers[old[known]], scene.numbers[known])
+    return elapsed, moved
 
 
 def body_at(body: BodyMotion, time: float, rules: SeparationRules) -> SeenBody:

@@ -6,7 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rrth_planner.execution.body_motion import body_at, first_sight, RAISED, seen_again, SHARE
+from rrth_planner.execution.body_motion import (
+    body_at,
+    first_sight,
+    RAISED,
+    seen_again,
+    SHARE,
+    WINDOW,
+)
 from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
@@ -138,6 +145,30 @@ def test_a_part_that_goes_on_so_fast_keeps_its_raised_bound():
         found.append(body_at(body, time + 0.05, RULES).speeds[0])
     assert np.array(found) == pytest.approx(SHARE * speed)
     assert body.n_faster == 1
+
+
+@pytest.mark.parametrize('rate', [30.0, 120.0, 500.0])
+@pytest.mark.parametrize('speed', [1.9, 2.3, 8.0])
+def test_a_part_that_is_a_little_faster_is_noticed_however_often_it_is_seen(rate, speed):
+    begin = Box('hand', [0.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    body = first_sight(Scene((begin,)), np.zeros(1))
+    # Two windows: between neighbouring sights at 500 Hz the errors hide 10 m/s.
+    for time in np.arange(1, int(2.0 * WINDOW * rate) + 2) / rate:
+        hand = Scene((replace(begin, center=[speed * time, 0.0, 0.0]),))
+        body = seen_again(body, hand, at(hand, time), RULES)
+    assert (body.n_faster > 0) == (speed > 2.0)
+    assert body_at(body, time, RULES).speeds[0] == pytest.approx(
+        max(2.0, SHARE * speed * (speed > 2.0))
+    )
+
+
+def test_a_clock_that_is_set_back_begins_another_window():
+    begin = Box('hand', [0.0, 0.0, 0.0], [0.1] * 3, np.eye(3))
+    body = first_sight(Scene((begin,)), np.full(1, 1000.0))
+    for time in np.arange(0, 60) * 2e-3:
+        hand = Scene((replace(begin, center=[3.0 * time, 0.0, 0.0]),))
+        body = seen_again(body, hand, at(hand, time), RULES)
+    assert body.n_faster > 0
 
 
 def test_a_sight_that_is_no_newer_tells_nothing_of_speeds():
