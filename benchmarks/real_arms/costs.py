@@ -9,6 +9,8 @@ import time
 import numpy as np
 from rrth_planner.collision.bar_pairs import pairs_of
 from rrth_planner.collision.world import arm_world, World
+from rrth_planner.kernels.kinematics.generated_fk import chain_of
+from rrth_planner.kernels.layout import N_BARS
 from rrth_planner.model.arm import ArmModel, bars_of, mount_bars
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import rotation_matrix
@@ -35,13 +37,15 @@ def costs(
     names = [bar.name for bar in (*bars_of(arm), *mount_bars(arm))]
     meeting = replace(arm, allowed=tuple(combinations(names, 2)))
     scene, nothing = _boxes_round(rng, arm.T_base_mount[:3, 3]), Scene(())
+    neither = arm_world(meeting, nothing, 0.0, ray_length)
     whole = arm_world(arm, scene, 0.0, ray_length)
     edges = _accepted(rng, whole, length)
     worlds = {
         'whole': whole,
         'pairs': arm_world(arm, nothing, 0.0, ray_length),
         'boxes': arm_world(meeting, scene, 0.0, ray_length),
-        'neither': arm_world(meeting, nothing, 0.0, ray_length),
+        'neither': neither,
+        'kinematics': _without_bars(neither),
     }
     least = dict.fromkeys(worlds, np.inf)
     flags = np.empty(len(edges[0]), dtype=np.bool_)
@@ -53,8 +57,15 @@ def costs(
             assert flags.all()
     n_pairs = len(pairs_of(arm))
     pair = (least['pairs'] - least['neither']) / n_pairs
-    bar = (least['boxes'] - least['neither']) / len(bars_of(arm))
+    bar = (least['boxes'] - least['kinematics']) / len(bars_of(arm))
     return n_pairs, least['whole'], pair, bar
+
+
+def _without_bars(world: World) -> World:
+    """Return a world whose arm moves as before and has no bar: even no boxes are tested at once."""
+    robot = world.robot.copy()
+    robot[world.bounds.shape[1] + 1, N_BARS] = 0
+    return replace(world, robot=robot, chain=chain_of(robot))
 
 
 def _boxes_round(rng: np.random.Generator, center: Array) -> Scene:
