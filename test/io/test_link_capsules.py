@@ -207,26 +207,34 @@ def test_meshes_are_found_where_the_urdf_says(tmp_path, monkeypatch):
     file = tmp_path / 'share' / 'my_arm' / 'urdf' / 'arm.urdf'
     mesh = tmp_path / 'share' / 'my_arm' / 'meshes' / 'part.stl'
     far = tmp_path / 'opt' / 'share' / 'other' / 'part.stl'
-    for path in (file, mesh, far):
+    near = tmp_path / 'mine' / 'third' / 'part.stl'
+    for path in (file, mesh, far, near):
         path.parent.mkdir(parents=True)
         path.write_bytes(stl(TETRAHEDRON))
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path / "opt"}')
+    monkeypatch.setenv('ROS_PACKAGE_PATH', f'{tmp_path / "mine"}:/nowhere')
     for name, expected in (
         ('package://my_arm/meshes/part.stl', mesh),
         ('package://renamed/meshes/part.stl', mesh),
         ('package://other/part.stl', far),
+        ('package://third/part.stl', near),
         ('../meshes/part.stl', mesh),
         (str(mesh), mesh),
         (f'file://{mesh}', mesh),
     ):
-        assert mesh_file(name, file, 'x').resolve() == mesh.resolve() or expected == far
         assert mesh_file(name, file, 'x').resolve() == expected.resolve()
 
 
 @pytest.mark.parametrize(
     ('shape', 'words'),
     [
-        ('<mesh filename="package://none/other.stl"/>', 'no mesh .package://none/other.stl'),
+        (
+            '<mesh filename="package://none/other.stl"/>',
+            (
+                '<mesh filename="package://none/other.stl"/>',
+                'no mesh .package://none/other.stl. in or above .*ROS_PACKAGE_PATH.*.none. may be',
+            ),
+        ),
         ('<mesh filename="http://a/part.stl"/>', 'expected a file, or package'),
         ('<mesh/>', 'no file name'),
         ('<mesh filename="arm.urdf"/>', 'expected one of .dae, .obj, .stl'),

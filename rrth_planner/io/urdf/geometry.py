@@ -121,7 +121,7 @@ def mesh_file(name: str, file: Path, label: str) -> Path:
     Return where a mesh file is that a URDF names, or raise ModelError.
 
     `package://` is looked for in the folders above the URDF, with and without the name of the
-    package, and where AMENT_PREFIX_PATH leads.
+    package, in those of ROS_PACKAGE_PATH, which hold packages, and where AMENT_PREFIX_PATH leads.
     """
     scheme, _, rest = name.rpartition('://')
     if scheme not in ('', 'file', 'package', 'model'):
@@ -131,15 +131,25 @@ def mesh_file(name: str, file: Path, label: str) -> Path:
     if scheme in ('package', 'model'):
         inner = rest.partition('/')[2]
         tried = [above / path for path in (rest, inner) for above in (folder, *folder.parents)]
-        prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-        tried += [Path(prefix) / 'share' / rest for prefix in prefixes if prefix]
+        tried += [path / rest for path in _paths('ROS_PACKAGE_PATH')]
+        tried += [path / 'share' / rest for path in _paths('AMENT_PREFIX_PATH')]
     for path in tried:
         # What no file can be called raises.
         with suppress(OSError, ValueError):
             if path.is_file():
                 return path
-    where = 'at, above or in packages known to' if scheme in ('package', 'model') else 'at'
-    raise ModelError(f'{label}: no mesh {shown(name)} {where} {folder}, expected a file')
+    where = f'at {folder}'
+    if scheme in ('package', 'model'):
+        where = (
+            f'in or above {folder}, nor in a folder of the variable ROS_PACKAGE_PATH, where the '
+            f'folder "{rest.partition("/")[0]}" may be'
+        )
+    raise ModelError(f'{label}: no mesh "{name}" {where}; expected a file')
+
+
+def _paths(variable: str) -> list[Path]:
+    """Return the folders that a variable of the environment names."""
+    return [Path(path) for path in os.environ.get(variable, '').split(os.pathsep) if path]
 
 
 def mesh_triangles(path: Path, label: str) -> Array:
