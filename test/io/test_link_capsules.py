@@ -230,10 +230,7 @@ def test_meshes_are_found_where_the_urdf_says(tmp_path, monkeypatch):
     [
         (
             '<mesh filename="package://none/other.stl"/>',
-            (
-                '<mesh filename="package://none/other.stl"/>',
-                'no mesh .package://none/other.stl. in or above .*ROS_PACKAGE_PATH.*.none. may be',
-            ),
+            'no mesh .package://none/other.stl. in or above .*ROS_PACKAGE_PATH.*.none. may be',
         ),
         ('<mesh filename="http://a/part.stl"/>', 'expected a file, or package'),
         ('<mesh/>', 'no file name'),
