@@ -62,7 +62,7 @@ def costs(
 
 
 def _without_bars(world: World) -> World:
-    """Return a world whose arm moves as before and has no bar: even no boxes are tested at once."""
+    """Return a world whose arm moves as before and has no bar that is tested against boxes."""
     robot = world.robot.copy()
     robot[world.bounds.shape[1] + 1, N_BARS] = 0
     return replace(world, robot=robot, chain=chain_of(robot))

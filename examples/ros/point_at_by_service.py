@@ -9,27 +9,23 @@ import rclpy
 from rrth_planner import RrthError
 from rrth_planner.ros.client import PlannerClient
 
-rclpy.init()
-client = PlannerClient(timeout=30.0)
-
 
 async def point_and_count() -> None:
     """Count while the planner plans."""
-    pointing = asyncio.create_task(client.point_at_async((0.8, 1.6, 0.6)))
-    n_rounds = 0
+    pointing, n_rounds = asyncio.create_task(client.point_at_async((0.8, 1.6, 0.6))), 0
     while not pointing.done():
         n_rounds += 1
         await asyncio.sleep(0.001)
     print(f'{pointing.result().code.name} after {n_rounds} rounds of another task')
 
 
+rclpy.init()
+client = PlannerClient(timeout=30.0)
 try:
     answer = client.point_at((1.5, 0.1, 0.3))
     print(f'{answer.code.name}: {answer.sentence}')
     asyncio.run(point_and_count())
 except RrthError as problem:
-    # No planner, or none that has a body and joint states, within the timeout.
-    sys.exit(str(problem))
-finally:
-    client.destroy_node()
-    rclpy.shutdown()
+    sys.exit(f'no answer: {problem}')
+client.destroy_node()
+rclpy.shutdown()
