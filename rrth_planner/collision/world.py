@@ -280,7 +280,7 @@ def _bars_by_name(arm: ArmModel) -> dict[str, int]:
     bars = [bar.name for bar in (*bars_of(arm), *mount_bars(arm))]
     found: dict[str, int] = {}
     for part, name in arm.allowed:
-        # Two bars that may meet each other are no pair.
+        # Names of two bars: `pairs_of` leaves them out.
         if name not in bars:
             met = sum(1 << k for k, bar in enumerate(bars) if bar == part)
             found[name] = found.get(name, 0) | met

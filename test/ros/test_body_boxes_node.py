@@ -49,6 +49,7 @@ BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Boxes that come close behind one another are all heard.
 ALL = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 MODULE = [sys.executable, '-m', 'rrth_planner.ros.body_boxes_node']
+FIRST = 'poses: the first body is published'
 # Each ready-made skeleton, and what a tracker of its kind publishes.
 TRACKERS = [
     ('azure_kinect', 'markers'),
@@ -139,6 +140,7 @@ class Tracker(Node):
             parameter_overrides=[Parameter(k, value=v) for k, v in values.items()]
         )
         self.node.get_logger().warning = lambda words, **_: self.logs.append(words)
+        self.node.get_logger().info = lambda words, **_: self.logs.append(words)
         self.create_subscription(MarkerArray, 'body_boxes', self.boxes.append, ALL)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         kinds = {'markers': MarkerArray, 'poses': PoseArray, 'joint_states': JointState}
@@ -313,6 +315,16 @@ def test_without_a_stamp_boxes_have_the_time_of_reception(start):
         tracker.boxes[0].markers[0].header.stamp, clock_type=before.clock_type
     )
     assert before <= stamp <= tracker.get_clock().now()
+
+
+def test_the_log_says_what_is_waited_for_and_when_the_first_body_is_published(start):
+    tracker = start('azure_kinect', 'markers')
+    wait_until(lambda: 'waiting for markers' in tracker.logs)
+    for k in range(3):
+        tracker.hear(person_of('azure_kinect'), NOW + k * STEP)
+    first = FIRST.replace('poses', 'markers')
+    wait_until(lambda: first in tracker.logs)
+    assert tracker.logs.count(first) == 1
 
 
 def test_a_part_that_is_lost_is_left_out_and_named_once(start):
@@ -579,4 +591,5 @@ def test_beside_a_recorded_person_the_planner_plans_by_what_a_tracker_sees(
     assert answer.success, (answer.message, said)
     assert answer.message.startswith('SUCCESS (1): ')
     assert len(seen[-1].markers) == len(load_skeleton('cmu_bvh').parts)
-    assert not of_node
+    # Nothing but that: no part is lost, no message rejected.
+    assert [line for line in of_node if line != 'waiting for poses'] == [FIRST]

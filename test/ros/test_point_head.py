@@ -330,6 +330,8 @@ def test_an_example_of_a_client_runs_and_is_short(client, name, lines):
 
 def test_the_public_client_says_what_it_was_given_and_what_it_waited_for():
     client = PlannerClient('lonely', timeout=0.05, namespace='/nowhere')
+    # A planner warns of two publishers of the body: who only points is none.
+    assert client.count_publishers('/nowhere/body_boxes') == 0
     with pytest.raises(MessageError, match=r'^target: .*expected .*\[m\]$'):
         client.point_at((1.0, math.nan, 0.0))
     for wait in (client.point_at, lambda t: asyncio.run(client.point_at_async(t))):

@@ -11,6 +11,7 @@ from rrth_planner.kernels.collision.bar_bar import (
     BOW_SIZE,
     BOWS_ROOM,
     colliding_pair,
+    curvature_factors,
     is_pair_in_contact,
     is_pair_open,
     pair_bounds,
@@ -22,12 +23,10 @@ from rrth_planner.kernels.layout import (
     D,
     FIRST_PAIR,
     FRAME_SIZE,
-    KIND,
     LANES,
     MAX_BARS,
     MAX_DOF,
     MAX_FRAMES,
-    PRISMATIC,
     REACH,
     STRIDE,
 )
@@ -111,12 +110,9 @@ def is_configuration_free(q, ray_length, chain, robot, boxes):
 
 @kernel(void(MAT, int64, VEC, VEC, OUT_VEC))
 def curvature_bounds(robot, n_bars, speed, curvature, bows):
-    """Write `curvature_bound` for both ends of each bar, seen from the base."""
-    dof, inner, factors = speed.shape[0], 0.0, scratch.floats(MAX_DOF)
-    for j in range(dof):
-        turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
-        factors[j] = speed[j] * (turns + 2.0 * inner) + curvature[j]
-        inner += turns
+    """Write the bounds of second derivatives of both ends of each bar, seen from the base."""
+    dof, factors = speed.shape[0], scratch.floats(MAX_DOF)
+    curvature_factors(robot, 0, speed, curvature, factors)
     for k in range(n_bars):
         start, end, row = 0.0, 0.0, dof + 2 + k
         for j in range(dof):

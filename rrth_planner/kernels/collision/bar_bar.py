@@ -128,24 +128,21 @@ def nearest_pair(points, at, dof, robot, least):
     return least
 
 
-@kernel(float64(MAT, int64, int64, int64, VEC, VEC), inline='always')
-def curvature_bound(robot, row, end, first, speed, curvature):
+@kernel(void(MAT, int64, VEC, VEC, OUT_VEC), inline='always')
+def curvature_factors(robot, first, speed, curvature, factors):
     """
-    Return a bound of the second derivative of one end of a bar, seen from a link.
+    Write what each joint from `first` on adds to the bound of a second derivative, by its reach.
 
-    The link is the one that `first` joints move; row: that of the bar in `robot`. speed,
-    curvature: bounds of |dq/du| and |d2q/du2| of each joint. With R_j the reach of the end round
-    joint j: sum over first <= i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus sum of
+    speed, curvature: bounds of |dq/du| and |d2q/du2| of each joint. With R_j the reach of a point
+    round joint j, its second derivative, seen from the link that `first` joints move, is at most
+    the sum over first <= i <= j of 2 |q_i'| |q_j'| R_j (once where i = j) plus the sum of
     |q_j''| R_j; an inner prismatic joint adds nothing (`docs/algorithms.md`, section 2).
     """
-    dof = speed.shape[0]
-    total, inner = 0.0, 0.0
-    for j in range(first, dof):
-        reach = robot[row, REACH + end * dof + j]
+    inner = 0.0
+    for j in range(first, speed.shape[0]):
         turns = 0.0 if robot[j, KIND] == PRISMATIC else speed[j]
-        total += reach * (speed[j] * (turns + 2.0 * inner) + curvature[j])
+        factors[j] = speed[j] * (turns + 2.0 * inner) + curvature[j]
         inner += turns
-    return total
 
 
 @kernel(void(MAT, VEC, OUT_VEC))
@@ -247,10 +244,13 @@ def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
         return False
     dof = speed.shape[0]
     if bows[n] < 0.0:
-        body = int64(robot[row, BODY])
+        body, factors = int64(robot[row, BODY]), scratch.floats(MAX_DOF)
+        curvature_factors(robot, body, speed, curvature, factors)
         for k in range(4):
             bar = dof + 2 + int64(robot[row, INNER if k < 2 else OUTER])
-            bows[n + k] = curvature_bound(robot, bar, k % 2, body, speed, curvature)
+            bows[n + k] = 0.0
+            for j in range(body, dof):
+                bows[n + k] += robot[bar, REACH + k % 2 * dof + j] * factors[j]
     seen = scratch.floats(SEEN_ROOM)
     slot = int64(robot[row, FRAME])
     frame = int64(robot[dof + 1, FRAMES]) + FRAME_SIZE * slot if slot >= 0 else -1

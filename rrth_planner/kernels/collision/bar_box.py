@@ -27,7 +27,7 @@ LOCAL_ROOM = 12 * LANES
 
 @kernel(int64(MAT, int64, int64, int64))
 def without_allowed(boxes, g, bar, lanes):
-    """Return those of some boxes of a last group that a bar may not meet."""
+    """Return those of some boxes of a last group that a bar must keep clear of, looked up."""
     first, bit = LANES * (BOX_ALLOWED + bar // ALLOWED_BITS), bar % ALLOWED_BITS
     for j in range(LANES):
         if (int64(boxes[g, first + j]) >> bit) & 1:
@@ -37,7 +37,8 @@ def without_allowed(boxes, g, bar, lanes):
 
 @kernel(int64(MAT, int64, int64, int64), inline='always')
 def checked_lanes(boxes, g, bar, lanes):
-    """Return the same; mostly no bar may meet any box, and a look at one number is enough."""
+    """Return those of some boxes of a last group that a bar must keep clear of."""
+    # Mostly no bar may meet any box: one number says so.
     if boxes[g, LANES * ANY_ALLOWED] != 0.0:
         lanes = without_allowed(boxes, g, bar, lanes)
     return lanes

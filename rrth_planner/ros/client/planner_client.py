@@ -47,6 +47,8 @@ T = TypeVar('T')
 # What is waited for, and its name, one after the other, until something comes of it.
 Waits = Generator[tuple[Callable[[], bool], str], None, T]
 NODE = 'rrth_planner'
+# What a client sends.
+TOPICS = {MarkerArray: 'body_boxes', PointStamped: 'target'}
 # Codes of a planner that lacks an input, or a recent one: that may come a moment later.
 LACKS_INPUT = ('UNABLE_TO_AQUIRE_SENSOR_DATA', 'SENSOR_INFO_STALE', 'ROBOT_STATE_STALE')
 # Between two requests to a planner that lacks an input [s].
@@ -108,10 +110,8 @@ class PlannerClient(Node):
         # The commanded motions and the joint states, until they are cleared.
         self.commanded: list[JointTrajectory] = []
         self.observed: list[JointState] = []
-        self._publishers_by_type = {
-            kind: self.create_publisher(kind, topic, LATCHED)
-            for kind, topic in ((MarkerArray, 'body_boxes'), (PointStamped, 'target'))
-        }
+        # Created when first needed: a client that sends no body is no publisher of it.
+        self._publishers_by_type: dict[type, Publisher] = {}
         self._joints = OpenSubscription(self, JointState, 'joint_states', self._on_state)
         # Whole motions: with separation `joint_trajectory` has stretches of them, not latched.
         quietly = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -271,7 +271,11 @@ class PlannerClient(Node):
         self._run(self._publish(message), self.timeout)
 
     def _publish(self, message: MarkerArray | PointStamped) -> Waits[None]:
-        publisher = self._publishers_by_type[type(message)]
+        kind = type(message)
+        publisher = self._publishers_by_type.get(kind)
+        if publisher is None:
+            publisher = self.create_publisher(kind, TOPICS[kind], LATCHED)
+            self._publishers_by_type[kind] = publisher
         yield (
             lambda: is_matched(self, publisher),
             f'a reliable subscription of {publisher.topic}',

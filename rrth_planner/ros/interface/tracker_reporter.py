@@ -63,6 +63,8 @@ class TrackerReporter:
 
     def published(self, measured: int, arrived: int, lost: tuple[str, ...]) -> None:
         """Count a body: when it was measured and had arrived [ns], and which parts it lacks."""
+        if self._n_published == 0:
+            self._node.get_logger().info(f'{self._source}: the first body is published')
         self._n_published += 1
         self._is_last_rejected = False
         self._measured, self._lost = measured, lost
@@ -80,6 +82,8 @@ class TrackerReporter:
 
     def _publish(self) -> None:
         level, message = self._summary()
+        if self._n_received == 0:
+            self._node.get_logger().info(message, once=True)
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: tracking'
         values: dict[str, object] = {
             'frames received': self._n_received,
