@@ -6,12 +6,13 @@ from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.io.urdf.capsules import (
+    cost_of,
     enclosed_in,
     enclosing_capsules,
     Enclosure,
+    Fit,
     half_of,
     uncovered,
-    volume,
 )
 from rrth_planner.io.urdf.geometry import box_triangles, cylinder_triangles
 from worlds import examples, random_rotation
@@ -55,7 +56,7 @@ def l_shape():
 def test_every_point_of_a_surface_is_in_a_capsule(seed, most):
     rng = np.random.default_rng(seed)
     triangles = random_surface(rng)
-    found = enclosing_capsules(triangles, 0.01, most)
+    found = enclosing_capsules(triangles, Fit(0.01, most))
     assert 1 <= len(found) <= most
     assert len(uncovered(triangles, found)) == 0
     points = points_on(triangles, rng, 2000)
@@ -79,7 +80,7 @@ def test_what_sticks_out_is_told(seed):
     triangles = random_surface(rng)
     # How good the cuts are does not matter here, and looking for good ones takes long.
     slabs = slabs_of(triangles, rng, int(rng.integers(1, 5)))
-    found = [enclosing_capsules(slab, 0.01, 1)[0] for slab in slabs]
+    found = [enclosing_capsules(slab, Fit(0.01, 1))[0] for slab in slabs]
     thinner = [Enclosure(one.ends, 0.9 * one.radius, 0.0) for one in found]
     points = points_on(triangles, rng, 2000)
     is_in = np.any([enclosed_in(points, one) for one in thinner], axis=0)
@@ -101,29 +102,29 @@ def test_a_thin_rod_stays_thin(seed):
     rng = np.random.default_rng(seed)
     radius, length = rng.uniform(0.005, 0.04), rng.uniform(0.2, 0.8)
     rod = placed(cylinder_triangles(radius, length), rng)
-    (one,) = enclosing_capsules(rod, 0.0, 1)
+    (one,) = enclosing_capsules(rod, Fit(0.0, 1))
     assert radius < one.radius < 1.12 * radius + 1e-3
     exact = np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
-    assert volume(one) < 1.05 * exact
+    assert cost_of(one) < 1.05 * exact
     assert one.slack < 1.2 * radius
     # Cutting it makes it no slimmer.
-    assert len(enclosing_capsules(rod, 0.0, 4)) == 1
+    assert len(enclosing_capsules(rod, Fit(0.0, 4))) == 1
 
 
 @examples(8)
 @given(SEEDS)
 def test_a_bent_tube_gets_two(seed):
     rng = np.random.default_rng(seed)
-    found = enclosing_capsules(placed(l_shape(), rng), 0.02, 4)
+    found = enclosing_capsules(placed(l_shape(), rng), Fit(0.02, 4))
     assert len(found) == 2
     assert max(one.radius for one in found) < 0.06
-    assert len(enclosing_capsules(l_shape(), 0.02, 1)) == 1
+    assert len(enclosing_capsules(l_shape(), Fit(0.02, 1))) == 1
 
 
 def test_an_arm_offset_at_both_ends_is_not_as_thick_as_it_is_wide():
     tube = box_triangles(np.array([0.06, 0.06, 0.5]))
     ends = [cylinder_triangles(0.05, 0.16)[:, :, [2, 0, 1]] + [0.06, 0.0, z] for z in (-0.2, 0.2)]
-    found = enclosing_capsules(np.concatenate([tube, *ends]), 0.02, 4)
+    found = enclosing_capsules(np.concatenate([tube, *ends]), Fit(0.02, 4))
     assert 3 <= len(found) <= 4
     assert min(one.radius for one in found) < 0.045
     assert max(one.radius for one in found) < 0.07
@@ -132,7 +133,7 @@ def test_an_arm_offset_at_both_ends_is_not_as_thick_as_it_is_wide():
 def test_a_sphere_of_points_is_a_capsule_without_length():
     directions = np.random.default_rng(0).standard_normal((3000, 3))
     points = 0.1 * directions / np.linalg.norm(directions, axis=1)[:, None]
-    (one,) = enclosing_capsules(points.reshape(-1, 3, 3), 0.02, 4)
+    (one,) = enclosing_capsules(points.reshape(-1, 3, 3), Fit(0.02, 4))
     assert one.radius < 0.102
     assert np.linalg.norm(one.ends[1] - one.ends[0]) < 0.01
     assert one.slack < 0.01
@@ -140,7 +141,7 @@ def test_a_sphere_of_points_is_a_capsule_without_length():
 
 @pytest.mark.parametrize('points', [np.zeros((1, 3, 3)), np.ones((2, 3, 3)) * [[[1], [2], [3]]]])
 def test_a_point_and_a_line_are_capsules_of_no_thickness(points):
-    (one,) = enclosing_capsules(points, 0.02, 4)
+    (one,) = enclosing_capsules(points, Fit(0.02, 4))
     assert one.radius <= 2e-6
     assert not len(uncovered(points, [one]))
 

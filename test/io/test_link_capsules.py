@@ -16,7 +16,12 @@ trimesh = pytest.importorskip('trimesh')
 
 from rrth_planner.collision.reference_checker import bar_ends_at
 from rrth_planner.io.arm_file import arm_from_mapping, arm_to_mapping
-from rrth_planner.io.urdf.allowed_pairs import colliding_pairs, disabled_pairs
+from rrth_planner.io.urdf import link_capsules
+from rrth_planner.io.urdf.allowed_pairs import (
+    colliding_pairs,
+    collision_shares,
+    disabled_pairs,
+)
 from rrth_planner.io.urdf.capsules import enclosed_in, Enclosure
 from rrth_planner.io.urdf.chain import read_chain
 from rrth_planner.io.urdf.export import arm_to_urdf
@@ -341,6 +346,49 @@ def test_parts_that_always_touch_are_found():
     # Touching in half of all configurations is a collision.
     middling = Capsule(name='shield', link=1, ends=np.zeros((2, 3)), radius=0.175)
     assert colliding_pairs(three_joints(capsules=[*three_joints().capsules, middling]), 500) == ()
+
+
+def passing_links():
+    """Return a plate, and a flat cylinder that turns over it, two joints on, 12 mm above it."""
+    links = {
+        'plate': collision('<box size="0.2 0.2 0.03"/>', '<origin xyz="0 0 -0.015"/>'),
+        'column': '',
+        'wheel': collision(
+            '<cylinder radius="0.06" length="0.1"/>', '<origin xyz="0 0.06 0" rpy="1.5708 0 0"/>'
+        ),
+        'lamp': '',
+    }
+    joints = [
+        joint('a', 'revolute', 'plate', 'column', '<axis xyz="0 0 1"/><origin xyz="0 0 0.072"/>'),
+        joint('b', 'revolute', 'column', 'wheel', '<axis xyz="0 1 0"/>'),
+        joint('c', 'fixed', 'wheel', 'lamp', '<origin xyz="0.2 0.06 0" rpy="0 1.5708 0"/>'),
+    ]
+    return links, joints
+
+
+def test_links_that_pass_each_other_closely_get_capsules_that_do(tmp_path, monkeypatch):
+    file = urdf_file(tmp_path, *passing_links())
+    found, flesh = imported(file, tool='lamp')
+    assert_enclosed(found, file, False)
+    assert collision_shares(found.arm, 500)['plate', 'wheel'] < 0.05
+    assert colliding_pairs(found.arm, 500) == ()
+    # As every link is enclosed, these two always collide, and would be let.
+    monkeypatch.setattr(link_capsules, 'OFTEN', 2.0)
+    usual, of_usual = imported(file, tool='lamp')
+    assert colliding_pairs(usual.arm, 500) == (('plate', 'wheel'),)
+    assert len(flesh.capsules) > len(of_usual.capsules)
+
+
+def test_links_that_truly_always_collide_keep_their_capsules(tmp_path, monkeypatch):
+    links, joints = passing_links()
+    links['plate'] = collision('<box size="0.2 0.2 0.1"/>')
+    file = urdf_file(tmp_path, links, joints)
+    found, flesh = imported(file, tool='lamp')
+    assert colliding_pairs(found.arm, 500) == (('plate', 'wheel'),)
+    monkeypatch.setattr(link_capsules, 'OFTEN', 2.0)
+    _, usual = imported(file, tool='lamp')
+    for one, other in zip(flesh.capsules, usual.capsules, strict=True):
+        assert one.radius == other.radius and np.array_equal(one.ends, other.ends)
 
 
 def test_an_srdf_names_pairs_that_may_touch(tmp_path):

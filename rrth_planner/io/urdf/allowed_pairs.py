@@ -24,24 +24,41 @@ def colliding_pairs(arm: ArmModel, n_samples: int = 2000) -> tuple[Pair, ...]:
     configurations. Parts of one link, or of links with one joint between them, are left out: the
     planner lets them collide anyway.
     """
-    rng = np.random.default_rng(0)
+    found = []
+    bars, ends, places = _bars_at(arm, _samples(arm, n_samples))
+    for names, pairs in places.items():
+        # Few collide in the middle, so that few are looked at in all configurations.
+        if _collide(bars, ends[:1], pairs).all() and _collide(bars, ends, pairs).mean() > ALWAYS:
+            found.append(names)
+    return tuple(found)
+
+
+def collision_shares(arm: ArmModel, n_samples: int) -> dict[Pair, float]:
+    """Return in which share of random configurations each pair of parts collides, as above [-]."""
+    bars, ends, places = _bars_at(arm, _samples(arm, n_samples))
+    return {names: float(_collide(bars, ends, pairs).mean()) for names, pairs in places.items()}
+
+
+def _samples(arm: ArmModel, n: int) -> Array:
+    """Return the middle of the joint ranges and n random configurations, (n + 1, dof)."""
     low, high = arm.bounds
-    samples = rng.uniform(low, high, (n_samples, arm.dof))
-    q = np.concatenate([arm.bounds.mean(axis=0)[None], samples])
+    samples = np.random.default_rng(0).uniform(low, high, (n, arm.dof))
+    return np.concatenate([arm.bounds.mean(axis=0)[None], samples])
+
+
+def _bars_at(
+    arm: ArmModel, q: Array
+) -> tuple[tuple[Bar, ...], Array, dict[Pair, list[tuple[int, int]]]]:
+    """Return the bars of an arm, their ends, and which of them may make which parts collide."""
     # So far the ray of an arm leads past itself, and hardly farther [m].
     length = float(np.abs(arm.dh[:, [1, 3]]).sum())
     bars, ends = (*bars_of(arm), *mount_bars(arm)), bar_ends_at(arm, q, length)
-    pairs: dict[Pair, list[tuple[int, int]]] = {}
+    places: dict[Pair, list[tuple[int, int]]] = {}
     for i in range(len(bars)):
         for j in range(len(bars)):
             if bars[j].body - bars[i].body > 1:
-                pairs.setdefault((bars[i].name, bars[j].name), []).append((i, j))
-    found = []
-    for names, places in pairs.items():
-        # Few collide in the middle, so that few are looked at in all configurations.
-        if _collide(bars, ends[:1], places).all() and _collide(bars, ends, places).mean() > ALWAYS:
-            found.append(names)
-    return tuple(found)
+                places.setdefault((bars[i].name, bars[j].name), []).append((i, j))
+    return bars, ends, places
 
 
 def _collide(bars: tuple[Bar, ...], ends: Array, places: list[tuple[int, int]]) -> Array:

@@ -25,8 +25,6 @@ STEP = 1e-6
 OVERLAP = 2e-4
 # A triangle this small that lies in no capsule as a whole is not enclosed [m].
 SMALLEST = 1e-5
-# A further capsule has to be worth this share of the volume.
-WORTH = 0.1
 # Slabs that cost so many times what has been found already are not looked at more closely.
 HOPELESS = 1.2
 # Between so many planes along each axis slabs begin and end.
@@ -59,11 +57,35 @@ class Enclosure(NamedTuple):
     slack: float
 
 
+class Fit(NamedTuple):
+    """
+    How closely capsules are to follow a surface.
+
+    Parameters
+    ----------
+    slack : float
+        As long as a capsule reaches farther than this beyond what it encloses, more are tried [m].
+    most : int
+        Greatest number of capsules, >= 1.
+    worth : float
+        A further capsule has to save this share of the cost.
+    power : float
+        What a capsule costs is its volume times this power of its radius: the greater it is, the
+        longer and thinner are the capsules.
+
+    """
+
+    slack: float
+    most: int
+    worth: float = 0.1
+    power: float = 0.0
+
+
 # What has a line, (2, 3), and a radius [m].
 Rounded: TypeAlias = Enclosure | Capsule
 
 
-def enclosing_capsules(triangles: Array, largest_slack: float, most: int) -> list[Enclosure]:
+def enclosing_capsules(triangles: Array, fit: Fit) -> list[Enclosure]:
     """
     Return as few capsules as keep a surface slim.
 
@@ -71,10 +93,8 @@ def enclosing_capsules(triangles: Array, largest_slack: float, most: int) -> lis
     ----------
     triangles : ndarray, shape (n, 3, 3)
         The corners of the triangles of the surface [m].
-    largest_slack : float
-        As long as a capsule reaches farther than this beyond what it encloses, more are tried [m].
-    most : int
-        Greatest number of capsules; a further one is used only where it saves 10 % of the volume.
+    fit : Fit
+        How slim that is.
 
     Returns
     -------
@@ -83,31 +103,36 @@ def enclosing_capsules(triangles: Array, largest_slack: float, most: int) -> lis
 
     """
     whole = triangles.reshape(-1, 3)
-    shape = _capsule_around(whole)
-    found, cost = [shape], volume(shape)
-    if most < 2 or shape.slack <= largest_slack:
+    shape = _capsule_around(whole, fit.power)
+    found, cost = [shape], cost_of(shape, fit.power)
+    if fit.most < 2 or shape.slack <= fit.slack:
         return found
-    slabs = [_Slabs(triangles, axis) for axis in _axes_to_cut(triangles)]
-    for n in range(2, most + 1):
+    slabs = [_Slabs(triangles, axis, fit.power) for axis in _axes_to_cut(triangles)]
+    for n in range(2, fit.most + 1):
         least, k = min((candidate.best(n)[0], k) for k, candidate in enumerate(slabs))
-        worth = (1.0 + WORTH) ** (n - 1)
+        worth = (1.0 + fit.worth) ** (n - 1)
         if least * worth > HOPELESS * cost:
             continue
         parts = slabs[k].parts(slabs[k].refined(slabs[k].best(n)[1]))
-        shapes = [_capsule_around(part) for part in parts]
-        price = sum(map(volume, shapes)) * worth
+        shapes = [_capsule_around(part, fit.power) for part in parts]
+        price = sum(cost_of(one, fit.power) for one in shapes) * worth
         if price < cost:
             found, cost = shapes, price
-        if max(shape.slack for shape in shapes) <= largest_slack:
+        if max(shape.slack for shape in shapes) <= fit.slack:
             break
     return found
 
 
-def volume(shape: Rounded) -> float:
-    """Return the volume of a capsule [m^3]."""
-    (begin, end), radius = shape.ends, shape.radius
-    length = float(np.linalg.norm(end - begin))
-    return float(np.pi * radius**2 * (length + 4.0 / 3.0 * radius))
+def cost_of(shape: Rounded, power: float = 0.0) -> float:
+    """Return what a capsule costs, as in `Fit` [m^(3 + power)]; power 0: its volume [m^3]."""
+    length = float(np.linalg.norm(shape.ends[1] - shape.ends[0]))
+    return float(_costs(np.array(shape.radius), np.array(length), power))
+
+
+def _costs(radii: Array, lengths: Array, power: float) -> Array:
+    """Return what capsules cost whose lines are so long [m]."""
+    result: Array = np.pi * radii ** (2.0 + power) * (lengths + 4.0 / 3.0 * radii)
+    return result
 
 
 def enclosed_in(points: Array, shape: Rounded) -> NDArray[np.bool_]:
@@ -172,16 +197,15 @@ def half_of(triangles: Array, axis: Array, height: float) -> Array:
 class _Slabs:
     """A surface between planes across an axis, and what capsules around its slabs cost."""
 
-    def __init__(self, triangles: Array, axis: Array) -> None:
-        self._triangles, self._axis = triangles, axis
+    def __init__(self, triangles: Array, axis: Array, power: float) -> None:
+        self._triangles, self._axis, self._power = triangles, axis, power
         heights = triangles @ axis
         self._planes = np.linspace(heights.min(), heights.max(), N_PLANES)
         thin = [_extreme(part, N_COARSE) for part in self.parts(self._planes)]
         self._costs = np.full((N_PLANES, N_PLANES), np.inf)
         rows, columns = np.triu_indices(N_PLANES, 1)
-        self._costs[rows, columns] = _least_volumes(
-            [np.concatenate(thin[low:high]) for low, high in zip(rows, columns, strict=True)]
-        )
+        slabs = [np.concatenate(thin[low:high]) for low, high in zip(rows, columns, strict=True)]
+        self._costs[rows, columns] = _least_costs(slabs, power)
 
     def parts(self, planes: Array) -> Iterator[Array]:
         """Yield the corners of what lies between each two planes, (n, 3) [m]."""
@@ -194,7 +218,7 @@ class _Slabs:
             left = half_of(left, -self._axis, OVERLAP - high)
 
     def best(self, n: int) -> tuple[float, list[int]]:
-        """Return the least volume of capsules round n slabs [m^3], and the planes between."""
+        """Return the least cost of capsules round n slabs, and the planes between."""
         # least[k]: of what lies below plane k, in as many slabs as there have been rounds.
         least, ways = self._costs[0], [[0, k] for k in range(N_PLANES)]
         for _ in range(n - 1):
@@ -216,13 +240,13 @@ class _Slabs:
                 beside = [
                     part for moved in tried for part in islice(self.parts(moved), k - 1, k + 1)
                 ]
-                costs = _least_volumes(beside).reshape(3, 2).sum(axis=1)
+                costs = _least_costs(beside, self._power).reshape(3, 2).sum(axis=1)
                 planes = tried[int(np.argmin(costs))]
         return planes
 
 
-def _least_volumes(parts: list[Array]) -> Array:
-    """Return about the volumes of capsules round points, each (n, 3) [m^3]; inf: no points."""
+def _least_costs(parts: list[Array], power: float) -> Array:
+    """Return about what capsules round points cost, each (n, 3) [m]; inf: no points."""
     result: Array = np.full(len(parts), np.inf)
     chosen = [k for k, points in enumerate(parts) if len(points)]
     if not chosen:
@@ -234,22 +258,24 @@ def _least_volumes(parts: list[Array]) -> Array:
     filled = np.stack(
         [points[np.where(np.arange(most) < len(points), np.arange(most), 0)] for points in few]
     )
-    result[chosen] = _volumes(*_capsules_along(filled, directions)).min(axis=1)
+    *_, radii, ends = _capsules_along(filled, directions, power)
+    result[chosen] = _costs(radii, ends[..., 1] - ends[..., 0], power).min(axis=1)
     return result
 
 
-def _capsule_around(points: Array) -> Enclosure:
-    """Return a capsule of little volume that contains points, (n, 3) [m]."""
+def _capsule_around(points: Array, power: float) -> Enclosure:
+    """Return a capsule of little cost that contains points, (n, 3) [m]."""
     points = np.unique(points, axis=0)
     few = _extreme(points, N_FINE)
     directions = np.concatenate([np.eye(3), _principal_axes(few), COARSE])
-    centres, axes, radii, ends = _capsules_round(few, directions)
+    centres, axes, radii, ends = _capsules_round(few, directions, power)
     for tilt in TILTS:
-        k = int(_volumes(centres, axes, radii, ends).argmin())
+        k = int(_costs(radii, ends[:, 1] - ends[:, 0], power).argmin())
         beside = axes[k] + tilt * AROUND
         tried = beside / np.linalg.norm(beside, axis=1)[:, None]
-        centres, axes, radii, ends = _capsules_round(few, np.concatenate([axes[k : k + 1], tried]))
-    k = int(_volumes(centres, axes, radii, ends).argmin())
+        tried = np.concatenate([axes[k : k + 1], tried])
+        centres, axes, radii, ends = _capsules_round(few, tried, power)
+    k = int(_costs(radii, ends[:, 1] - ends[:, 0], power).argmin())
     line = centres[k] + ends[k][:, None] * axes[k]
     # Few of the points were looked at: what they miss, the radius makes up for.
     farthest = line_distances(points, line).max()
@@ -269,20 +295,22 @@ def _slack(points: Array, ends: Array, radius: float) -> float:
     return float((reach - (points @ directions).max(axis=0)).max())
 
 
-def _capsules_round(points: Array, axes: Array) -> tuple[Array, ...]:
+def _capsules_round(points: Array, axes: Array, power: float) -> tuple[Array, ...]:
     """Return `_capsules_along` of one set of points, (n, 3), along axes, (m, 3)."""
-    return tuple(values[0] for values in _capsules_along(points[None], axes[None]))
+    return tuple(values[0] for values in _capsules_along(points[None], axes[None], power))
 
 
-def _capsules_along(points: Array, axes: Array) -> tuple[Array, Array, Array, Array]:
+def _capsules_along(points: Array, axes: Array, power: float) -> tuple[Array, Array, Array, Array]:
     """
-    Return the capsule of least volume along each of m axes that contains points, for k sets.
+    Return the capsule of least cost along each of m axes that contains points, for k sets.
 
     Parameters
     ----------
     points : ndarray, shape (k, n, 3)
         [m].
     axes : ndarray, shape (k, m, 3)
+    power : float
+        Of the cost, as in `Fit`.
 
     Returns
     -------
@@ -321,8 +349,7 @@ def _capsules_along(points: Array, axes: Array) -> tuple[Array, Array, Array, Ar
         beyond = np.sqrt(np.maximum(radii[..., k, None] ** 2 - square, 0.0))
         low[..., k], high[..., k] = (along + beyond).min(axis=-1), (along - beyond).max(axis=-1)
     low, high = np.minimum(low, 0.5 * (low + high)), np.maximum(high, 0.5 * (low + high))
-    volumes = np.pi * radii**2 * (high - low + 4.0 / 3.0 * radii)
-    k = volumes.argmin(axis=-1)
+    k = _costs(radii, high - low, power).argmin(axis=-1)
     ends = np.stack([low[which, row, k], high[which, row, k]], axis=-1)
     return middle + best, axes, radii[which, row, k], ends
 
@@ -332,12 +359,6 @@ def _squares_from(centre: Array, twice: Array, square: Array, here: Array) -> No
     np.matmul(centre, twice, out=here)
     np.subtract(square, here, out=here)
     here += (centre * centre).sum(axis=-1)[..., None]
-
-
-def _volumes(_centres: Array, _axes: Array, radii: Array, ends: Array) -> Array:
-    """Return the volumes of capsules of `_capsules_along` [m^3]."""
-    result: Array = np.pi * radii**2 * (ends[..., 1] - ends[..., 0] + 4.0 / 3.0 * radii)
-    return result
 
 
 def _extreme(points: Array, n: int) -> Array:

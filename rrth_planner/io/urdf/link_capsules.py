@@ -2,22 +2,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """The links of a URDF as capsules of the arm that its chain is."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.io.urdf.capsules import enclosing_capsules, uncovered, volume
+from rrth_planner.io.urdf.allowed_pairs import collision_shares
+from rrth_planner.io.urdf.capsules import cost_of, enclosing_capsules, Fit, uncovered
 from rrth_planner.io.urdf.chain import joint_limits, joint_motion, squared, UrdfChain
 from rrth_planner.io.urdf.geometry import collision_triangles
-from rrth_planner.io.urdf.import_chain import ImportedArm
+from rrth_planner.io.urdf.import_chain import ImportedArm, with_capsules
 from rrth_planner.model.arm import Capsule, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 
-# A link gets more capsules as long as one reaches farther beyond it [m], and at most so many.
-LARGEST_SLACK, MOST = 0.02, 4
+# How capsules fit a link; and how, where it so often collides with another link that this may be
+# for the capsules alone: by more of them, or by thin ones.
+USUAL = Fit(slack=0.02, most=4)
+CLOSER = (Fit(slack=0.01, most=8, worth=0.02), Fit(slack=0.02, most=4, power=8.0))
+# This share of random configurations is often. Capsules that fit more closely are taken where they
+# collide in less than this part of the configurations in which the usual ones do.
+OFTEN, LESS = 0.25, 0.7
+N_SAMPLES = 500
 # Between two positions at which a joint beside the chain is looked at [rad].
 BRANCH_STEP = 0.5
 MOST_POSES = 200
@@ -98,6 +106,7 @@ def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
     Return capsules that enclose the collision geometry of an arm's links.
 
     Of the links from the chain's first one outwards: those of the chain and those fixed to them.
+    Links that often collide with each other are enclosed more closely, where that helps.
 
     Parameters
     ----------
@@ -112,6 +121,47 @@ def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
         moves otherwise; what reads it is missing.
 
     """
+    usual = _enclose(found, include_branches, {})
+    closer = _closer_fits(found, usual, include_branches)
+    return _enclose(found, include_branches, closer) if closer else usual
+
+
+def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> dict[str, Fit]:
+    """Return which links of an arm are to be enclosed more closely, and how."""
+    if not usual.capsules:
+        return {}
+    shares = collision_shares(with_capsules(found, usual.capsules, 0.0).arm, N_SAMPLES)
+    links = {capsule.name for capsule in usual.capsules}
+    often = {
+        pair: share for pair, share in shares.items() if share > OFTEN and links.issuperset(pair)
+    }
+    names = {name for pair in often for name in pair}
+    fits: dict[str, Fit] = {}
+    if not names:
+        return fits
+    tried = {fit: _enclose(found, include_branches, dict.fromkeys(names, fit)) for fit in CLOSER}
+    tried[USUAL] = usual
+    for pair, share in sorted(often.items(), key=lambda item: -item[1]):
+        if pair[0] in fits or pair[1] in fits:
+            continue
+        results = {}
+        for both in product(tried, tried):
+            capsules = tuple(
+                capsule
+                for name, fit in zip(pair, both, strict=True)
+                for capsule in tried[fit].capsules
+                if capsule.name == name
+            )
+            arm = with_capsules(found, capsules, 0.0).arm
+            results[both] = collision_shares(arm, N_SAMPLES).get(pair, 0.0), len(capsules)
+        best = min(results, key=lambda both: results[both])
+        if results[best][0] < LESS * share:
+            fits |= zip(pair, best, strict=True)
+    return fits
+
+
+def _enclose(found: ImportedArm, include_branches: bool, fits: Mapping[str, Fit]) -> Flesh:
+    """Return capsules around an arm's links, some of which fit in their own way."""
     chain, arm = found.chain, found.arm
     frames = np.stack([arm.T_base_mount, *forward_kinematics(arm, np.zeros(arm.dof))])
     on_chain = {chain.base, *(joint.child for joint in chain.joints)}
@@ -133,12 +183,16 @@ def enclose_links(found: ImportedArm, include_branches: bool = False) -> Flesh:
             for capsule in other.capsules
             if capsule.link == placed.body
         ]
-        enclosed.append(_enclosed(placed, surfaces, poses, beside))
+        enclosed.append(_enclosed(placed, surfaces, poses, beside, fits.get(name, USUAL)))
     return Flesh(tuple(enclosed), tuple(bare), tuple(left_out))
 
 
 def _enclosed(
-    placed: PlacedLink, surfaces: tuple[Array, ...], poses: Array, beside: list[Capsule]
+    placed: PlacedLink,
+    surfaces: tuple[Array, ...],
+    poses: Array,
+    beside: list[Capsule],
+    fit: Fit,
 ) -> EnclosedLink:
     """Return a link with its surfaces enclosed, at poses in the frame of its body."""
     name = placed.link.name
@@ -147,10 +201,12 @@ def _enclosed(
     if not placed.is_moved and not len(uncovered(triangles, beside)):
         return EnclosedLink(name, (), 0.0)
     # Only one is convex, and holds what is between the poses.
-    found = enclosing_capsules(triangles, LARGEST_SLACK, 1 if placed.is_moved else MOST)
-    if not placed.is_moved and 1 < len(parts) <= MOST:
-        apart = [enclosing_capsules(part, LARGEST_SLACK, 1)[0] for part in parts]
-        if sum(map(volume, apart)) < sum(map(volume, found)):
+    found = enclosing_capsules(triangles, fit._replace(most=1) if placed.is_moved else fit)
+    if not placed.is_moved and 1 < len(parts) <= fit.most:
+        apart = [enclosing_capsules(part, fit._replace(most=1))[0] for part in parts]
+        if sum(cost_of(one, fit.power) for one in apart) < sum(
+            cost_of(one, fit.power) for one in found
+        ):
             found = apart
     if len(lost := uncovered(triangles, found)):
         raise ModelError(
