@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The links of a URDF as capsules of the arm that its chain is."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 import math
@@ -139,8 +139,9 @@ def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> di
     fits: dict[str, Fit] = {}
     if not names:
         return fits
-    tried = {fit: _enclose(found, include_branches, dict.fromkeys(names, fit)) for fit in CLOSER}
-    tried[USUAL] = usual
+    tried = {USUAL: usual} | {
+        fit: _enclose(found, include_branches, dict.fromkeys(names, fit), names) for fit in CLOSER
+    }
     for pair, share in sorted(often.items(), key=lambda item: -item[1]):
         if pair[0] in fits or pair[1] in fits:
             continue
@@ -160,8 +161,13 @@ def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> di
     return fits
 
 
-def _enclose(found: ImportedArm, include_branches: bool, fits: Mapping[str, Fit]) -> Flesh:
-    """Return capsules around an arm's links, some of which fit in their own way."""
+def _enclose(
+    found: ImportedArm,
+    include_branches: bool,
+    fits: Mapping[str, Fit],
+    names: Container[str] | None = None,
+) -> Flesh:
+    """Return capsules around an arm's links, or those named; fits: of those that are not usual."""
     chain, arm = found.chain, found.arm
     frames = np.stack([arm.T_base_mount, *forward_kinematics(arm, np.zeros(arm.dof))])
     on_chain = {chain.base, *(joint.child for joint in chain.joints)}
@@ -169,6 +175,8 @@ def _enclose(found: ImportedArm, include_branches: bool, fits: Mapping[str, Fit]
     bare, left_out = [], []
     for placed in _placed_links(chain, include_branches):
         name = placed.link.name
+        if names is not None and name not in names:
+            continue
         if not placed.link.collisions:
             bare += [name] if name in on_chain and placed.link.visuals else []
             continue
