@@ -193,8 +193,9 @@ def kernel(
     Return a decorator that compiles a kernel for one signature, and keeps the result.
 
     inline: 'always' writes the kernel out where it is called, for the few whose call costs as much
-    as what they do; the compiler itself takes only the smallest. is_short: other threads wait
-    while it runs, which takes less time than to get hold of the interpreter once more after it.
+    as what they do; the compiler itself takes only the smallest. Such a kernel is compiled by
+    itself only if Python calls it. is_short: other threads wait while it runs, which takes less
+    time than to get hold of the interpreter once more after it.
     """
     # No `nnan`: a NaN must fail every comparison, and so never be certified.
     options = {
@@ -207,7 +208,7 @@ def kernel(
 
     def decorate(function: Callable[..., Any]) -> Any:
         compiled = njit(**options)(function)
-        if not config.DISABLE_JIT:
+        if not config.DISABLE_JIT and inline == 'never':
             if _folder is None:
                 _announce(function)
             else:
