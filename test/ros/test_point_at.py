@@ -7,6 +7,7 @@ Most runs are calls of its `main`, as a process takes seconds to load what this 
 """
 
 from functools import partial
+import gc
 import json
 import os
 import signal
@@ -309,6 +310,20 @@ def client(ros_context):
     client = PlannerClient('point_at', 0.5)
     yield client
     client.destroy_node()
+
+
+def test_a_destroyed_client_leaves_nothing_to_destroy_again(ros_context, monkeypatch):
+    ignored = []
+    monkeypatch.setattr(sys, 'unraisablehook', ignored.append)
+    client = PlannerClient('point_at', 0.5)
+    condition = client._spinner._sigint_gc
+    client.destroy_node()
+    # The garbage collector may take it before what holds it.
+    condition.__del__()
+    client._spinner.__del__()
+    del client, condition
+    gc.collect()
+    assert not ignored
 
 
 def test_an_interrupt_in_mid_step_leaves_no_other_words(client, monkeypatch):

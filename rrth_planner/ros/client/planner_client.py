@@ -203,6 +203,13 @@ class PlannerClient(Node):
             if time.monotonic() > end:
                 raise _late(what, timeout)
 
+    def destroy_node(self) -> None:
+        """Destroy the node and what spins it."""
+        # Left to the garbage collector, rclpy's executor may destroy a condition a second time,
+        # which prints a traceback.
+        self._spinner.shutdown(timeout_sec=0.0)
+        super().destroy_node()
+
     def take_messages(self, longest: float = 0.05) -> None:
         """Receive a message, if one comes within a time [s]."""
         try:
