@@ -34,7 +34,11 @@ def colliding_pairs(arm: ArmModel, n_samples: int = 2000) -> tuple[Pair, ...]:
 
 
 def collision_shares(arm: ArmModel, n_samples: int) -> dict[Pair, float]:
-    """Return in which share of random configurations each pair of parts collides, as above [-]."""
+    """
+    Return in which share of random configurations each pair of parts collides [-].
+
+    Of the pairs that `colliding_pairs` looks at, the inner part first.
+    """
     bars, ends, places = _bars_at(arm, _samples(arm, n_samples))
     return {names: float(_collide(bars, ends, pairs).mean()) for names, pairs in places.items()}
 

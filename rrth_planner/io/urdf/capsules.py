@@ -68,10 +68,10 @@ class Fit(NamedTuple):
     most : int
         Greatest number of capsules, >= 1.
     worth : float
-        A further capsule has to save this share of the cost.
+        A further capsule has to save this share of the cost [-].
     power : float
-        What a capsule costs is its volume times this power of its radius: the greater it is, the
-        longer and thinner are the capsules.
+        What a capsule costs is its volume times this power of its radius [-]: the greater it is,
+        the longer and thinner are the capsules.
 
     """
 

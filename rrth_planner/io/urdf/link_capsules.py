@@ -18,12 +18,12 @@ from rrth_planner.model.arm import Capsule, forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import ModelError
 
-# How capsules fit a link; and how, where it so often collides with another link that this may be
-# for the capsules alone: by more of them, or by thin ones.
+# How closely capsules fit a link, and what is tried for two links that often collide, perhaps only
+# because their capsules are thicker than they are: more capsules, or thinner ones.
 USUAL = Fit(slack=0.02, most=4)
 CLOSER = (Fit(slack=0.01, most=8, worth=0.02), Fit(slack=0.02, most=4, power=8.0))
-# This share of random configurations is often. Capsules that fit more closely are taken where they
-# collide in less than this part of the configurations in which the usual ones do.
+# Two links often collide where they do so in more than this share of random configurations. A
+# closer fit is taken where it reduces that share to less than this part of it.
 OFTEN, LESS = 0.25, 0.7
 N_SAMPLES = 500
 # Between two positions at which a joint beside the chain is looked at [rad].
@@ -154,7 +154,8 @@ def _closer_fits(found: ImportedArm, usual: Flesh, include_branches: bool) -> di
                 if capsule.name == name
             )
             arm = with_capsules(found, capsules, 0.0).arm
-            results[both] = collision_shares(arm, N_SAMPLES).get(pair, 0.0), len(capsules)
+            # A link that lies in the capsules of another one has none of its own.
+            results[both] = collision_shares(arm, N_SAMPLES).get(pair, 1.0), len(capsules)
         best = min(results, key=lambda both: results[both])
         if results[best][0] < LESS * share:
             fits |= zip(pair, best, strict=True)
