@@ -15,11 +15,17 @@ import warnings
 import numba
 from numba import config, njit, types
 from numba.core import cgutils
+from numba.core.registry import CPUDispatcher
 from numba.core.types import float64, int32, int64
 from numba.experimental.function_type import _get_wrapper_address
 from numba.extending import intrinsic
 import numpy as np
-from rrth_planner.kernels.kept_code import KeptCode, private_folder, use_slim_libraries
+from rrth_planner.kernels.kept_code import (
+    calling_by_name,
+    KeptCode,
+    private_folder,
+    use_slim_libraries,
+)
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
 # a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). Edge checks take what
@@ -97,6 +103,9 @@ EDGE_CHECK_AT, CHAIN_AT, FREE_RADIUS_AT, CONTACTS_AT = range(4)
 # Entries of `sizes`: nodes of the tree of the start and of that of the goals, pairs of nodes where
 # they meet, and how many goals the second tree begins with.
 N_START, N_GOAL, N_MEETINGS, N_GOALS = range(4)
+
+# What a kernel makes arrays with that are freed again, unlike those of `scratch`.
+ARRAY_MAKERS = {'arange', 'array', 'copy', 'empty', 'empty_like', 'full', 'ones', 'zeros'}
 
 # The file that marks the cache of all kernels of the planner as complete.
 COMPLETE = 'complete'
@@ -187,37 +196,52 @@ def _announce(function: Callable[..., Any]) -> None:
 
 
 def kernel(
-    signature: Any, inline: str = 'never', is_short: bool = False
+    signature: Any, is_inner: bool = False, is_inlined: bool = False, is_short: bool = False
 ) -> Callable[[Callable[..., Any]], Any]:
     """
     Return a decorator that compiles a kernel for one signature, and keeps the result.
 
-    inline: 'always' writes the kernel out where it is called, for the few whose call costs as much
-    as what they do; the compiler itself takes only the smallest. Such a kernel is compiled by
-    itself only if Python calls it. is_short: other threads wait while it runs, which takes less
-    time than to get hold of the interpreter once more after it.
+    is_inner: only other kernels call it, so what Python would call it through is not made.
+    is_inlined: it is also written out where it is called, for the few whose call costs as much as
+    what they do; the compiler itself takes only the smallest. is_short: other threads wait while
+    it runs, which takes less time than to get hold of the interpreter once more after it.
     """
     # No `nnan`: a NaN must fail every comparison, and so never be certified.
     options = {
         'nogil': not is_short,
         'error_model': 'numpy',
-        'inline': inline,
+        'forceinline': is_inlined,
         'fastmath': {'contract', 'arcp', 'nsz'},
         'no_cfunc_wrapper': signature not in SEAMS,
+        'no_cpython_wrapper': is_inner,
     }
 
     def decorate(function: Callable[..., Any]) -> Any:
-        compiled = njit(**options)(function)
-        if not config.DISABLE_JIT and inline == 'never':
+        # References are counted only where there are arrays to be freed; a kernel that makes one
+        # in another way than these does not compile.
+        makes_arrays = not ARRAY_MAKERS.isdisjoint(function.__code__.co_names)
+        compiled = njit(**options, _nrt=makes_arrays)(function)
+        if not config.DISABLE_JIT:
             if _folder is None:
                 _announce(function)
             else:
-                compiled._cache = KeptCode(function, _folder, _announce, _give_up)
-            compiled.compile(signature)
+                compiled._cache = KeptCode(function, is_inlined, _folder, _announce, _give_up)
+            with calling_by_name():
+                compiled.compile(signature)
             compiled.disable_compile()
+            if is_inner:
+                compiled.__class__ = _InnerKernel
         return compiled
 
     return decorate
+
+
+class _InnerKernel(CPUDispatcher):
+    """A kernel that only other kernels call: there is nothing by which Python could."""
+
+    def __call__(self, *_: Any) -> None:
+        """Raise TypeError, where a call would end the process."""
+        raise TypeError(f'{self.__qualname__} is called by other kernels only')
 
 
 class FirstClass:

@@ -2,18 +2,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled kernels as files: code, which is run as it is found, so nobody else may write it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import contextlib
 import functools
 import hashlib
+import itertools
 import os
 from pathlib import Path
 import pickle
 import stat
 import tempfile
-from typing import Any
+from typing import Any, ClassVar
+from weakref import WeakValueDictionary
 
 from numba import config
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary, ll
 from numba.core.compiler import CompileResult
@@ -23,6 +26,9 @@ from numba.core.serialize import dumps
 
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 DIGEST_SIZE = hashlib.sha256().digest_size
+# Longer kernels are called by name [lines of LLVM's text, most of them an instruction]: the
+# compiler would inline hardly any of them, since it counts 5 each and inlines up to 275.
+LONGEST_COPIED = 200
 
 
 def private_folder(path: Path) -> Path:
@@ -95,17 +101,18 @@ class KeptCode(NullCache):
     what it does. The folder is private, and another one for each state of the sources of all
     kernels: that a kernel of another file has changed is not seen here. `miss` is called with a
     function whose code is missing, before it is compiled, `give_up` with an OSError that prevented
-    the code from being written.
+    the code from being written. is_inlined: its callers are given a copy, however long it is.
     """
 
     def __init__(
         self,
         function: Callable[..., Any],
+        is_inlined: bool,
         folder: Path,
         miss: Callable[[Callable[..., Any]], None],
         give_up: Callable[[OSError], None],
     ) -> None:
-        self._function, self._folder = function, folder
+        self._function, self._is_inlined, self._folder = function, is_inlined, folder
         self._miss, self._give_up = miss, give_up
 
     def _file(self, signature: Any, codegen: Any) -> Path:
@@ -126,8 +133,15 @@ class KeptCode(NullCache):
         # What is whole may be of other versions of what it is made of.
         with contextlib.suppress(Exception):
             if data is not None:
-                return CompileResult._rebuild(context, *pickle.loads(data))
+                entry, calls, parts = pickle.loads(data)
+                require_kernels(calls)
+                result = CompileResult._rebuild(context, *parts)
+                result.library.name_calls(entry, calls)
+                return result
         self._miss(self._function)
+        # Part of the name of the code, by which others call it: the same in all processes.
+        number = int(self._file(signature, context.codegen()).stem.rpartition('-')[2], 16)
+        FunctionIdentity._unique_ids = itertools.count(number)
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
@@ -135,8 +149,12 @@ class KeptCode(NullCache):
         if result.library.has_dynamic_globals:
             return
         file = self._file(signature, result.codegen)
+        library, entry = result.library, result.fndesc.llvm_func_name
+        if self._is_inlined or not library.is_long(entry):
+            entry = ''
+        library.name_calls(entry, library.calls)
         try:
-            write_whole(file, dumps(result._reduce()))
+            write_whole(file, dumps((entry, library.calls, result._reduce())))
         except OSError as problem:
             self._give_up(problem)
 
@@ -159,14 +177,53 @@ def _digest(file: str) -> str:
 
 class SlimLibrary(JITCodeLibrary):
     """
-    The code of a kernel that is loaded, and its module once others are compiled against it.
+    The code of a kernel: long ones are called by name, and what is loaded is not unpacked.
 
-    numba itself unpacks the module of each kernel that it loads, looks through all its symbols,
-    and keeps it. A process that plans and never compiles anything would spend a second of its
-    start on that, and 45 of 235 MB.
+    numba copies the code of a kernel into that of each other one which calls it, and optimizes
+    and translates it there once more, which is a third of all compiling. It also unpacks the
+    module of each kernel that it loads, looks through all its symbols, and keeps it: a process
+    that plans and never compiles anything would spend a second of its start on that, and 45 of
+    235 MB.
     """
 
+    # Whether what is compiled now calls long kernels by name. The code of others gets copies: it
+    # may be kept, and loaded where these kernels have other names.
+    is_calling_by_name: ClassVar[bool] = False
+    # The long kernels of this process by their names.
+    _long: ClassVar[WeakValueDictionary[str, 'SlimLibrary']] = WeakValueDictionary()
+    # Of code that was loaded.
     _bitcode: bytes | None = None
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        """Begin with no code."""
+        super().__init__(codegen, name)
+        self._is_calling_by_name = self.is_calling_by_name
+        # Its name, '' where callers get a copy; and the names that it calls.
+        self.entry, self.calls = '', frozenset[str]()
+
+    def is_long(self, function: str) -> bool:
+        """Return whether a function of this library is to be called by name."""
+        return str(self._final_module.get_function(function)).count('\n') > LONGEST_COPIED
+
+    def name_calls(self, entry: str, calls: frozenset[str]) -> None:
+        """Set by which name this kernel is called, '' for none, and which names it calls."""
+        self.entry, self.calls = entry, calls
+        if entry:
+            self._long[entry] = self
+
+    def add_linking_library(self, library: Any) -> None:
+        """Add what is called: by name, or its code, with that of all that it calls."""
+        library._ensure_finalized()
+        if isinstance(library, SlimLibrary):
+            if self._is_calling_by_name:
+                if library.entry:
+                    self.calls |= {library.entry}
+                    return
+                self.calls |= library.calls
+            else:
+                for name in library.calls:
+                    self.add_linking_library(self._long[name])
+        super().add_linking_library(library)
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Any:
@@ -189,6 +246,23 @@ class SlimLibrary(JITCodeLibrary):
         if self._shared_module is None and self._bitcode is not None:
             self._shared_module = ll.parse_bitcode(self._bitcode)
         return super()._get_module_for_linking()
+
+
+@contextlib.contextmanager
+def calling_by_name() -> Iterator[None]:
+    """Have what is compiled meanwhile call long kernels by name."""
+    before = SlimLibrary.is_calling_by_name
+    SlimLibrary.is_calling_by_name = True
+    try:
+        yield
+    finally:
+        SlimLibrary.is_calling_by_name = before
+
+
+def require_kernels(names: frozenset[str]) -> None:
+    """Raise LookupError unless kernels are there: code that calls others ends the process."""
+    if missing := names.difference(SlimLibrary._long):
+        raise LookupError(f'kernels {sorted(missing)} are not loaded')
 
 
 def use_slim_libraries() -> None:

@@ -10,9 +10,11 @@ import shutil
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from rrth_planner.kernels.jit import cache_folder
 from rrth_planner.kernels.kept_code import private_folder, read_whole, write_whole
+from rrth_planner.kernels.search.elastic_band import relax
 
 COMPILE = """
 import numpy as np
@@ -87,6 +89,32 @@ if Path(os.environ['RRTH_CACHE_DIR'], 'more').exists():
     seam = jit.first_class(count)
     assert seam(np.zeros(3), 1.0, np.zeros(3), 4) == 7 and seam.address
 print('scipy.linalg' in sys.modules, file=sys.stderr)
+"""
+# A kernel that another one calls by its name, though it is short, that one, and code of others.
+NAMED = """
+import os, sys
+from pathlib import Path
+from numba import float64, njit
+from rrth_planner.kernels import jit, kept_code
+is_copied = Path(os.environ['RRTH_CACHE_DIR'], 'copied').exists()
+kept_code.LONGEST_COPIED = 10**9 if is_copied else 0
+compiled = []
+save = kept_code.KeptCode.save_overload
+def note(self, signature, result):
+    compiled.append(self._function.__name__)
+    save(self, signature, result)
+kept_code.KeptCode.save_overload = note
+@jit.kernel(float64(float64), is_inner=True)
+def half(x):
+    return 0.5 * x
+@jit.kernel(float64(float64))
+def quarter(x):
+    return 0.5 * half(x)
+def names(function):
+    return len(function.overloads[float64,].library.calls)
+other = njit(lambda x: quarter(x) + half(x))
+assert quarter(8.0) == 2.0 and other(8.0) == 6.0 and not names(other)
+print(names(quarter), *compiled, file=sys.stderr)
 """
 # What both processes of a planner load.
 PLANNER = """
@@ -232,6 +260,24 @@ def test_a_kept_kernel_is_called_by_one_that_is_compiled_later(tmp_path, run_col
     assert run_cold(CALLER, folder, tmp_path) == ['True']
     assert len(code_in(folder)) == 3
     assert run_cold(CALLER, folder, tmp_path) == ['False']
+
+
+def test_a_long_kernel_is_called_by_name_and_never_one_that_is_not_there(tmp_path, run):
+    folder = tmp_path / 'cache'
+    assert run(NAMED, folder, tmp_path) == ['1 half quarter']
+    assert run(NAMED, folder, tmp_path) == ['1']
+    (half,) = folder.rglob('*half*.code')
+    half.unlink()
+    # The same name as before, whichever process compiles it.
+    assert run(NAMED, folder, tmp_path) == ['1 half']
+    half.unlink()
+    (folder / 'copied').touch()
+    assert run(NAMED, folder, tmp_path) == ['0 half quarter']
+
+
+def test_a_kernel_that_only_kernels_call_is_not_called_from_python():
+    with pytest.raises(TypeError, match='relax is called by other kernels only'):
+        relax(np.zeros((3, 4)), 3, np.zeros(1), 0.5, np.zeros((1, 4)))
 
 
 def test_a_planner_whose_kernels_are_kept_loads_nothing_of_the_compiler(tmp_path):

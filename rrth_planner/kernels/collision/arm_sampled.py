@@ -41,7 +41,7 @@ def is_edge_free_sampled(q_from, q_to, resolution, chain, robot, boxes):
     return True
 
 
-@kernel(boolean(VEC, CHAIN, MAT, MAT))
+@kernel(boolean(VEC, CHAIN, MAT, MAT), is_inner=True)
 def is_configuration_free_at_points(q, chain, robot, boxes):
     """
     Return whether no check point of the arm at q is inside a cuboid (the paper's eqs. 1 and 2).

@@ -52,7 +52,7 @@ SPLIT, MAX_PARTS = 0.05, 64
 FIRST_INTERVAL = 1.0
 
 
-@kernel(int64(OUT_VEC, int64, int64, MAT), inline='always')
+@kernel(int64(OUT_VEC, int64, int64, MAT), is_inlined=True, is_inner=True)
 def group_contact(points, at, n_bars, boxes):
     """Return 0 where no bar of the arm at points[at] is in contact with one group of boxes."""
     found = 0
@@ -65,7 +65,7 @@ def group_contact(points, at, n_bars, boxes):
     return found
 
 
-@kernel(boolean(OUT_VEC, int64, int64, MAT))
+@kernel(boolean(OUT_VEC, int64, int64, MAT), is_inner=True)
 def is_in_contact(points, at, n_bars, boxes):
     """Return whether any bar of the arm at points[at] is in contact with a box: exact."""
     if boxes.shape[0] == 1:
@@ -121,7 +121,7 @@ def curvature_bounds(robot, n_bars, speed, curvature, bows):
         bows[2 * k], bows[2 * k + 1] = start, end
 
 
-@kernel(void(MAT, float64, OUT_VEC))
+@kernel(void(MAT, float64, OUT_VEC), is_inner=True)
 def curve_point(curve, u, q):
     """Write the point of a polynomial curve at u (Horner); curve (degree + 1, dof), low first."""
     n = curve.shape[0]
@@ -132,7 +132,7 @@ def curve_point(curve, u, q):
         q[k] = value
 
 
-@kernel(void(OUT_VEC, int64, int64, int64, int64, OUT_VEC))
+@kernel(void(OUT_VEC, int64, int64, int64, int64, OUT_VEC), is_inner=True)
 def cut_bar(points, a, b, n_parts, part, piece):
     """Write one of the equal parts of a bar at two instants, laid out as points."""
     low, high = part / n_parts, (part + 1) / n_parts
@@ -145,7 +145,8 @@ def cut_bar(points, a, b, n_parts, part, piece):
 
 @kernel(
     int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, MAT, OUT_POOL, int64),
-    inline='always',
+    is_inlined=True,
+    is_inner=True,
 )
 def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
     """
@@ -179,7 +180,10 @@ def open_bar(points, a, b, bow, bows, k, boxes, pool, n_open):
     return n_open
 
 
-@kernel(int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, boolean, MAT, OUT_POOL, int64))
+@kernel(
+    int64(OUT_VEC, int64, int64, float64, OUT_VEC, int64, boolean, MAT, OUT_POOL, int64),
+    is_inner=True,
+)
 def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
     """
     Append to the pool the open part of its entry `row`; return its new length.
@@ -211,7 +215,8 @@ def open_again(points, a, b, bow, bows, row, is_split, boxes, pool, n_open):
 
 
 @kernel(
-    int64(OUT_VEC, int64, int64, int64, int64, float64, VEC, VEC, OUT_VEC, MAT, OUT_POOL, int64)
+    int64(OUT_VEC, int64, int64, int64, int64, float64, VEC, VEC, OUT_VEC, MAT, OUT_POOL, int64),
+    is_inner=True,
 )
 def open_pairs(points, a, b, first, last, width, speed, curvature, bows, robot, pool, n_open):
     """
@@ -237,7 +242,7 @@ def open_pairs(points, a, b, first, last, width, speed, curvature, bows, robot, 
     return n_open
 
 
-@kernel(boolean(OUT_VEC, int64, int64, MAT, OUT_POOL, int64, int64))
+@kernel(boolean(OUT_VEC, int64, int64, MAT, OUT_POOL, int64, int64), is_inner=True)
 def is_open_pair_in_contact(points, at, dof, robot, pool, first, last):
     """Return whether any pair in the pool from entry `first` to `last` is in contact: exact."""
     for k in range(first, last):

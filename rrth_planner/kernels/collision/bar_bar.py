@@ -39,7 +39,7 @@ SEEN_ROOM = 4 * BAR_SIZE
 POINT = 1e-24
 
 
-@kernel(float64(OUT_VEC, int64, OUT_VEC, int64, OUT_VEC), inline='always')
+@kernel(float64(OUT_VEC, int64, OUT_VEC, int64, OUT_VEC), is_inlined=True)
 def segment_gap(first, i, second, j, gap):
     """
     Return the squared distance of two lines [m^2], and write the vector of it [m].
@@ -83,7 +83,7 @@ def segment_gap(first, i, second, j, gap):
     return square
 
 
-@kernel(boolean(OUT_VEC, int64, int64, float64), inline='always')
+@kernel(boolean(OUT_VEC, int64, int64, float64), is_inlined=True, is_inner=True)
 def are_far(points, a, b, distance):
     """Return whether the middles of two bars prove them further apart than a distance [m]."""
     twice = 0.0
@@ -94,7 +94,7 @@ def are_far(points, a, b, distance):
     return twice > 4.0 * far * far
 
 
-@kernel(boolean(OUT_VEC, int64, int64, MAT))
+@kernel(boolean(OUT_VEC, int64, int64, MAT), is_inner=True)
 def is_pair_in_contact(points, at, row, robot):
     """Return whether a pair of bars, row in `robot`, is in contact at points[at]: exact."""
     a = at + BAR_SIZE * int64(robot[row, INNER])
@@ -116,7 +116,7 @@ def colliding_pair(points, at, dof, robot):
     return -1
 
 
-@kernel(float64(OUT_VEC, int64, int64, MAT, float64))
+@kernel(float64(OUT_VEC, int64, int64, MAT, float64), is_inner=True)
 def nearest_pair(points, at, dof, robot, least):
     """Return the least distance of pairs of bars that must not collide, where it is less [m]."""
     gap = scratch.floats(3)
@@ -128,7 +128,7 @@ def nearest_pair(points, at, dof, robot, least):
     return least
 
 
-@kernel(void(MAT, int64, VEC, VEC, OUT_VEC), inline='always')
+@kernel(void(MAT, int64, VEC, VEC, OUT_VEC), is_inlined=True, is_inner=True)
 def curvature_factors(robot, first, speed, curvature, factors):
     """
     Write what each joint from `first` on adds to the bound of a second derivative, by its reach.
@@ -145,7 +145,7 @@ def curvature_factors(robot, first, speed, curvature, factors):
         inner += turns
 
 
-@kernel(void(MAT, VEC, OUT_VEC))
+@kernel(void(MAT, VEC, OUT_VEC), is_inner=True)
 def pair_bounds(robot, speed, bows):
     """Write what is known of the motion of each pair at first, BOW_SIZE numbers each."""
     dof = speed.shape[0]
@@ -166,7 +166,7 @@ def pair_bounds(robot, speed, bows):
         bows[n + SPEED] = fastest[(dof + 1) * inner + body] + fastest[(dof + 1) * outer + body]
 
 
-@kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64), inline='always')
+@kernel(void(OUT_VEC, int64, int64, OUT_VEC, int64), is_inlined=True, is_inner=True)
 def seen_from(points, bar, frame, seen, to):
     """Write both ends of points[bar] in the frame at points[frame], < 0: as is, to seen[to]."""
     for end in range(2):
@@ -182,7 +182,7 @@ def seen_from(points, bar, frame, seen, to):
             seen[to + 4 * end + k] = value
 
 
-@kernel(void(OUT_VEC, int64, OUT_VEC))
+@kernel(void(OUT_VEC, int64, OUT_VEC), is_inner=True)
 def turned_to(points, frame, v):
     """Turn a vector of the base into the frame at points[frame]."""
     x, y, z = v[0], v[1], v[2]
@@ -191,7 +191,11 @@ def turned_to(points, frame, v):
         v[k] = points[row] * x + points[row + 1] * y + points[row + 2] * z
 
 
-@kernel(boolean(OUT_VEC, float64, OUT_VEC, OUT_VEC, int64, float64, float64), inline='always')
+@kernel(
+    boolean(OUT_VEC, float64, OUT_VEC, OUT_VEC, int64, float64, float64),
+    is_inlined=True,
+    is_inner=True,
+)
 def keeps_apart(gap, length, seen, bows, n, bow, radius):
     """
     Return whether a direction, `gap` of some length, separates the hulls of two moving bars.
@@ -213,7 +217,8 @@ def keeps_apart(gap, length, seen, bows, n, bow, radius):
 
 @kernel(
     boolean(OUT_VEC, int64, int64, int64, float64, VEC, VEC, OUT_VEC, int64, MAT),
-    inline='always',
+    is_inlined=True,
+    is_inner=True,
 )
 def is_pair_open(points, a, b, row, width, speed, curvature, bows, n, robot):
     """

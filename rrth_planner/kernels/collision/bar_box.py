@@ -25,7 +25,7 @@ PARALLEL = 1e-12
 LOCAL_ROOM = 12 * LANES
 
 
-@kernel(int64(MAT, int64, int64, int64))
+@kernel(int64(MAT, int64, int64, int64), is_inner=True)
 def without_allowed(boxes, g, bar, lanes):
     """Return those of some boxes of a last group that a bar must keep clear of, looked up."""
     first, bit = LANES * (BOX_ALLOWED + bar // ALLOWED_BITS), bar % ALLOWED_BITS
@@ -35,7 +35,7 @@ def without_allowed(boxes, g, bar, lanes):
     return lanes
 
 
-@kernel(int64(MAT, int64, int64, int64), inline='always')
+@kernel(int64(MAT, int64, int64, int64), is_inlined=True, is_inner=True)
 def checked_lanes(boxes, g, bar, lanes):
     """Return those of some boxes of a last group that a bar must keep clear of."""
     # Mostly no bar may meet any box: one number says so.
@@ -44,7 +44,7 @@ def checked_lanes(boxes, g, bar, lanes):
     return lanes
 
 
-@kernel(int64(OUT_VEC, int64, MAT, int64), inline='always')
+@kernel(int64(OUT_VEC, int64, MAT, int64), is_inlined=True)
 def contact_lanes(points, at, boxes, g):
     """
     Return the boxes of group g in contact with a bar, bit l for lane l.
@@ -88,7 +88,7 @@ def contact_lanes(points, at, boxes, g):
     return hit & ~apart
 
 
-@kernel(float64(OUT_VEC, OUT_VEC, OUT_VEC, float64))
+@kernel(float64(OUT_VEC, OUT_VEC, OUT_VEC, float64), is_inner=True)
 def _derivative(start, step, half, t):
     """Return half the derivative by t of the squared distance of start + t step from a box."""
     total = 0.0
@@ -173,7 +173,7 @@ def nearer(points, at, boxes, g, j, least):
     return min(least, bar_box_distance(start, step, half) - radius)
 
 
-@kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64), inline='always')
+@kernel(int64(OUT_VEC, int64, int64, float64, float64, MAT, int64), is_inlined=True)
 def open_lanes(points, a, b, bow_start, bow_end, boxes, g):
     """
     Return the boxes of group g not proven apart from the hull of a bar at two instants.

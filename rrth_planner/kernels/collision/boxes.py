@@ -117,7 +117,7 @@ def may_meet(rows, box, bar):
     return (bars >> bar % ALLOWED_BITS) & 1 != 0
 
 
-@kernel(void(MAT, READ_INTS, int64, int64, OUT_MAT, int64, int64))
+@kernel(void(MAT, READ_INTS, int64, int64, OUT_MAT, int64, int64), is_inner=True)
 def write_bound(rows, order, begin, end, groups, g, lane):
     """
     Write the smallest bound of the boxes order[begin:end] into a lane of a group.
@@ -154,7 +154,7 @@ def write_bound(rows, order, begin, end, groups, g, lane):
                 groups[g, LANES * (BOX_HALF + k) + lane] = 0.5 * (high[k] - low[k]) + SPARE
 
 
-@kernel(float64(MAT, int64, int64))
+@kernel(float64(MAT, int64, int64), is_inner=True)
 def center_of(rows, i, r):
     """Return coordinate r of a box's centre in the arm's frame."""
     at = 0.0
@@ -163,7 +163,7 @@ def center_of(rows, i, r):
     return at
 
 
-@kernel(void(MAT, OUT_INTS, int64, int64, OUT_VEC))
+@kernel(void(MAT, OUT_INTS, int64, int64, OUT_VEC), is_inner=True)
 def sort_widest(rows, order, begin, end, keys):
     """Sort order[begin:end] by the boxes' centres along the axis that these spread most along."""
     widest = -1.0

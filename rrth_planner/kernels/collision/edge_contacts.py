@@ -63,7 +63,10 @@ def bar_gaps(points, at, boxes, g, gaps):
         gaps[j] = max(gap, (abs(m0 * e1 - m1 * e0) - h0 * f1 - h1 * f0) * norm)
 
 
-@kernel(float64(VEC, VEC, float64, float64, CHAIN, MAT, int64, int64, int64, OUT_VEC, OUT_VEC))
+@kernel(
+    float64(VEC, VEC, float64, float64, CHAIN, MAT, int64, int64, int64, OUT_VEC, OUT_VEC),
+    is_inner=True,
+)
 def gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points):
     """Return the gap of one bar and one box at a share of the edge [m]."""
     for k in range(q_from.shape[0]):
@@ -74,7 +77,9 @@ def gap_at(q_from, q_to, share, ray_length, chain, boxes, bar, g, j, q, points):
     return gaps[j]
 
 
-@kernel(int64(VEC, VEC, float64, float64, float64, CHAIN, MAT, OUT_POOL, OUT_MAT, int64))
+@kernel(
+    int64(VEC, VEC, float64, float64, float64, CHAIN, MAT, OUT_POOL, OUT_MAT, int64), is_inner=True
+)
 def add_contact(q_from, q_to, share, spacing, ray_length, chain, boxes, pair, contacts, n):
     """
     Append the contact of one pair, at its least gap near a share of the edge; return the total.

@@ -14,7 +14,7 @@ from rrth_planner.kernels.vectors import between, distance
 CONTACT = 1e-9
 
 
-@kernel(boolean(VEC, VEC, MAT))
+@kernel(boolean(VEC, VEC, MAT), is_inner=True)
 def is_edge_free_in_plane(q_from, q_to, obstacles):
     """Return whether no rectangle is entered: separating axes, those of the rectangle first."""
     ax, ay, bx, by = q_from[0], q_from[1], q_to[0], q_to[1]
@@ -74,7 +74,7 @@ def is_edge_free(q_from, q_to, resolution, chain, robot, obstacles):
     return True
 
 
-@kernel(boolean(VEC, MAT))
+@kernel(boolean(VEC, MAT), is_inner=True)
 def is_point_inside(q, obstacles):
     """Return whether a point is inside any box."""
     dof = q.shape[0]

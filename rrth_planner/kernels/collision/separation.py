@@ -43,7 +43,7 @@ TINY, SLOW = 1e-6, 1e-3
 BODY = (MAT, READ_INTS, MAT, VEC, VEC)
 
 
-@kernel(void(MAT, float64, float64, OUT_MAT))
+@kernel(void(MAT, float64, float64, OUT_MAT), is_inner=True)
 def cut(curve, begin, end, part):
     """
     Write the part of a polynomial between two shares of it, again over u from 0 to 1.
@@ -106,7 +106,10 @@ def fast_part(begin, end, contact, part):
     return True
 
 
-@kernel(int64(MAT, float64, float64, float64, READ_INTS, CHAIN, MAT, MAT, VEC, VEC, MAT, MAT))
+@kernel(
+    int64(MAT, float64, float64, float64, READ_INTS, CHAIN, MAT, MAT, VEC, VEC, MAT, MAT),
+    is_inner=True,
+)
 def blocking_box(
     part, begin, end, contact, bodies, chain, robot, rows, growths, speeds, quartic, cubic
 ):
@@ -239,7 +242,7 @@ def first_blocked(
     return -1
 
 
-@kernel(void(float64, float64, float64, float64, OUT_VEC))
+@kernel(void(float64, float64, float64, float64, OUT_VEC), is_inner=True)
 def stop_state(v, a, j, t, state):
     """
     Write how far a joint gets, and its velocity, (2,), at a time of a stop.
@@ -261,7 +264,7 @@ def stop_state(v, a, j, t, state):
     state[0], state[1] = x, max(w, 0.0)
 
 
-@kernel(float64(float64, float64, float64))
+@kernel(float64(float64, float64, float64), is_inner=True)
 def stop_time(v, a, j):
     """Return how long a joint takes from a velocity to rest, within limits of the stop [s]."""
     return v / a + a / j if v * j >= a * a else 2.0 * math.sqrt(v / j)
@@ -269,6 +272,7 @@ def stop_time(v, a, j):
 
 @kernel(
     void(OUT_VEC, READ_INTS, int64, MAT, MAT, VEC, VEC, OUT_VEC),
+    is_inner=True,
 )
 def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
     """
@@ -299,7 +303,8 @@ def latest_times(points, bodies, dof, robot, rows, growths, speeds, latest):
     boolean(
         *(float64, int64, float64, float64, float64, float64, float64, MAT, MAT),
         *(float64, int64),
-    )
+    ),
+    is_inner=True,
 )
 def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bars):
     """

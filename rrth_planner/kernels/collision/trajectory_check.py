@@ -15,7 +15,7 @@ from rrth_planner.kernels.trajectory.quintics import bound, fit
 NEW, POINTS = (MAT, READ_INTS, MAT, float64, int64), (VEC, MAT, MAT, MAT)
 
 
-@kernel(void(MAT, float64, OUT_MAT))
+@kernel(void(MAT, float64, OUT_MAT), is_inner=True)
 def shift(curve, begin, rest):
     """
     Write the rest of a polynomial after a share of it, again over u from 0 to 1.
@@ -55,7 +55,7 @@ def prove_pieces(curves, speeds, curvatures, first, begin, resolution, chain, ro
     return -1
 
 
-@kernel(OUT_MAT(*NEW))
+@kernel(OUT_MAT(*NEW), is_inner=True)
 def packed(boxes, allowed, T_arm_base, growth, depth):
     """Return newly received boxes (m, 15) as groups, as `rows_of` and `pack` in `boxes` do."""
     n = boxes.shape[0]

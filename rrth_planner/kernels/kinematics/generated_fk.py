@@ -59,7 +59,7 @@ ALL_ANGLES = """    for i in range({room}):
 """
 
 
-@kernel(int64(VEC, float64, OUT_VEC, int64))
+@kernel(int64(VEC, float64, OUT_VEC, int64), is_inner=True)
 def no_chain(q, ray_length, points, at):
     """Stand in for the chain where the robot is a point: it has no bars."""
     return 0

@@ -27,7 +27,7 @@ from rrth_planner.kernels.vectors import copy, distance
 FIRST_DRAWS = 16
 
 
-@kernel(void(VEC, OUT_INTS, int64, int64))
+@kernel(void(VEC, OUT_INTS, int64, int64), is_inner=True)
 def sink(keys, heap, n, i):
     """Let entry i of a heap of n indices sink to its place; the least key is on top."""
     while True:

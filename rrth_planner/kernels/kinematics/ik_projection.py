@@ -81,7 +81,7 @@ def measure_aim(robot, target, q, work):
     return math.atan2(sine, cosine), distance
 
 
-@kernel(UniTuple(float64, 2)(OUT_MAT, float64, float64, float64))
+@kernel(UniTuple(float64, 2)(OUT_MAT, float64, float64, float64), is_inner=True)
 def solve_damped(work, rise, side, damping):
     """Return (J J' + damping)^-1 (rise, side), J the Jacobian of the joints that are not held."""
     a, b, c = damping, 0.0, damping
@@ -94,7 +94,7 @@ def solve_damped(work, rise, side, damping):
     return (c * rise - b * side) / determinant, (a * side - b * rise) / determinant
 
 
-@kernel(void(MAT, VEC, float64, float64, OUT_MAT))
+@kernel(void(MAT, VEC, float64, float64, OUT_MAT), is_inner=True)
 def least_step(bounds, q, angle, damping, work):
     """
     Write the step J' (J J' + damping)^-1 (angle, 0) from q, within limits.
@@ -157,7 +157,7 @@ def project(robot, bounds, target, q, work):
     return -1.0
 
 
-@kernel(void(MAT, VEC, OUT_MAT))
+@kernel(void(MAT, VEC, OUT_MAT), is_inner=True)
 def step_along(bounds, q, work):
     """
     Write the part of a wish that leads along the goal manifold, from q on it, within limits.

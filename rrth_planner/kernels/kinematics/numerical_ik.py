@@ -23,7 +23,7 @@ from rrth_planner.kernels.vectors import copy, distance
 TWIN = 1e-6
 
 
-@kernel(boolean(MAT, int64, VEC))
+@kernel(boolean(MAT, int64, VEC), is_inner=True)
 def is_among(candidates, n, q):
     """Return whether q is one of the first n candidates."""
     for i in range(n):

@@ -22,7 +22,7 @@ GRADIENTS_ROOM = SQUARE_ROOM = MAX_CLOSED_DOF * MAX_CLOSED_DOF
 MAX_NEWTON, MAX_HALVINGS, DIFFERENCE, FINE = 12, 6, 1e-6, 1e-5
 
 
-@kernel(void(MAT, int64, OUT_VEC))
+@kernel(void(MAT, int64, OUT_VEC), is_inner=True)
 def tilt_frame(robot, i, frame):
     """Apply Tx(a) Rx(alpha) of row i; frame (12,) = x, y, z axes and origin."""
     for k in range(3):
@@ -43,7 +43,7 @@ def unwrap(angle, near, lower, upper):
     return angle if lower <= angle <= upper else math.nan
 
 
-@kernel(void(MAT, VEC, VEC, OUT_VEC))
+@kernel(void(MAT, VEC, VEC, OUT_VEC), is_inner=True)
 def target_from_elbow(robot, target, q, v):
     """Write where the target is (3,), seen from the pan joint at rest; its base is at q [m]."""
     dof = q.shape[0]
@@ -68,7 +68,7 @@ def target_from_elbow(robot, target, q, v):
         v[2] += offset * frame[6 + k]
 
 
-@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC), is_inner=True)
 def pan_and_tilt(robot, bounds, v, q_near, branch, q):
     """
     Write the last two joints so that the ray meets v; return the ray's reach [m], or -1.
@@ -150,14 +150,14 @@ def goal_candidates(
     return n
 
 
-@kernel(boolean(CHAIN, MAT, MAT, VEC, float64))
+@kernel(boolean(CHAIN, MAT, MAT, VEC, float64), is_inner=True)
 def is_goal_free(chain, robot, obstacles, q, reach):
     """Return whether q is free with its ray out to the target, and up to ray_guard_length."""
     ray_length = max(reach, robot[q.shape[0], D])
     return is_configuration_free(q, ray_length, chain, robot, obstacles)
 
 
-@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC))
+@kernel(float64(MAT, MAT, VEC, VEC, int64, OUT_VEC), is_inner=True)
 def nearest_on_manifold(robot, bounds, target, q_from, branch, q):
     """
     Move q along its branch of the goal manifold to where it is nearest to q_from.

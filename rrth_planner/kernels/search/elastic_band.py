@@ -40,7 +40,7 @@ SHORTEST = 1e-3
 WORTH = 5e-4
 
 
-@kernel(void(MAT, int64, OUT_VEC))
+@kernel(void(MAT, int64, OUT_VEC), is_inner=True)
 def invert_springs(path, n, inverse):
     """
     Write the inverse of the stiffness matrix of the corners of a path.
@@ -78,7 +78,7 @@ def invert_springs(path, n, inverse):
                     inverse[MAX_CORNERS * k + j] -= factor * inverse[MAX_CORNERS * i + j]
 
 
-@kernel(void(MAT, int64, OUT_VEC, float64, OUT_MAT))
+@kernel(void(MAT, int64, OUT_VEC, float64, OUT_MAT), is_inner=True)
 def relax(path, n, inverse, share, moves):
     """Write a share of the moves (n - 2, dof) to the equilibrium of the corners without boxes."""
     m = n - 2
@@ -91,7 +91,7 @@ def relax(path, n, inverse, share, moves):
             moves[i, k] = share * (rest - path[i + 1, k])
 
 
-@kernel(int64(SPACE, MAT, MAT, int64, OUT_MAT, OUT_INTS, OUT_VEC, int64))
+@kernel(int64(SPACE, MAT, MAT, int64, OUT_MAT, OUT_INTS, OUT_VEC, int64), is_inner=True)
 def add_constraints(space, path, moved, e, contacts, edges, least, n):
     """
     Append the linearized contact constraints of edge e; return the number of constraints.
@@ -114,7 +114,7 @@ def add_constraints(space, path, moved, e, contacts, edges, least, n):
     return n + n_found
 
 
-@kernel(int64(MAT, MAT, int64, MAT, OUT_MAT, OUT_INTS, OUT_VEC, int64))
+@kernel(int64(MAT, MAT, int64, MAT, OUT_MAT, OUT_INTS, OUT_VEC, int64), is_inner=True)
 def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
     """Append a constraint for each joint limit that the moves exceed; return the total."""
     for i in range(n - 2):
@@ -134,7 +134,7 @@ def add_limits(bounds, path, n, moves, contacts, edges, least, n_found):
     return n_found
 
 
-@kernel(void(OUT_VEC, OUT_MAT, OUT_INTS, OUT_VEC, int64, int64, OUT_MAT))
+@kernel(void(OUT_VEC, OUT_MAT, OUT_INTS, OUT_VEC, int64, int64, OUT_MAT), is_inner=True)
 def constrain(inverse, contacts, edges, least, n, m, moves):
     """
     Correct the moves of m corners, by the least change in the spring norm, to keep n constraints.
@@ -185,7 +185,7 @@ def constrain(inverse, contacts, edges, least, n, m, moves):
             break
 
 
-@kernel(float64(MAT, MAT, int64, MAT, OUT_MAT))
+@kernel(float64(MAT, MAT, int64, MAT, OUT_MAT), is_inner=True)
 def shift(bounds, path, n, moves, moved):
     """Write the path with its corners moved, within the bounds; return its length."""
     for k in range(path.shape[1]):
@@ -196,7 +196,7 @@ def shift(bounds, path, n, moves, moved):
     return path_length(moved, n)
 
 
-@kernel(int64(SPACE, OUT_MAT, int64, OUT_MAT, OUT_INTS))
+@kernel(int64(SPACE, OUT_MAT, int64, OUT_MAT, OUT_INTS), is_inner=True)
 def relax_band(space, path, n, contacts, edges):
     """
     Move all corners of a path to where it is shorter, without entering a box.
@@ -243,7 +243,7 @@ def relax_band(space, path, n, contacts, edges):
     return -1 - n_found
 
 
-@kernel(int64(OUT_MAT, int64, MAT, OUT_INTS, int64))
+@kernel(int64(OUT_MAT, int64, MAT, OUT_INTS, int64), is_inner=True)
 def insert_corner(path, n, contacts, edges, n_found):
     """
     Insert a corner at the contact within an edge with the greatest multiplier; return the new n.

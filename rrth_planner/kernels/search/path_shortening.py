@@ -31,7 +31,7 @@ FINEST_SLIDE = 2e-3
 MAX_SLIDES, MAX_BAND_SLIDES, SLID = 30, 1, 1e-3
 
 
-@kernel(int64(SPACE, SHORTEN, SLIDE, VEC, VEC, boolean, OUT_MAT, int64))
+@kernel(int64(SPACE, SHORTEN, SLIDE, VEC, VEC, boolean, OUT_MAT, int64), is_inner=True)
 def shorten_and_slide(space, shorten, slide_goal, target, how, is_fine, path, n):
     """
     Alternate shortening and slides of the goal until little is gained; return n.

@@ -81,7 +81,7 @@ def keep_best(paths, n, pair, state, history):
     state[N_HISTORY] = row + 1
 
 
-@kernel(int64(MAT, VEC, float64))
+@kernel(int64(MAT, VEC, float64), is_inner=True)
 def count_useful(goals, q_start, cost):
     """Return how many of the goals, nearest first, a path shorter than that can lead to."""
     n = 0
@@ -128,7 +128,7 @@ def plant(goals, q_start, n_goals, tree_q, parents, sizes):
         parents[1, i] = -1
 
 
-@kernel(void(OUT_CUBE, int64, OUT_MAT, OUT_INTS))
+@kernel(void(OUT_CUBE, int64, OUT_MAT, OUT_INTS), is_inner=True)
 def store_raw(paths, n, club, state):
     """Add the inner points of a raw path to the path club, and keep the first raw path."""
     if state[N_RAW] == 0:

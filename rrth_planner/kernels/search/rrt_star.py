@@ -48,7 +48,7 @@ PARENT, CHILD, SIBLING = 0, 1, 2
 GAIN = 1e-12
 
 
-@kernel(float64(int64, int64, float64, float64))
+@kernel(float64(int64, int64, float64, float64), is_inner=True)
 def near_radius(size, dof, rewire_radius, step_size):
     """
     Return the radius of the neighbourhood, gamma (log n / n)^(1/dof) (algorithm 6).
@@ -59,7 +59,7 @@ def near_radius(size, dof, rewire_radius, step_size):
     return min(radius, step_size)
 
 
-@kernel(void(OUT_INT_MAT, int64))
+@kernel(void(OUT_INT_MAT, int64), is_inner=True)
 def detach(links, node):
     """Take a node out of its parent's list of children; links (3, capacity)."""
     parent = links[PARENT, node]
@@ -80,7 +80,7 @@ def attach(links, node, parent):
     links[CHILD, parent] = node
 
 
-@kernel(void(OUT_INT_MAT, OUT_VEC, int64, float64))
+@kernel(void(OUT_INT_MAT, OUT_VEC, int64, float64), is_inner=True)
 def shift_costs(links, costs, node, change):
     """Add a change to the cost of a node and of all its descendants, depth first."""
     costs[node] += change

@@ -15,7 +15,7 @@ from rrth_planner.kernels.search.tree import trace_path
 from rrth_planner.kernels.vectors import copy, path_length
 
 
-@kernel(int64(SPACE, OUT_MAT, int64))
+@kernel(int64(SPACE, OUT_MAT, int64), is_inner=True)
 def skip_waypoints(space, path, n):
     """
     Drop the waypoints that are not needed, in place; return how many are left.

@@ -17,7 +17,7 @@ LEAST_GAIN = 1e-5
 MAX_ROUNDS = 100
 
 
-@kernel(int64(OUT_MAT, int64, int64))
+@kernel(int64(OUT_MAT, int64, int64), is_inner=True)
 def remove_waypoint(path, n, i):
     """Remove waypoint i; return how many are left."""
     for j in range(i, n - 1):
@@ -25,7 +25,7 @@ def remove_waypoint(path, n, i):
     return n - 1
 
 
-@kernel(void(OUT_MAT, int64))
+@kernel(void(OUT_MAT, int64), is_inner=True)
 def reverse_path(path, n):
     """Reverse the first n waypoints."""
     for i in range(n // 2):
@@ -67,7 +67,7 @@ def shortcut_forward(space, path, n, spacing):
     return n
 
 
-@kernel(int64(SPACE, OUT_MAT, int64, float64))
+@kernel(int64(SPACE, OUT_MAT, int64, float64), is_inner=True)
 def cut_corners(space, path, n, spacing):
     """
     Do step 3 of RRT-H in place, from both sides: replace each corner by its largest free chord.

@@ -45,7 +45,7 @@ borrowed = (lambda space: space) if config.DISABLE_JIT else intrinsic(_borrowed)
 
 
 # Called with the tuple, it would cost an edge check 40 ns more.
-@kernel(boolean(SPACE, VEC, VEC), 'always')
+@kernel(boolean(SPACE, VEC, VEC), is_inlined=True, is_inner=True)
 def is_free(space, q_from, q_to):
     """Return whether the straight edge between two configurations is free."""
     is_edge_free = as_edge_check(space.functions[EDGE_CHECK_AT])
@@ -53,7 +53,7 @@ def is_free(space, q_from, q_to):
     return is_edge_free(q_from, q_to, space.resolution, chain, space.robot, space.obstacles)
 
 
-@kernel(float64(SPACE, VEC, VEC))
+@kernel(float64(SPACE, VEC, VEC), is_inner=True)
 def adapted_step(space, settings, q):
     """
     Return the step from q: shorter where obstacles are near (after Cai, as the paper cites it).

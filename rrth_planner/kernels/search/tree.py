@@ -24,7 +24,7 @@ CHUNK = 256
 ROOM = CHUNK + 8
 
 
-@kernel(void(MAT, int64, int64, VEC, OUT_VEC))
+@kernel(void(MAT, int64, int64, VEC, OUT_VEC), is_inner=True)
 def squared_distances(nodes, first, n, q, squares):
     """Write the squared distances of n nodes, from that row on, from q."""
     # Written out for the common sizes, and nothing else in the loop, it is done on vectors.

@@ -30,7 +30,7 @@ AHEAD, FURTHER, CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
 RESERVES = (1.003, 0.985, 0.95, 0.85)
 
 
-@kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE))
+@kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE), is_inner=True)
 def remaining_motion(curves, times, now, last, points, states):
     """Write the points of a motion from now to one at which it is at rest; return their number."""
     state, n, dof, kept = np.empty((4, curves.shape[2])), 0, curves.shape[2], now
@@ -66,7 +66,7 @@ def first_rest(curves, times, now):
     return n
 
 
-@kernel(float64(VEC, float64))
+@kernel(float64(VEC, float64), is_inner=True)
 def avoid_points(times, begin):
     """Return the next time that is a point of a motion, or not close to any [s]."""
     for i in range(times.shape[0]):
@@ -88,7 +88,7 @@ def first_window(curves, times, time, limits):
     return window
 
 
-@kernel(int64(VEC, float64, float64))
+@kernel(int64(VEC, float64, float64), is_inner=True)
 def points_between(times, begin, end):
     """Return how many points of a motion lie between two times [s]."""
     n = 0

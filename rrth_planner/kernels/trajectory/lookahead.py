@@ -26,7 +26,7 @@ ROUNDS = 6
 TINY = 1e-9
 
 
-@kernel(void(CUBE, VEC, int64, float64, OUT_MAT))
+@kernel(void(CUBE, VEC, int64, float64, OUT_MAT), is_inner=True)
 def derivatives_on(curves, times, piece, time, states):
     """
     Write position, velocity, acceleration and jerk of one piece at a time, (4, dof).
@@ -44,7 +44,7 @@ def derivatives_on(curves, times, piece, time, states):
         states[3, k] = ((60 * c5 * u + 24 * c4) * u + 6 * c3) * scale**3
 
 
-@kernel(float64(CUBE, VEC, int64, float64, MAT))
+@kernel(float64(CUBE, VEC, int64, float64, MAT), is_inner=True)
 def s_dot_at(curves, times, piece, time, limits):
     """Return s_dot, the norm of the velocities, each over the acceleration limit of its joint."""
     width = times[piece + 1] - times[piece]
@@ -57,7 +57,7 @@ def s_dot_at(curves, times, piece, time, limits):
     return math.sqrt(total) / width
 
 
-@kernel(float64(CUBE, VEC, int64, float64, float64, MAT))
+@kernel(float64(CUBE, VEC, int64, float64, float64, MAT), is_inner=True)
 def s_between(curves, times, piece, begin, end, limits):
     """Return the change of s between two times of one piece [-]."""
     width, total = end - begin, 0.0
@@ -80,7 +80,7 @@ def time_after(curves, times, piece, begin, end, s, limits):
     return time
 
 
-@kernel(void(MAT, MAT, OUT_MAT, OUT_VEC))
+@kernel(void(MAT, MAT, OUT_MAT, OUT_VEC), is_inner=True)
 def path_derivatives(states, limits, q_s, speeds):
     """
     Write three derivatives of q by s, (3, dof), and s_dot, s_ddot and s_dddot, (3,).

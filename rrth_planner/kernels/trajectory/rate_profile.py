@@ -48,7 +48,7 @@ def state_of(profile, time, state):
         state[2] = 0.0
 
 
-@kernel(void(VEC, VEC, VEC, OUT_MAT))
+@kernel(void(VEC, VEC, VEC, OUT_MAT), is_inner=True)
 def chain_phases(state, lasts, jerks, profile):
     """Write the profile of three phases from a state, (3,) as from `state_of`."""
     tau, r, a = state[0], state[1], state[2]
@@ -61,7 +61,7 @@ def chain_phases(state, lasts, jerks, profile):
         a += t * j
 
 
-@kernel(void(VEC, float64, float64, float64, OUT_MAT))
+@kernel(void(VEC, float64, float64, float64, OUT_MAT), is_inner=True)
 def rate_change(state, target, a_max, j_max, profile):
     """
     Write the profile that reaches a target rate soonest, (3, 5).
@@ -98,7 +98,7 @@ def profile_after(profile, time, rest):
     chain_phases(state, lasts, jerks, rest)
 
 
-@kernel(float64(MAT, float64, float64, float64))
+@kernel(float64(MAT, float64, float64, float64), is_inner=True)
 def time_at(profile, tau, low, high):
     """Return when a profile, between two times of it, passes a time of the motion [s]."""
     state = np.empty(3)
@@ -112,7 +112,7 @@ def time_at(profile, tau, low, high):
     return high
 
 
-@kernel(int64(VEC, MAT, OUT_VEC))
+@kernel(int64(VEC, MAT, OUT_VEC), is_inner=True)
 def scaled_times(times, profile, points):
     """
     Write the times of the points of a motion that follows a rate profile; return their number.
@@ -165,7 +165,7 @@ def scaled_times(times, profile, points):
     return n
 
 
-@kernel(void(CUBE, VEC, MAT, VEC, OUT_CUBE))
+@kernel(void(CUBE, VEC, MAT, VEC, OUT_CUBE), is_inner=True)
 def scaled_states(curves, times, profile, points, states):
     """Write position, velocity and acceleration at points of a profile, (3, n, dof)."""
     at, found, piece, n = np.empty(3), np.empty((4, curves.shape[2])), 0, points.shape[0]
@@ -182,7 +182,7 @@ def scaled_states(curves, times, profile, points, states):
             states[2, i, k] = 0.0 if is_end else found[2, k] * at[1] ** 2 + found[1, k] * at[2]
 
 
-@kernel(boolean(CUBE, VEC, MAT, MAT, float64))
+@kernel(boolean(CUBE, VEC, MAT, MAT, float64), is_inner=True)
 def keeps_limits(curves, times, profile, limits, until):
     """Return whether a motion keeps limits, (3, dof), while it follows a profile until a time."""
     end = profile[0, LASTS] + profile[1, LASTS] + profile[2, LASTS]

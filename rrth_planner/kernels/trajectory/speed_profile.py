@@ -50,7 +50,7 @@ def reachable_speed(speed, length, v_max, a_max, j_max):
     return low
 
 
-@kernel(float64(float64, float64, float64, float64, float64, float64))
+@kernel(float64(float64, float64, float64, float64, float64, float64), is_inner=True)
 def peak_speed(v_from, v_to, length, v_max, a_max, j_max):
     """Return the greatest speed up to `v_max` within a cell, between the speeds at its ends."""
     low, high = max(v_from, v_to), max(v_from, v_to, v_max)
@@ -67,7 +67,7 @@ def peak_speed(v_from, v_to, length, v_max, a_max, j_max):
     return low
 
 
-@kernel(int64(float64, float64, float64, float64, OUT_MAT, int64))
+@kernel(int64(float64, float64, float64, float64, OUT_MAT, int64), is_inner=True)
 def ramp(v_from, v_to, a_max, j_max, phases, n):
     """Write the phases of constant jerk of a change of speed as rows n, ...; return the next."""
     change, sign = abs(v_to - v_from), 1.0 if v_to > v_from else -1.0
@@ -105,7 +105,7 @@ def cell_phases(v_from, v_to, cell, phases):
     return ramp(peak, v_to, a_max, j_max, phases, n + 1)
 
 
-@kernel(void(MAT, MAT, int64, VEC, OUT_MAT))
+@kernel(void(MAT, MAT, int64, VEC, OUT_MAT), is_inner=True)
 def bound_derivatives(directions, turns, row, place, q_s):
     """
     Write bounds of the derivatives of the path by its length within a cell, (3, dof).
@@ -126,7 +126,7 @@ def bound_derivatives(directions, turns, row, place, q_s):
         q_s[2, k] = abs(turn) * w_ddot / (width * width)
 
 
-@kernel(float64(MAT, MAT))
+@kernel(float64(MAT, MAT), is_inner=True)
 def constant_speed(q_s, limits):
     """Return the greatest constant speed through a cell that holds all limits [rad/s]."""
     speed = math.inf
@@ -140,7 +140,7 @@ def constant_speed(q_s, limits):
     return speed
 
 
-@kernel(float64(MAT, MAT, float64, float64, float64))
+@kernel(float64(MAT, MAT, float64, float64, float64), is_inner=True)
 def slowed_square(q_s, limits, length, square, cap):
     """
     Return the greatest squared speed from which a cell allows to slow down to another one.
@@ -158,7 +158,7 @@ def slowed_square(q_s, limits, length, square, cap):
     return most
 
 
-@kernel(void(MAT, MAT, float64, OUT_VEC))
+@kernel(void(MAT, MAT, float64, OUT_VEC), is_inner=True)
 def path_limits(q_s, limits, speed, cell):
     """Write a_max and j_max along the path, as a cell allows them up to a speed."""
     a_max, j_max = math.inf, math.inf
@@ -182,7 +182,7 @@ def path_limits(q_s, limits, speed, cell):
     cell[J_MAX] = min(j_max, a_max / SHORTEST_RAMP) if has_room else 0.0
 
 
-@kernel(float64(float64, float64, VEC))
+@kernel(float64(float64, float64, VEC), is_inner=True)
 def ramped(speed, other, cell):
     """Return the greatest speed up to `speed` that a cell can change to, or from, `other`."""
     if speed <= other or cell[A_MAX] == 0.0:

@@ -65,7 +65,7 @@ def stop_s(phases):
     return phases[2, X] + t * (phases[2, V] + t * (0.5 * phases[2, A] + t * phases[2, J] / 6.0))
 
 
-@kernel(boolean(CUBES, int64, int64, float64, float64, float64, float64, float64))
+@kernel(boolean(CUBES, int64, int64, float64, float64, float64, float64, float64), is_inner=True)
 def keeps_limits_at(geometry, cell, last, share, v, a, j, reserve):
     """Return whether s_dot, s_ddot and s_dddot keep the limits at a share of a cell."""
     for k in range(geometry.shape[3]):
@@ -120,7 +120,7 @@ def keeps_limits(phases, rows, geometry, pieces, first, n, reserve):
     return True
 
 
-@kernel(void(int64, float64, float64, *AHEAD))
+@kernel(void(int64, float64, float64, *AHEAD), is_inner=True)
 def try_stop(
     row, deceleration, jerk, rows, geometry, pieces, n, limits, reserve, best, phases, tried
 ):
@@ -143,7 +143,7 @@ def try_stop(
             copy(tried[k], phases[k])
 
 
-@kernel(int64(MAT, CUBES, READ_INTS, int64, int64, MAT, float64, float64, OUT_MAT))
+@kernel(int64(MAT, CUBES, READ_INTS, int64, int64, MAT, float64, float64, OUT_MAT), is_inner=True)
 def soonest_stop(rows, geometry, pieces, first, n, limits, before, reserve, phases):
     """
     Write the soonest stop found, phases (3, 5); return the row that it begins with, or -1.

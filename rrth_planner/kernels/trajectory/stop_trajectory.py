@@ -28,7 +28,7 @@ INSTANTS, ALLOWED, WITHIN = 17, 1.002, 1.0025
 ROUNDING = 300 * 2.3e-16
 
 
-@kernel(float64(MAT, float64))
+@kernel(float64(MAT, float64), is_inner=True)
 def passing_time(phases, s):
     """Return the time since the begin of a stop at which it passes s, before its end [s]."""
     before = 0.0
@@ -47,7 +47,7 @@ def passing_time(phases, s):
     return before
 
 
-@kernel(int64(MAT, READ_INTS, MAT, int64, float64, OUT_VEC))
+@kernel(int64(MAT, READ_INTS, MAT, int64, float64, OUT_VEC), is_inner=True)
 def stop_times(rows, pieces, phases, begin, spacing, points):
     """Write the times of the points of a stop that begins with a row, since the first row [s]."""
     marks, m, now = np.empty(rows.shape[0] + 5), 1, rows[0, TIME]
@@ -82,7 +82,7 @@ def stop_times(rows, pieces, phases, begin, spacing, points):
     return n
 
 
-@kernel(void(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, OUT_CUBE))
+@kernel(void(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, OUT_CUBE), is_inner=True)
 def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out):
     """Write position, velocity and acceleration at all points of a stop, (3, n, dof)."""
     n, dof = points.shape[0], curves.shape[2]
@@ -125,7 +125,7 @@ def stop_states(curves, times, rows, pieces, phases, begin, limits, points, out)
             out[2, i, k] = states[2, k] * ratio * ratio + states[1, k] * ratio_dot
 
 
-@kernel(boolean(VEC, CUBE, float64, MAT))
+@kernel(boolean(VEC, CUBE, float64, MAT), is_inner=True)
 def is_within(points, stop, begin, most):
     """
     Return whether the pieces of a stop that end after `begin` keep limits, (3, dof).
@@ -161,7 +161,7 @@ def is_within(points, stop, begin, most):
     return True
 
 
-@kernel(boolean(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, CUBE))
+@kernel(boolean(CUBE, VEC, MAT, READ_INTS, MAT, int64, MAT, VEC, CUBE), is_inner=True)
 def is_on_path(curves, times, rows, pieces, phases, begin, limits, points, stop):
     """
     Return whether a stop, in pieces (n - 1, 6, dof) between its points (n,), stays on its path.
