@@ -98,6 +98,8 @@ def scene_of_a_motion(wait_until, send, spinning):
     said = []
     with ExitStack() as stack:
         yield begin
+    # Shown where a test fails.
+    print(*said, sep='\n')
 
 
 def in_the_way(client, ahead):
