@@ -20,6 +20,7 @@ from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary, ll
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
@@ -250,13 +251,14 @@ class SlimLibrary(JITCodeLibrary):
 
 @contextlib.contextmanager
 def calling_by_name() -> Iterator[None]:
-    """Have what is compiled meanwhile call long kernels by name."""
-    before = SlimLibrary.is_calling_by_name
-    SlimLibrary.is_calling_by_name = True
-    try:
-        yield
-    finally:
-        SlimLibrary.is_calling_by_name = before
+    """Have what this thread compiles meanwhile call long kernels by name."""
+    with global_compiler_lock:
+        before = SlimLibrary.is_calling_by_name
+        SlimLibrary.is_calling_by_name = True
+        try:
+            yield
+        finally:
+            SlimLibrary.is_calling_by_name = before
 
 
 def require_kernels(names: frozenset[str]) -> None:
