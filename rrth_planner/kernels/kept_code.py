@@ -116,21 +116,25 @@ class KeptCode(NullCache):
         self._function, self._is_inlined, self._folder = function, is_inlined, folder
         self._miss, self._give_up = miss, give_up
 
-    def _file(self, signature: Any, codegen: Any) -> Path:
-        """Return the file of the code for one signature and processor."""
+    def _key(self, signature: Any, codegen: Any) -> str:
+        """Return 16 hexadecimal digits for the source, one signature and processor."""
         function = self._function
         closure = dumps(tuple(cell.cell_contents for cell in function.__closure__ or ()))
         # Code that checks bounds is other code.
         key = (signature, codegen.magic_tuple(), config.BOUNDSCHECK, _source(function), closure)
-        digest = hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+        return hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+
+    def _file(self, key: str) -> Path:
+        function = self._function
         name = f'{function.__module__}.{function.__qualname__}'.replace('<', '').replace('>', '')
-        return self._folder / f'{name}-{digest}.code'
+        return self._folder / f'{name}-{key}.code'
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return the code for a signature; None where it is to be compiled."""
         # Of all that a context is made of, code that is compiled already needs the runtime only.
         rtsys.initialize(context)
-        data = read_whole(self._file(signature, context.codegen()))
+        key = self._key(signature, context.codegen())
+        data = read_whole(self._file(key))
         # What is whole may be of other versions of what it is made of.
         with contextlib.suppress(Exception):
             if data is not None:
@@ -141,15 +145,14 @@ class KeptCode(NullCache):
                 return result
         self._miss(self._function)
         # Part of the name of the code, by which others call it: the same in all processes.
-        number = int(self._file(signature, context.codegen()).stem.rpartition('-')[2], 16)
-        FunctionIdentity._unique_ids = itertools.count(number)
+        FunctionIdentity._unique_ids = itertools.count(int(key, 16))
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep the code for a signature."""
         if result.library.has_dynamic_globals:
             return
-        file = self._file(signature, result.codegen)
+        file = self._file(self._key(signature, result.codegen))
         library, entry = result.library, result.fndesc.llvm_func_name
         if self._is_inlined or not library.is_long(entry):
             entry = ''

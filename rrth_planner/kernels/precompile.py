@@ -32,6 +32,7 @@ SHARES = (
         'search.rrt_h',
     ),
 )
+
 # The compiler makes few cycles, and to look for them takes a twentieth of its time.
 RARE_COLLECTIONS = 'import gc; gc.set_threshold(100_000)'
 
