@@ -69,13 +69,15 @@ def permitted_ahead(
     body: SeenBody,
     settings: Separation,
     margin: float,
+    reserve: float = 1.0,
 ) -> Array:
     """
     Return the rates that are permitted at the first places of a motion, (n,) [s] -> (n_rates, 3).
 
     The greatest rate from which a stop would keep clear of the wearer, up to 1 [-], and how fast
     the rate may change there: its first and its second derivative [1/s, 1/s^2]. body: the wearer
-    as he will be known when such a stop begins; margin [m]. An estimate: `first_unproven` proves.
+    as he will be known when such a stop begins; margin [m]; reserve: a stop from so many times the
+    rate would keep clear, too. An estimate: `first_unproven` proves.
     """
     arm, rules = settings.arm, settings.rules
     found = np.empty((n_rates, 3))
@@ -84,6 +86,7 @@ def permitted_ahead(
         motion.times,
         places,
         n_rates,
+        reserve,
         *settings.limits.rows[1:],
         *settings.stop_limits.rows[1:],
         rules.contact_speed,

@@ -25,9 +25,11 @@ from rrth_planner.timing.rate_profile import (
 # last ones takes the arm up to so far [s].
 N_RATES, SPACING_AHEAD, BEYOND = 21, 0.03, 0.9
 # Share of its limits that a motion slows down with; how much of a ramp that takes from the way.
-GENTLE, RAMP = 0.5, 0.5
+GENTLE, RAMP = 0.5, 0.75
 # Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
 OF_PRESENT, OF_PERMITTED = (1.0, 0.7), (0.5, 0.25)
+# What the estimate of the permitted rate may miss, where a stop that has begun is completed.
+RESERVE = 1.05
 # The least rate that is tried: a motion at a much lower one would last for hours [-].
 LEAST = 0.03
 # Shares of the permitted rate that a motion from rest may begin with.
@@ -116,7 +118,9 @@ def permitted(motion: Trajectory, time: float, body: SeenBody, settings: Separat
     n = max(2, math.ceil(ahead / SPACING_AHEAD) + 1)
     places = np.linspace(time, time + ahead, n)
     n_rates, margin = min(n, N_RATES), settings.margin + JUMP_WAY
-    rates, slows, fades = permitted_ahead(motion, places, n_rates, body, settings, margin).T
+    reserve = RESERVE if _has_sharp_stops(settings) else 1.0
+    found = permitted_ahead(motion, places, n_rates, body, settings, margin, reserve)
+    rates, slows, fades = found.T
     places = places[:n_rates]
     # The square of the rate falls by 2 s_ddot along the way, less what the ramps take of that.
     way = np.maximum(places - time - RAMP * slows / fades, 0.0)
@@ -150,7 +154,7 @@ def first_commitment(
         found = _committed(motion, time, state, None, body, settings)
         if isinstance(found, Commitment):
             break
-    return found
+    return found or Blocked(0.0, 'the arm', 'its limits')
 
 
 def extended(
@@ -185,9 +189,14 @@ def is_in_sharp_stop(commitment: Commitment, time: float, settings: Separation) 
     It is not left before it has ended: a controller to which that came 20 ms late would jump by
     more than 2e-4 rad, and mostly the arm brakes harder than a motion may.
     """
-    is_sharp = bool((settings.stop_limits.jerk > settings.limits.jerk).any())
     elapsed = time - commitment.start_time
-    return is_sharp and commitment.stretch < elapsed < commitment.trajectory.duration
+    is_stopping = commitment.stretch < elapsed < commitment.trajectory.duration
+    return is_stopping and _has_sharp_stops(settings)
+
+
+def _has_sharp_stops(settings: Separation) -> bool:
+    """Return whether stops have more jerk than motions."""
+    return bool((settings.stop_limits.jerk > settings.limits.jerk).any())
 
 
 def _committed(
@@ -198,8 +207,12 @@ def _committed(
     body: SeenBody,
     settings: Separation,
     is_clear: Callable[[Trajectory], bool] = lambda curve: True,
-) -> Commitment | Blocked:
-    """Return the fastest commitment from a state that is proven, or what keeps it from it."""
+) -> Commitment | Blocked | None:
+    """
+    Return the fastest commitment from a state that is proven, or what keeps it from it.
+
+    None where only the limits of the arm do, which is in a stop then.
+    """
     rules, margin = settings.rules, settings.margin + JUMP_WAY
     blocked: Blocked | None = None
 
@@ -248,4 +261,4 @@ def _committed(
     if blocked is None:
         # No rate could be tried: the motion itself says what is in its way.
         is_proven(part_of(motion, float(state[0]), motion.duration))
-    return blocked or Blocked(0.0, 'the arm', 'its limits')
+    return blocked

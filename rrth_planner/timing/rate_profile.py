@@ -8,6 +8,7 @@ import numpy as np
 from rrth_planner.kernels.trajectory.rate_profile import (
     LASTS,
     profile_after,
+    SAME_RATE,
     SPACING,
     state_of,
     steer,
@@ -17,9 +18,9 @@ from rrth_planner.kernels.trajectory.rate_profile import (
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, Trajectory
 
-# Rates that differ by less [-], and derivatives below that [1/s], are not worth a change: it would
-# end within microseconds, in which rounding is a jerk.
-SAME_RATE, NO_SLOPE = 1e-3, 1e-3
+# Derivatives of a rate below that are not worth a change [1/s]: it would end within 0.2 ms, in
+# which rounding is a jerk.
+NO_SLOPE = 5e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,10 +8,12 @@ pytest.importorskip('tqdm')
 
 from benchmarks.separation.adversary import chain_of_hands, FAST, Trial, trials
 from benchmarks.separation.contacts import AT_REST, classes_of, distances_to, SLOW
+from benchmarks.separation.durations import chain_of_timed
 from benchmarks.separation.lockstep import Controller
 from benchmarks.separation.people import beside_person, items, speed_lines, Take
 from benchmarks.separation.reaching import EARLIEST, interception, Reaching
 from benchmarks.separation.reference import chain_of_motions
+from benchmarks.separation.setting import Case
 import numpy as np
 from rrth_planner.model.arm import tool_pose
 from rrth_planner.model.scene import Box, Scene
@@ -49,6 +51,18 @@ def test_commitments_pass_the_reference_checker():
     assert judged.n_judged == 2
     assert judged.n_instants > 100
     assert judged.n_violations == 0
+
+
+@pytest.mark.parametrize('stop', ['4/40', '10/400'])
+@pytest.mark.parametrize('dead', [0.03, 0.1])
+def test_beside_a_wearer_at_rest_no_motion_stops_on_its_way(dead, stop):
+    for seed in (0, 2):
+        for one in chain_of_timed(dead, Case(stop=stop, controller_delay=0.01), 5, seed):
+            assert one.n_stops == 0
+            assert one.took < 4.0 * one.planned
+            assert one.excess <= 1.01
+            assert one.jump <= 2e-4
+            assert one.speed_jump <= 0.02
 
 
 @pytest.mark.parametrize('item', items(Take('', 1.0))[:2])

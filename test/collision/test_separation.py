@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.collision.reference_checker import fast_distances, separation_violations
-from rrth_planner.collision.separation import first_unproven
+from rrth_planner.collision.separation import first_unproven, permitted_ahead
 from rrth_planner.collision.separation_checker import first_separation_violation
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.kernels.collision.separation import fast_part, within_distance
 from rrth_planner.model.arm import ArmModel, bars_of, Capsule
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import growth_at, seen_body, SeparationRules
-from rrth_planner.model.trajectory import part_of, sample, Trajectory
+from rrth_planner.model.separation import growth_at, seen_body, Separation, SeparationRules
+from rrth_planner.model.trajectory import MotionLimits, part_of, sample, Trajectory
 from sample_motions import motion_of
 from worlds import random_boxes, random_chain, random_rotation, seeded_capsule_arm, table_1_arm
 
@@ -289,6 +289,27 @@ def test_no_slower_motion_than_the_contact_speed_is_blocked_and_any_faster_one_i
         assert first_unproven(slide, 0.0, sliding_arm(), body, RULES, 0.0) is None
         slide = steady_motion(1.0001 * sign * RULES.contact_speed)
         assert first_unproven(slide, 0.0, sliding_arm(), body, RULES, 0.0) is not None
+
+
+def test_within_reach_of_a_box_no_place_of_the_arm_is_permitted_more_than_the_contact_speed():
+    for arm, size, fastest in (
+        (turning_arm(), 2.0 * LENGTH, LENGTH + RADIUS),
+        # What slides counts once for the bar that gets longer, and once for what is in it.
+        (sliding_arm(), 2.0, 2.0),
+    ):
+        limits = MotionLimits([1.0], [4.0], [40.0])
+        settings = Separation(
+            arm=arm, rules=RULES, limits=limits, stop_limits=limits, stretch=0.024, margin=0.0
+        )
+        body = seen_body(box_at((0.0, 0.0, 0.0), (size,) * 3), 0.0, RULES)
+        for speed in (0.2, -1.0):
+            motion = steady_motion(speed)
+            rates = permitted_ahead(motion, np.linspace(0.0, 0.3, 11), 5, body, settings, 0.0)[
+                :, 0
+            ]
+            permitted = RULES.contact_speed / (abs(speed) * fastest)
+            assert (rates <= permitted).all()
+            assert (rates >= permitted - 0.02).all()
 
 
 def test_the_slow_part_of_a_bar_may_be_in_a_box():

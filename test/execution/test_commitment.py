@@ -226,7 +226,7 @@ def test_a_controller_that_is_20_ms_late_jumps_by_next_to_nothing(acceleration, 
         velocity=limits().velocity, acceleration=np.full(4, acceleration), jerk=np.full(4, jerk)
     )
     settings, body = replace(SETTINGS, stop_limits=stop), body_at(scene=body_far_away())
-    n_extended = n_stopping = n_resumed = 0
+    n_extended = n_stopping = n_continued = n_resumed = 0
     for motion in motions():
         for before in stretches(motion, settings):
             end = before.trajectory.duration
@@ -234,6 +234,7 @@ def test_a_controller_that_is_20_ms_late_jumps_by_next_to_nothing(acceleration, 
                 after = extended(before, before.start_time + elapsed, body, settings)
                 if isinstance(after, Commitment):
                     n_extended += elapsed == PERIOD
+                    n_continued += before.stretch < elapsed < end
                     n_resumed += elapsed >= end
                     jump, speed_jump = late_jump(before, after)
                     assert jump <= JUMP
@@ -244,7 +245,9 @@ def test_a_controller_that_is_20_ms_late_jumps_by_next_to_nothing(acceleration, 
                     n_stopping += after is None
     assert min(n_extended, n_resumed) > 10
     # The motion goes on from a sharp stop only once that has ended.
-    assert (n_stopping > 50) == (jerk == 400.0)
+    assert n_stopping > 50
+    assert (n_continued > 50) == (jerk == 40.0)
+    assert (n_continued == 0) == (jerk == 400.0)
 
 
 def committed(motion, profile):
@@ -317,9 +320,10 @@ def test_a_wearer_who_is_not_seen_for_seconds_blocks_and_is_named(contact_speed)
             # It creeps: none of its places is fast.
             assert contact_speed > 0.0
             assert not separation_violations(ARM, body, found.trajectory, rules, MARGIN)
-        else:
+        elif found is not None:
             assert (found.bar in names, found.box in boxes) == (True, True)
-    assert sum(isinstance(found, Blocked) for found in answers) > 0.2 * len(answers)
+    n_blocked = sum(isinstance(found, Blocked) for found in answers)
+    assert n_blocked >= (10 if contact_speed > 0.0 else 0.2 * len(answers))
 
 
 def test_a_motion_goes_on_and_arrives_when_the_wearer_is_seen_again():

@@ -313,8 +313,8 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
     v, gains, a, j: of the joint that takes longest to stop, velocity and acceleration at rate 1,
     the latter 0 where it slows down, and the limits of the stop; step: between two places [s];
     latest (n, n_bars * SECTIONS): as from `latest_times`, of the places; ends (n, 2 n_bars): the
-    speeds of the bars' ends there at rate 1 [m/s]. Of a bar the sections whose middles are faster
-    than `contact` count. An estimate: it knows the motion at these places only.
+    speeds of the bars' ends there at rate 1, with their flesh [m/s]. Of a bar the sections with a
+    place faster than `contact` count. An estimate: it knows the motion at these places only.
     """
     state, begin_v = np.empty(2), rate * v
     # What accelerates goes on for a while.
@@ -338,8 +338,8 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
             begin += part * (ends[k + 1, 2 * bar] - begin)
             end += part * (ends[k + 1, 2 * bar + 1] - end)
             for section in range(SECTIONS):
-                middle = (section + 0.5) / SECTIONS
-                if share * (begin + middle * (end - begin)) <= contact:
+                faster = (section + 1) / SECTIONS if end > begin else section / SECTIONS
+                if share * (begin + faster * (end - begin)) <= contact:
                     continue
                 until = latest[k, SECTIONS * bar + section]
                 after = latest[k + 1, SECTIONS * bar + section]
@@ -350,7 +350,7 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
 
 @kernel(
     void(
-        *(CUBE, VEC, VEC, int64, VEC, VEC, VEC, VEC, float64),
+        *(CUBE, VEC, VEC, int64, float64, VEC, VEC, VEC, VEC, float64),
         *(READ_INTS, CHAIN, MAT, *BODY, OUT_MAT),
     ),
     is_short=True,
@@ -360,6 +360,7 @@ def permitted_rates(
     times,
     places,
     n_rates,
+    reserve,
     acceleration,
     jerk,
     stop_acceleration,
@@ -379,7 +380,8 @@ def permitted_rates(
     Write the greatest rates at some places of a motion from which a stop would keep clear.
 
     curves (n, 6, dof), times (n + 1,): the motion; places (m,): times within it, evenly spread
-    [s], of which the first n_rates are asked for; acceleration, jerk, stop_acceleration, stop_jerk
+    [s], of which the first n_rates are asked for; reserve: how many times a rate must be safe, to
+    be permitted; acceleration, jerk, stop_acceleration, stop_jerk
     (dof,): limits of the motion and of a stop; growths (m,): of the boxes when a stop begins. The
     rest as for `BODY` and `first_blocked`. found (n_rates, 3): the rate, up to 1, and how fast the
     rate may change there: its first and its second derivative that the limits of the motion allow
@@ -413,22 +415,29 @@ def permitted_rates(
         chain(q, 0.0, points, 0)
         chain(nearby, 0.0, other, 0)
         for bar in range(n_bars):
+            # As for the proof: the flesh turns with the bar, and some of it slides.
+            flesh, last = 0.0, bodies[bar] - 1
+            for k in range(bodies[bar]):
+                flesh += abs(state[1, k]) if robot[k, KIND] == REVOLUTE else 0.0
+            flesh *= points[BAR_SIZE * bar + 7]
+            flesh += abs(state[1, last]) if robot[last, KIND] == PRISMATIC else 0.0
             for end in range(2):
                 square = 0.0
                 for c in range(3):
                     p = BAR_SIZE * bar + 4 * end + c
                     square += (other[p] - points[p]) ** 2
-                ends[i, 2 * bar + end] = math.sqrt(square) / STEP
+                ends[i, 2 * bar + end] = math.sqrt(square) / STEP + flesh
         latest_times(points, bodies, dof, robot, rows, growths, speeds, latest[i])
     for i in range(n_rates):
         v, gains, a, j = stops[i, 0], stops[i, 1], stops[i, 2], stops[i, 3]
         low, high = 0.0, 1.0
-        if is_rate_safe(1.0, i, v, gains, a, j, step, latest, ends, contact, n_bars):
+        if is_rate_safe(reserve, i, v, gains, a, j, step, latest, ends, contact, n_bars):
             low = 1.0
         else:
             for _ in range(STEPS):
                 middle = 0.5 * (low + high)
-                if is_rate_safe(middle, i, v, gains, a, j, step, latest, ends, contact, n_bars):
+                rate = reserve * middle
+                if is_rate_safe(rate, i, v, gains, a, j, step, latest, ends, contact, n_bars):
                     low = middle
                 else:
                     high = middle

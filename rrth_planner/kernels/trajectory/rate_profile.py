@@ -14,6 +14,7 @@ from rrth_planner.kernels.trajectory.stop_trajectory import (
     CLOSEST_FIRST,
     is_within,
     TICK,
+    WITHIN,
 )
 from rrth_planner.kernels.vectors import copy
 
@@ -27,6 +28,8 @@ SPACING = 0.01
 HALVINGS = 50
 # A rate as low as this is none [-], and changes of the rate below that are none [1/s].
 NO_RATE, NO_CHANGE = 1e-6, 1e-9
+# Rates that differ by less count as the same; a rate goes no further beyond 1 than that [-].
+SAME_RATE, BEYOND = 1e-3, 1e-5
 # Shares of the limits that a change of the rate is tried with, one after the other.
 SHARES = (0.95, 0.6, 0.35, 0.2, 0.1)
 
@@ -213,6 +216,9 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
     copy(velocity, limits[0])
     copy(acceleration, limits[1])
     copy(jerk, limits[2])
+    for order in range(3):
+        # What a stop exceeds them by comes on top of it.
+        limits[order] /= WITHIN ** (order + 1)
     while piece < curves.shape[0] - 1 and times[piece + 1] <= state[0]:
         piece += 1
     derivatives_on(curves, times, piece, state[0], found)
@@ -225,9 +231,11 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
     for share in SHARES:
         # Where the derivative fades the rate goes no further than from 0 to 1.
         faded = state[1] + 0.5 * state[2] * abs(state[2]) / (share * j_max)
-        if faded < -NO_RATE or faded > 1.0 + NO_RATE:
+        if faded < -NO_RATE or faded > 1.0 + BEYOND:
             break
-        rate_change(state, target, share * a_max, share * j_max, profile)
+        # Where that leads to the target it is all: coming back to it would be a phase too short.
+        aim = faded if abs(faded - target) < SAME_RATE else target
+        rate_change(state, aim, share * a_max, share * j_max, profile)
         end = profile[0, LASTS] + profile[1, LASTS] + profile[2, LASTS]
         if keeps_limits(curves, times, profile, limits, end):
             return True
