@@ -28,7 +28,8 @@ N_RATES, SPACING_AHEAD, BEYOND = 21, 0.03, 0.9
 GENTLE, RAMP = 0.5, 0.75
 # Rates that are tried where the permitted one is not proven: shares of the present one, and of it.
 OF_PRESENT, OF_PERMITTED = (1.0, 0.7), (0.5, 0.25)
-# What the estimate of the permitted rate may miss, where a stop that has begun is completed.
+# Stops that are completed once they have begun would also keep clear from so many times the
+# permitted rate: its estimate may miss something.
 RESERVE = 1.05
 # The least rate that is tried: a motion at a much lower one would last for hours [-].
 LEAST = 0.03
@@ -211,7 +212,7 @@ def _committed(
     """
     Return the fastest commitment from a state that is proven, or what keeps it from it.
 
-    None where only the limits of the arm do, which is in a stop then.
+    None if only the limits of the arm keep it from it: it is in a stop, which has to end first.
     """
     rules, margin = settings.rules, settings.margin + JUMP_WAY
     blocked: Blocked | None = None

@@ -217,7 +217,7 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
     copy(acceleration, limits[1])
     copy(jerk, limits[2])
     for order in range(3):
-        # What a stop exceeds them by comes on top of it.
+        # A stop from this motion may exceed them by as much again.
         limits[order] /= WITHIN ** (order + 1)
     while piece < curves.shape[0] - 1 and times[piece + 1] <= state[0]:
         piece += 1
@@ -233,7 +233,7 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
         faded = state[1] + 0.5 * state[2] * abs(state[2]) / (share * j_max)
         if faded < -NO_RATE or faded > 1.0 + BEYOND:
             break
-        # Where that leads to the target it is all: coming back to it would be a phase too short.
+        # If that ends near enough to the target, the phase back to it would be too short to keep.
         aim = faded if abs(faded - target) < SAME_RATE else target
         rate_change(state, aim, share * a_max, share * j_max, profile)
         end = profile[0, LASTS] + profile[1, LASTS] + profile[2, LASTS]
