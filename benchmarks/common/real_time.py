@@ -31,12 +31,12 @@ def put_ahead(*threads: int, by: int = 1) -> None:
             os.sched_setscheduler(thread, kind, os.sched_param(min(present + by, most)))
 
 
-def run_as_controller(pid: int) -> bool:
+def run_in_real_time(pid: int, priority: int = CONTROLLER) -> bool:
     """Run a process in real time, as the controllers of ros2_control; return whether it may."""
     try:
         for thread in psutil.Process(pid).threads():
             with suppress(ProcessLookupError):
-                os.sched_setscheduler(thread.id, os.SCHED_FIFO, os.sched_param(CONTROLLER))
+                os.sched_setscheduler(thread.id, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         return False
     return True

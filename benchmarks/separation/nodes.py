@@ -16,6 +16,7 @@ import time
 from typing import Any
 
 import numpy as np
+import psutil
 from rclpy.qos import QoSProfile
 from rrth_planner.collision.reference_checker import bars
 from rrth_planner.io.wearer_file import load_body
@@ -34,7 +35,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from benchmarks.common.client import FRAME, LATCHED, ros_client
 from benchmarks.common.random_draws import random_target
-from benchmarks.common.real_time import run_as_controller
+from benchmarks.common.real_time import run_in_real_time
 from benchmarks.separation.contacts import (
     AT_REST,
     box_distances,
@@ -48,13 +49,16 @@ from benchmarks.separation.reaching import EARLIEST, FASTEST, interception, Reac
 from benchmarks.separation.setting import Case, separation_of, STOPS, the_arm
 from benchmarks.soak.client import SoakClient
 
+# What docs/ros_control.md gives the planner.
+PLANNER_PRIORITY = 10
 PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
 # A tracker publishes so often [1/s]; a hand reaches for so long [s], aimed anew so often [s].
 RATE, REACH, AIM_PERIOD = 120.0, 1.0, 0.02
 # Where hands rest: so far from the bars of an arm at rest [m]; their size [m]; places tried.
 NEAR, FAR, SIDE, PLACES = 0.05, 0.6, 0.1, 200
-# An arm so fast has set off [rad/s]; a slower one is at rest.
-SET_OFF, REST = 0.2, 1e-3
+# An arm so fast has set off, and in strict separation, where it is slow near the wearer [rad/s]; a
+# slower one than the last is at rest.
+SET_OFF, SET_OFF_STRICT, REST = 0.2, 0.02, 1e-3
 # When a hand leaves, or the planner is killed, after the arm has set off [s].
 LATEST = 0.5
 # The planner stands still for so long [s].
@@ -89,6 +93,7 @@ class Trial:
     event: str = NOTHING
     speed: float = 1.0
     is_separated: bool = True
+    is_planner_in_real_time: bool = False
 
 
 @dataclass(slots=True)
@@ -109,6 +114,10 @@ class Hands:
         The same where it went on to the end of the planned motion.
     n_requests : int
         Asked for.
+    commitments : str
+        How long the planner took from a body to its commitment; empty where planners died.
+    share : float
+        Of a core that the planner's node used, without planning; 0 where planners died.
 
     """
 
@@ -117,6 +126,8 @@ class Hands:
     rests: list[float] = field(default_factory=list)
     played: list[float] = field(default_factory=list)
     n_requests: int = 0
+    commitments: str = ''
+    share: float = 0.0
 
 
 class Wearer:
@@ -246,14 +257,22 @@ def run(trial: Trial, n: int, seed: int) -> Hands:
     ):
         client.listen_to_states()
         client.hear(LONGEST, lambda: client.states)
-        if not run_as_controller(controller.pid):
+        if not run_in_real_time(controller.pid):
             tqdm.write('the controller runs at ordinary priority', file=sys.stderr)
         with _planners(planner, client) as planners:
             child = next(planners)
+            if trial.is_planner_in_real_time and not run_in_real_time(child.pid, PLANNER_PRIORITY):
+                tqdm.write('the planner runs at ordinary priority', file=sys.stderr)
+            node = psutil.Process(child.pid)
+            begin, before = time.monotonic(), sum(node.cpu_times()[:2])
             for _ in tqdm(range(n), desc=trial.what, file=sys.stderr):
                 _one_hand(trial, client, wearer, child, rng, found)
                 if trial.event == KILLED:
                     child = next(planners)
+            if trial.event == NOTHING:
+                used = sum(node.cpu_times()[:2]) - before
+                found.share = used / (time.monotonic() - begin)
+                found.commitments = client.figures.get('commitments', '')
         client.close()
     return found
 
@@ -292,6 +311,7 @@ def _one_hand(
 ) -> None:
     """Have a hand reach for an arm in motion."""
     speed = trial.speed * speed_bound(separation_of(trial.case).rules, 'hand')
+    fast = SET_OFF if trial.case.contact_speed > 0.0 else SET_OFF_STRICT
     client.hear(LONGEST, lambda: client.speed < REST)
     wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
     client.hear(0.3)
@@ -308,10 +328,10 @@ def _one_hand(
             wearer.add_hand(_place_near(np.array(client.states[-1][1]), rng), speed)
             client.hear(0.3)
             continue
-        if client.hear(PATIENCE, lambda: client.speed > SET_OFF):
+        if client.hear(PATIENCE, lambda: client.speed > fast):
             break
     client.hear(float(rng.uniform(0.0, LATEST)))
-    was_moving = client.speed > SET_OFF
+    was_moving = client.speed > fast
     reaching = wearer.reaching
     assert reaching is not None
     n_states = max(0, len(client.states) - 10)
@@ -451,7 +471,7 @@ def _place_near(q: Array, rng: np.random.Generator) -> Array:
 HEADER = (
     '| what | v_c [m/s] | stop | hands | contacts, arm faster than v_c | slower | at rest '
     '| fastest contact [m/s] | at rest on its way after: median [s] | most [s] '
-    '| played to its end: motions | most [s] |'
+    '| played to its end: motions | most [s] | body to commitment | share of a core |'
 )
 
 
@@ -460,6 +480,8 @@ def trials() -> dict[str, tuple[Trial, bool]]:
     found: list[tuple[Trial, bool]] = []
     for case in (Case(), Case(stop='10/400'), Case(contact_speed=0.0, stop='10/400')):
         found.append((Trial('hands at the speed assumed', case), False))
+    what = 'the same, planner in real time as well'
+    found.append((Trial(what, Case(), is_planner_in_real_time=True), False))
     found.append((Trial('power: 1.5 times as fast', Case(), speed=1.5), False))
     found.append((Trial('power: separation off', Case(), is_separated=False), False))
     for event in (KILLED, STOPPED):
@@ -479,4 +501,5 @@ def line_of(trial: Trial, found: Hands) -> str:
         [f'{np.median(found.rests):.2f}', f'{max(found.rests):.2f}'] if found.rests else ['–', '–']
     )
     cells += [str(len(found.played)), f'{max(found.played):.2f}' if found.played else '–']
+    cells += [found.commitments, f'{found.share:.0%}'] if found.commitments else ['–', '–']
     return f'| {" | ".join(cells)} |'

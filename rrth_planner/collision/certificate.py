@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The certificate: a continuous collision check of a timed curve, as a controller runs it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import functools
 import math
@@ -72,6 +73,16 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     if found < 0:
         return Certificate(is_proven=True)
     return Certificate(is_proven=False, piece=found // 2, is_violated=bool(found % 2))
+
+
+def are_pieces_proven(pieces: Sequence[Array], world: World, obstacles: Array) -> bool:
+    """
+    Return whether some pieces of a motion are proven free of obstacles in place of the world's.
+
+    pieces: coefficients, as from `piece_coefficients`, and both `derivative_bounds` of them.
+    """
+    resolution = FINENESS * world.resolution
+    return prove_pieces(*pieces, 0, 0.0, resolution, world.chain, world.robot, obstacles) < 0
 
 
 @functools.lru_cache(maxsize=8)

@@ -3,11 +3,10 @@
 """Penetration depths of the arm in the boxes, and the proof that a motion escapes from them."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from rrth_planner.collision.certificate import certify
+from rrth_planner.collision.certificate import are_pieces_proven, bounds_of, certify
 from rrth_planner.collision.world import without_ray, World
 from rrth_planner.kernels.collision.bar_box import depths
 from rrth_planner.kernels.layout import (
@@ -19,7 +18,12 @@ from rrth_planner.kernels.layout import (
     LANES,
 )
 from rrth_planner.model.arrays import Array
-from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
+from rrth_planner.model.trajectory import (
+    cut_at,
+    piece_coefficients,
+    positions_at,
+    Trajectory,
+)
 
 # Time intervals, within each of which the arm gets no deeper than at its start.
 INTERVALS = 12
@@ -76,13 +80,19 @@ def escape_depths(world: World, q: Array) -> Array:
 
 def relaxed(world: World, by: Array) -> World:
     """Return the world with its boxes shrunk on every side by (m,) [m]; some may vanish."""
-    obstacles = world.obstacles.reshape(len(world.obstacles), BOX_ROWS, LANES).copy()
+    return replace(world, obstacles=_shrunk(world, by[None])[0])
+
+
+def _shrunk(world: World, by: Array) -> Array:
+    """Return the obstacles with their boxes shrunk by each row of (k, m) [m], k of them."""
+    obstacles = world.obstacles.reshape(1, len(world.obstacles), BOX_ROWS, LANES)
+    obstacles = obstacles.repeat(len(by), axis=0)
     rows, lanes = _places(world)
     # The groups above bound the larger boxes, hence the smaller ones too.
-    halves = obstacles[rows, BOX_HALF:BOX_ALLOWED, lanes] - by[:, None]
-    is_left = (halves > 0.0).all(axis=1, keepdims=True)
-    obstacles[rows, BOX_HALF:BOX_ALLOWED, lanes] = np.where(is_left, halves, -np.inf)
-    return replace(world, obstacles=obstacles.reshape(world.obstacles.shape))
+    halves = obstacles[:, rows, BOX_HALF:BOX_ALLOWED, lanes] - by.T[:, :, None]
+    is_left = (halves > 0.0).all(axis=2, keepdims=True)
+    obstacles[:, rows, BOX_HALF:BOX_ALLOWED, lanes] = np.where(is_left, halves, -np.inf)
+    return obstacles.reshape(len(by), *world.obstacles.shape)
 
 
 def _places(world: World) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -131,18 +141,17 @@ def leads_out(
         or (of_bars >= half_widths(world)).any()
     ):
         return False
-    bars = without_ray(world)
-    for i, (start, stop) in enumerate(pairwise(times.tolist())):
-        if stop <= start:
-            continue
+    # Pieces, each of which is within an interval; the first ones of each.
+    part, first = cut_at(trajectory, times)
+    motion, bars = (piece_coefficients(part), *bounds_of(part)), without_ray(world)
+    for_arm, for_bars = _shrunk(world, of_arm), _shrunk(world, of_bars)
+    for i in range(INTERVALS):
         # Once the arm is clear of all boxes, the remaining time is one interval.
         is_out = not of_arm[i].any()
-        part = part_of(trajectory, 0.0, end if is_out else stop)
-        if not certify(part, relaxed(world, of_arm[i]), start).is_proven:
+        pieces = [rows[first[i] : None if is_out else first[i + 1]] for rows in motion]
+        if not are_pieces_proven(pieces, world, for_arm[i]):
             return False
-        if (of_bars[i] < of_arm[i]).any() and not certify(
-            part, relaxed(bars, of_bars[i]), start
-        ).is_proven:
+        if (of_bars[i] < of_arm[i]).any() and not are_pieces_proven(pieces, bars, for_bars[i]):
             return False
         if is_out:
             break

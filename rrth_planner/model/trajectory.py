@@ -208,6 +208,19 @@ def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
     )
 
 
+def cut_at(trajectory: Trajectory, times: Array) -> tuple[Trajectory, NDArray[np.int64]]:
+    """
+    Return the part from the first to the last of some increasing times, with a point at each.
+
+    With the numbers of these points. It is that trajectory to rounding, as `part_of`; times (m,)
+    are within it [s].
+    """
+    own = trajectory.times
+    points = np.unique(np.concatenate([times, own[(own > times[0]) & (own < times[-1])]]))
+    part = Trajectory(points - points[0], *sample(trajectory, points))
+    return part, points.searchsorted(times)
+
+
 def near_point(trajectory: Trajectory, time: float) -> float:
     """Return a time, replaced by that of a point of the trajectory within `NEAR_POINT` [s]."""
     near = _nearest(trajectory, time)

@@ -8,6 +8,7 @@ import pytest
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import (
+    cut_at,
     joined,
     near_point,
     part_of,
@@ -97,6 +98,22 @@ def test_velocity_and_acceleration_of_a_part_are_those_of_the_trajectory(seed):
 
 
 @examples(200)
+@given(seed=SEEDS)
+def test_a_trajectory_with_cuts_is_that_trajectory_and_has_a_point_at_each(seed):
+    rng = np.random.default_rng(seed)
+    motion = a_motion(rng)
+    cuts = np.sort([a_cut(rng, motion) for _ in range(5)])
+    # One of them twice.
+    cuts = np.sort(np.append(cuts, cuts[2]))
+    part, places = cut_at(motion, cuts)
+    assert (part.times[places] == cuts - cuts[0]).all()
+    assert len(part.times) <= len(motion.times) + len(cuts)
+    times = test_times(part)
+    assert np.abs(positions_at(part, times) - positions_at(motion, cuts[0] + times)).max() < (
+        ROUNDING
+    )
+
+
 @given(seed=SEEDS)
 def test_a_part_of_a_part_is_a_part_of_the_trajectory(seed):
     rng = np.random.default_rng(seed)

@@ -85,12 +85,18 @@ def scene_of_a_motion(wait_until, send, spinning):
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
         wait_until(lambda: client.figures.get('age of joints [s]', 'inf') != 'inf')
-        send(client, client.body, body()[0])
+        wearer = body()[0]
+        send(client, client.body, wearer)
         send(client, client.target, samples.target(*FAR))
         future = client.plan.call_async(Trigger.Request())
-        wait_until(future.done)
-        assert future.result().success
-        wait_until(lambda: client.motions and client.speed() > 0.3)
+
+        def is_moving():
+            # However busy the machine is, the body is not stale before the arm moves.
+            client.body.publish(wearer)
+            assert not future.done() or future.result().success
+            return client.motions and client.speed() > 0.3
+
+        wait_until(is_moving)
         return client, said
 
     from contextlib import ExitStack
@@ -214,7 +220,10 @@ def test_a_body_that_stops_coming_stops_the_arm_and_it_holds(scene_of_a_motion, 
     wait_until(lambda: client.figures.get('monitor') == 'holding')
     wait_until(lambda: client.speed() == 0.0)
     assert any('body_timeout' in line for line in said)
-    assert len(client.motions) == 2
+    # Only the stop, published again where a busy machine took it too late.
+    again = [line for line in said if 'stop published again' in line]
+    assert len(client.motions) == 2 + len(again)
+    assert len([line for line in said if 'SUCCESS' in line]) == 1
 
 
 def test_without_replan_the_arm_holds_where_it_stopped(scene_of_a_motion, wait_until):
