@@ -178,12 +178,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     extent = Extent(**{n: given.get(n, getattr(base, n)) for n in Extent.__dataclass_fields__})
     for name in options.only or SECTIONS:
         SECTIONS[name](options, extent)
-    if options.figures is not None:
+    if options.figure is not None:
         # Only pictures need it.
         from benchmarks.separation.figures import draw
 
         file = str(options.recordings[0]) if options.recordings else ''
-        print(f'\n{draw(options.figures, people.Take(file, 1.0), Case())}')
+        print(f'\n{draw(options.figure, people.Take(file, 1.0), Case())}')
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -214,7 +214,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help='further recorded people, in the layouts of CMU or TUM',
     )
-    parser.add_argument('--figures', type=Path, metavar='FOLDER', help='draw pictures into it')
+    parser.add_argument('--figure', type=Path, metavar='FILE', help='draw a motion into it')
     parser.add_argument('--jobs', type=_count, default=1, metavar='N', help='processes (1)')
     parser.add_argument('--seed', type=int, default=0, help='the first of them (0)')
     return parser

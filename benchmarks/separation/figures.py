@@ -42,8 +42,8 @@ class _Watched(Session):
         self.rates.append((at, rate, permitted(planner.motion, tau, body, self.settings)))
 
 
-def draw(folder: Path, take: Take, case: Case) -> Path:
-    """Draw a motion beside a recorded person into a folder, and return the file."""
+def draw(file: Path, take: Take, case: Case) -> Path:
+    """Draw motions beside a recorded person into a file, and return it."""
     session = _Watched(take, case)
     session.run(SECONDS)
     times = instants(0.0, SECONDS)[::5]
@@ -57,9 +57,8 @@ def draw(folder: Path, take: Take, case: Case) -> Path:
     lower.plot(at, limits, color='C1', label='permitted')
     lower.plot(at, rates, color='C0', label='commanded')
     lower.set(xlabel='time [s]', ylabel='rate of the motion', ylim=(0.0, 1.1))
-    lower.legend(loc='upper right')
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / 'beside_a_person.png'
+    lower.legend(loc='lower left')
+    file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=150)
     plt.close(figure)
     return file
