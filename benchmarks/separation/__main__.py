@@ -214,7 +214,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar='FILE',
         help='further recorded people, in the layouts of CMU or TUM',
     )
-    parser.add_argument('--figure', type=Path, metavar='FILE', help='draw a motion into it')
+    parser.add_argument('--figure', type=Path, metavar='FILE', help='draw motions into it')
     parser.add_argument('--jobs', type=_count, default=1, metavar='N', help='processes (1)')
     parser.add_argument('--seed', type=int, default=0, help='the first of them (0)')
     return parser

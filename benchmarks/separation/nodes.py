@@ -56,8 +56,8 @@ PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'pl
 RATE, REACH, AIM_PERIOD = 120.0, 1.0, 0.02
 # Where hands rest: so far from the bars of an arm at rest [m]; their size [m]; places tried.
 NEAR, FAR, SIDE, PLACES = 0.05, 0.6, 0.1, 200
-# An arm so fast has set off, and in strict separation, where it is slow near the wearer [rad/s]; a
-# slower one than the last is at rest.
+# An arm has set off once it is so fast; in strict separation, where it is slow near him, the
+# second counts. Below the third it is at rest [rad/s].
 SET_OFF, SET_OFF_STRICT, REST = 0.2, 0.02, 1e-3
 # When a hand leaves, or the planner is killed, after the arm has set off [s].
 LATEST = 0.5

@@ -79,7 +79,8 @@ def are_pieces_proven(pieces: Sequence[Array], world: World, obstacles: Array) -
     """
     Return whether some pieces of a motion are proven free of obstacles in place of the world's.
 
-    pieces: coefficients, as from `piece_coefficients`, and both `derivative_bounds` of them.
+    pieces: coefficients (n, 6, dof), as from `piece_coefficients`, and both `derivative_bounds` of
+    them, (n, dof) [rad]; obstacles: of the shape of `World.obstacles`.
     """
     resolution = FINENESS * world.resolution
     return prove_pieces(*pieces, 0, 0.0, resolution, world.chain, world.robot, obstacles) < 0

@@ -210,10 +210,10 @@ def part_of(trajectory: Trajectory, begin: float, end: float) -> Trajectory:
 
 def cut_at(trajectory: Trajectory, times: Array) -> tuple[Trajectory, NDArray[np.int64]]:
     """
-    Return the part from the first to the last of some increasing times, with a point at each.
+    Return the part from the first to the last of some times, with a point at each, and which.
 
-    With the numbers of these points. It is that trajectory to rounding, as `part_of`; times (m,)
-    are within it [s].
+    It is that trajectory to rounding, as `part_of`. times (m,): within it, not decreasing [s];
+    the indices of their points: (m,).
     """
     own = trajectory.times
     points = np.unique(np.concatenate([times, own[(own > times[0]) & (own < times[-1])]]))
