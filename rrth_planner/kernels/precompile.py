@@ -15,12 +15,11 @@ from rrth_planner.kernels.jit import cache_folder, compiling_notice, is_compiled
 SHARES = (
     (
         'vectors',
-        'collision.arm_clearance',
         'kinematics.generated_fk',
-        'collision.trajectory_check',
         'collision.separation',
-        'kinematics.goal_selection',
+        'kinematics.pan_tilt_ik',
         'search.elastic_band',
+        'collision.arm_clearance',
     ),
     (
         'trajectory.quintics',
@@ -30,6 +29,8 @@ SHARES = (
         'trajectory.rate_profile',
         'search.rrt',
         'search.rrt_h',
+        'kinematics.goal_selection',
+        'collision.trajectory_check',
     ),
 )
 

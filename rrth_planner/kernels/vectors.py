@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Small vectors: copies, distances, lengths of paths."""
+"""Small vectors: copies, sorting, distances, lengths of paths."""
 
 import math
 
@@ -13,6 +13,17 @@ def copy(q, to):
     """Write q to another place; an assignment of arrays takes the compiler ten times as long."""
     for k in range(q.shape[0]):
         to[k] = q[k]
+
+
+@kernel(void(OUT_VEC, int64), is_inner=True)
+def sort(values, n):
+    """Sort the first few of some values; the compiler takes ten times as long for numpy's sort."""
+    for i in range(1, n):
+        value, k = values[i], i
+        while k > 0 and values[k - 1] > value:
+            values[k] = values[k - 1]
+            k -= 1
+        values[k] = value
 
 
 @kernel(float64(VEC, VEC))

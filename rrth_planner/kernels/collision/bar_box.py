@@ -5,7 +5,6 @@
 import math
 
 from numba.core.types import float64, int64, void
-import numpy as np
 from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC
 from rrth_planner.kernels.layout import (
@@ -246,7 +245,7 @@ def depths(boxes, points, found):
     points (n, n_bars, 8): the bars of the arm in n configurations, each its start, half its length
     (not read), its end and its radius [m]; found (n, n_bars, m) [m], < 0: apart.
     """
-    middle, along, half = np.empty(3), np.empty(3), np.empty(3)
+    middle, along, half = scratch.floats(3), scratch.floats(3), scratch.floats(3)
     for k in range(points.shape[0]):
         for bar in range(points.shape[1]):
             p, q = points[k, bar, :4], points[k, bar, 4:]

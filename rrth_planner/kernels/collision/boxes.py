@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_INTS, OUT_MAT, OUT_VEC, READ_INTS
 from rrth_planner.kernels.layout import (
     ALLOWED_BITS,
@@ -126,7 +127,7 @@ def write_bound(rows, order, begin, end, groups, g, lane):
     or those of the arm's frame.
     """
     best = math.inf
-    low, high, axes = np.empty(3), np.empty(3), np.empty((3, 3))
+    low, high, axes = scratch.floats(3), scratch.floats(3), np.empty((3, 3))
     for candidate in range(begin, min(end, begin + LANES) + 1):
         is_last = candidate == min(end, begin + LANES)
         for k in range(3):
@@ -201,9 +202,12 @@ def pack(rows, depth, groups, lanes):
     n = rows.shape[1]
     groups[:] = 0.0
     groups[:, LANES * BOX_HALF : LANES * BOX_ALLOWED] = -math.inf
-    order, keys = np.arange(n), np.empty(n)
+    order, keys = np.empty(n, dtype=np.int64), np.empty(n)
+    for i in range(n):
+        order[i] = i
     # Ends of the parts of the present level, each a group of it.
-    ends = np.full(1, n)
+    ends = np.empty(1, dtype=np.int64)
+    ends[0] = n
     first = 0
     for _ in range(depth - 1):
         for _ in range(3):

@@ -316,7 +316,7 @@ def is_rate_safe(rate, place, v, gains, a, j, step, latest, ends, contact, n_bar
     speeds of the bars' ends there at rate 1, with their flesh [m/s]. Of a bar the sections with a
     place faster than `contact` count. An estimate: it knows the motion at these places only.
     """
-    state, begin_v = np.empty(2), rate * v
+    state, begin_v = scratch.floats(2), rate * v
     # What accelerates goes on for a while.
     fades = rate * rate * gains / j
     top = begin_v + 0.5 * fades * fades * j

@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, int64
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import (
     kernel,
     MAT,
@@ -66,7 +67,9 @@ def advance(space, settings, best_cost, club, n_draws, rng, tree_q, parents, siz
     meeting[0] = meeting[1] = -1
     n_goals = sizes[N_GOALS]
     # Draws near the start and near the goals, and how many of them led to a new node.
-    n_tried, n_grown = np.ones(2), np.zeros(2)
+    n_tried, n_grown = scratch.floats(2), scratch.floats(2)
+    n_tried[0] = n_tried[1] = 1.0
+    n_grown[0] = n_grown[1] = 0.0
     for draw in range(n_draws):
         if sizes[0] >= capacity - 1 or sizes[1] >= capacity - 1:
             return n_draws

@@ -4,6 +4,7 @@
 
 from numba.core.types import float64, int64, void
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import kernel, OUT_MAT, SPACE
 from rrth_planner.kernels.search.space import is_free
 from rrth_planner.kernels.vectors import copy, distance, path_length
@@ -77,8 +78,7 @@ def cut_corners(space, path, n, spacing):
     """
     dof = path.shape[1]
     q_in, q_out = np.empty(dof), np.empty(dof)
-    share = np.empty(2)
-    lengths = np.empty(2)
+    share, lengths = scratch.floats(2), scratch.floats(2)
     i = 1
     while i < n - 1:
         lengths[0], lengths[1] = distance(path[i - 1], path[i]), distance(path[i], path[i + 1])

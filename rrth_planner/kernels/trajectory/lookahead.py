@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import float64, int64, void
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBES, OUT_INTS, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.vectors import copy
 
@@ -117,7 +118,7 @@ def look_ahead(curves, times, now, begin, end, step, limits, rows, pieces, geome
     and geometry (m, 3, 3, dof) are written.
     """
     dof = curves.shape[2]
-    states, speeds, most = np.empty((4, dof)), np.empty(3), limits.copy()
+    states, speeds, most = np.empty((4, dof)), scratch.floats(3), limits.copy()
     piece, n, time, s = 0, 0, now, 0.0
     while times[piece + 1] <= now:
         piece += 1

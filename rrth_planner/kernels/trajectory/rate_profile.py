@@ -6,6 +6,7 @@ import math
 
 from numba.core.types import boolean, float64, int64, void
 import numpy as np
+from rrth_planner.kernels import scratch
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_MAT, OUT_VEC, VEC
 from rrth_planner.kernels.trajectory.lookahead import derivatives_on
 from rrth_planner.kernels.trajectory.quintics import fit
@@ -16,7 +17,7 @@ from rrth_planner.kernels.trajectory.stop_trajectory import (
     TICK,
     WITHIN,
 )
-from rrth_planner.kernels.vectors import copy
+from rrth_planner.kernels.vectors import sort
 
 # A rate profile: three phases of constant second derivative of the rate, then a constant rate.
 # `profile` (3, 5), a row for each phase: its duration [s]; at its begin the time within the motion
@@ -82,7 +83,7 @@ def rate_change(state, target, a_max, j_max, profile):
     first, last = (peak - a) / j_max, peak / j_max
     gained = 0.5 * (a + peak) * first + 0.5 * peak * last
     hold = (change - gained) / peak if peak > NO_CHANGE else 0.0
-    lasts, jerks = np.empty(3), np.empty(3)
+    lasts, jerks = scratch.floats(3), scratch.floats(3)
     lasts[0], lasts[1], lasts[2] = first, max(hold, 0.0), last
     jerks[0], jerks[1], jerks[2] = sign * j_max, 0.0, -sign * j_max
     chain_phases(state, lasts, jerks, profile)
@@ -91,7 +92,7 @@ def rate_change(state, target, a_max, j_max, profile):
 @kernel(void(MAT, float64, OUT_MAT))
 def profile_after(profile, time, rest):
     """Write what is left of a profile after a time [s]."""
-    state, lasts, jerks = np.empty(3), np.empty(3), np.empty(3)
+    state, lasts, jerks = scratch.floats(3), scratch.floats(3), scratch.floats(3)
     state_of(profile, time, state)
     before = 0.0
     for p in range(3):
@@ -104,7 +105,7 @@ def profile_after(profile, time, rest):
 @kernel(float64(MAT, float64, float64, float64), is_inner=True)
 def time_at(profile, tau, low, high):
     """Return when a profile, between two times of it, passes a time of the motion [s]."""
-    state = np.empty(3)
+    state = scratch.floats(3)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         state_of(profile, middle, state)
@@ -128,7 +129,7 @@ def scaled_times(times, profile, points):
     for p in range(3):
         end += profile[p, LASTS]
         marks[m], m = end, m + 1
-    state = np.empty(3)
+    state = scratch.floats(3)
     state_of(profile, end, state)
     changed, final = state[0], state[1]
     after, last = end, times[times.shape[0] - 1]
@@ -145,7 +146,7 @@ def scaled_times(times, profile, points):
         after, m = marks[m], m + 1
     if final <= NO_RATE and not is_over:
         after = end
-    marks[:m].sort()
+    sort(marks, m)
     points[0], n, kept = 0.0, 1, 0.0
     for i in range(1, m + 1):
         mark = marks[i] if i < m else after
@@ -171,7 +172,7 @@ def scaled_times(times, profile, points):
 @kernel(void(CUBE, VEC, MAT, VEC, OUT_CUBE), is_inner=True)
 def scaled_states(curves, times, profile, points, states):
     """Write position, velocity and acceleration at points of a profile, (3, n, dof)."""
-    at, found, piece, n = np.empty(3), np.empty((4, curves.shape[2])), 0, points.shape[0]
+    at, found, piece, n = scratch.floats(3), np.empty((4, curves.shape[2])), 0, points.shape[0]
     for i in range(n):
         state_of(profile, points[i], at)
         tau = min(at[0], times[curves.shape[0]])
@@ -213,12 +214,10 @@ def steer(curves, times, state, target, velocity, acceleration, jerk, profile):
     the motion allows there; less, where that exceeds the limits.
     """
     limits, found, piece = np.empty((3, velocity.shape[0])), np.empty((4, velocity.shape[0])), 0
-    copy(velocity, limits[0])
-    copy(acceleration, limits[1])
-    copy(jerk, limits[2])
-    for order in range(3):
+    for k in range(velocity.shape[0]):
         # A stop from this motion may exceed them by as much again.
-        limits[order] /= WITHIN ** (order + 1)
+        limits[0, k], limits[1, k] = velocity[k] / WITHIN, acceleration[k] / WITHIN**2
+        limits[2, k] = jerk[k] / WITHIN**3
     while piece < curves.shape[0] - 1 and times[piece + 1] <= state[0]:
         piece += 1
     derivatives_on(curves, times, piece, state[0], found)

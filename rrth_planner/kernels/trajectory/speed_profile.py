@@ -207,7 +207,8 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     are written in rad, and speeds (n + 1,) [rad/s].
     """
     n, dof = directions.shape
-    q_s, squares = np.empty((3, dof)), np.full(n + 1, math.inf)
+    q_s, squares = np.empty((3, dof)), np.empty(n + 1)
+    squares[:] = math.inf
     squares[0], squares[n] = v_start * v_start, 0.0
     for i in range(n):
         bound_derivatives(directions, turns, i, places[i], q_s)

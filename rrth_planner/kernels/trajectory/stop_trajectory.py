@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_VEC, READ_INTS, VEC
 from rrth_planner.kernels.trajectory.lookahead import derivatives_on, S, TIME, time_after
 from rrth_planner.kernels.trajectory.stop_search import A, J, LASTS, stop_s, V, X
+from rrth_planner.kernels.vectors import sort
 
 # Points of a stop are no further apart, where that keeps it on its path, and no closer [s]:
 # between close points the jerk is mostly rounding, and between distant ones a jump of the jerk
@@ -67,7 +68,7 @@ def stop_times(rows, pieces, phases, begin, spacing, points):
                 marks[m] = start + passing_time(phases, rows[row, S])
             m += 1
         row += 1
-    marks[:m].sort()
+    sort(marks, m)
     points[0], n, kept = 0.0, 1, 0.0
     for i in range(1, m + 1):
         mark = marks[i] if i < m else after
