@@ -5,7 +5,7 @@
 from dataclasses import replace
 from pathlib import Path
 import sys
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 
 import pytest
 
@@ -23,6 +23,7 @@ from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker  # noqa: E402
+from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
 PACKAGE = str(Path(rrth_planner.__file__).parent)
@@ -279,6 +280,41 @@ def test_a_motion_that_is_not_wanted_any_more_is_not_planned_again_for_what_fail
     arm.monitor.fail('a body is late')
     (stop,) = arm.monitor.take_stops()
     assert stop.is_replanned
+
+
+@pytest.mark.parametrize('is_taken', [True, False])
+def test_after_an_error_while_the_arm_stops_nothing_is_planned_by_itself(monitored, is_taken):
+    arm = monitored()
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    arm.monitor.fail('a body is late')
+    n_stops = arm.monitor.n_stops
+    if is_taken:
+        (stop,) = arm.monitor.take_stops()
+        assert stop.is_replanned
+    arm.monitor.fail('the monitor failed', is_replanned=False)
+    (stop,) = arm.monitor.take_stops()
+    assert not stop.is_replanned
+    # Nor is a motion published that was planned meanwhile.
+    assert arm.monitor.n_stops > n_stops
+    assert arm.monitor.stop_reason == 'the monitor failed'
+    assert len(arm.published) == 1
+
+
+def test_what_is_tried_after_a_stop_is_withdrawn_after_an_error(monitored):
+    arm, never = monitored(), SimpleNamespace()
+    arm.reporter.parameters = replace(arm.reporter.parameters, replan=True)
+    node = Node('fail_closed_queue')
+    publishers = SimpleNamespace(is_view_subscribed=lambda: False)
+    queue = PlanQueue(node, arm.inputs, arm.reporter, publishers, arm.monitor, never)
+    queue.prepare = lambda work: None
+    goal = arm.monitor.goal
+    arm.monitor.fail('a body is late')
+    queue._follow_up()
+    assert queue.pursues(goal)
+    arm.monitor.fail('the monitor failed', is_replanned=False)
+    queue._follow_up()
+    assert not queue.pursues(goal)
+    node.destroy_node()
 
 
 def test_a_planner_that_ends_stops_its_arm(monitored):

@@ -299,8 +299,16 @@ class ExecutionMonitor:
             self._pending_since = time.perf_counter()
             self._stop_for_failure()
         elif self.running is not None and is_fault:
-            # The arm stops already; what was planned for after that does not begin.
+            # The arm stops already; what is planned for after that does not begin.
             self._commitments.fail(why, is_fault)
+            self.stop_reason, self.n_stops = why, self.n_stops + 1
+            self._stops = deque(
+                (replace(stop, is_replanned=False) for stop in self._stops), self._stops.maxlen
+            )
+            if not self._stops:
+                # The queue has taken the stop already.
+                with suppress(Exception):
+                    self._record_stop(self.running.trajectory, None, is_replanned=False)
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""

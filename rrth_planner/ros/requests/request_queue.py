@@ -441,6 +441,9 @@ class PlanQueue:
         self._show_newest()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
+            if stop.goal is not None and not stop.is_replanned:
+                # Also what was to be tried again after an earlier stop.
+                self.withdraw(stop.goal)
             if stop.is_replanned and stop.goal is not None and not self._is_closed:
                 self._discard_resumption()
                 duration = stop.trajectory.duration
