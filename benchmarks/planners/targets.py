@@ -52,8 +52,8 @@ WHY_NOT: Mapping[str, str] = {
         'further, takes a millisecond and more.',
     ),
     'cold start of the node to service ready, p50': (
-        'Some 42 s of processor time for 168 kernels, in two processes: two thirds of it numba, '
-        'one third LLVM. More than a third of it is for the kernels that monitor and stop a '
+        'Some 37 s of processor time for 169 kernels, in two processes: more than half of it '
+        'numba, the rest LLVM. More than a third of it is for the kernels that monitor and stop a '
         'moving arm.'
     ),
 }

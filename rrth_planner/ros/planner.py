@@ -144,6 +144,8 @@ class PlannerNode(Node):
 
     def close(self) -> None:
         """Stop an arm in motion; end the plan in progress, the queue, and the planning process."""
+        # First of all; to end the rest takes time, or may fail.
+        self._monitor.close()
         if self._point_head is not None:
             self._point_head.close()
         self._queue.close()

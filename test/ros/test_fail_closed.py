@@ -23,6 +23,7 @@ from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker  # noqa: E402
+from rrth_planner.ros.planner import PlannerNode  # noqa: E402
 from rrth_planner.ros.requests.request_queue import PlanQueue  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures('ros_context')
@@ -324,3 +325,14 @@ def test_a_planner_that_ends_stops_its_arm(monitored):
     assert 'the planner is shutting down' in arm.reporter.monitor_state[1]
     arm.monitor.close()
     assert len(arm.published) == 1
+
+
+def test_a_planner_that_ends_stops_its_arm_before_all_else():
+    ended = []
+
+    def part(name):
+        return SimpleNamespace(close=lambda: ended.append(name))
+
+    parts = {f'_{name}': part(name) for name in ('point_head', 'monitor', 'queue')}
+    PlannerNode.close(SimpleNamespace(**parts))
+    assert ended == ['monitor', 'point_head', 'queue']
