@@ -5,6 +5,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 import os
+import signal
 import time
 from typing import Any, TypeVar
 
@@ -110,7 +111,9 @@ T = TypeVar('T', bound=Client)
 
 @contextmanager
 def ros_client(make: Callable[[], T] = Client) -> Iterator[T]:
-    """Give a client in a ROS domain of its own."""
+    """Give a client in a ROS domain of its own, to a main thread."""
+    # Whatever ends this process, its nodes do not go on in the same domain.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

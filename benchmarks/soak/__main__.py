@@ -8,7 +8,6 @@ from contextlib import nullcontext
 import gc
 from importlib.util import find_spec
 from pathlib import Path
-import signal
 import sys
 import tempfile
 
@@ -52,8 +51,6 @@ def _run(options: argparse.Namespace) -> int:
     from benchmarks.soak.plans import soak_plans
     from benchmarks.soak.report import draw_memory, report
 
-    # Whatever ends this process, its nodes do not go on in the same domain.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     # What lives as long as the client, and threads that hand the interpreter to each other.
     gc.collect()
     gc.freeze()

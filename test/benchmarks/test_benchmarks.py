@@ -3,6 +3,9 @@
 """The benchmarks sum up rows as they should; what is fast is not for a test to say."""
 
 import json
+from pathlib import Path
+import subprocess
+import sys
 
 import pytest
 
@@ -24,6 +27,7 @@ from benchmarks.planners.table import peer_lines, survival_lines, TARGET_HEADER,
 from benchmarks.planners.targets import TARGETS
 from benchmarks.real_arms.edges import checked_pairs
 import numpy as np
+import psutil
 from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.scene import Scene
@@ -250,3 +254,24 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(capsys):
     error = capsys.readouterr().err
     assert error.startswith('psutil: not installed')
     assert 'pip install -r requirements/benchmark.txt' in error
+
+
+# Starts a node as benchmarks do, writes its number, and waits.
+STARTS_A_NODE = """
+import time
+from benchmarks.common.client import ros_client
+from rrth_planner.ros.middleware.child_process import ChildProcess
+with ros_client(), ChildProcess('rrth_planner.ros.playback_node', [], lambda line: None) as child:
+    print(child.pid, flush=True)
+    time.sleep(60.0)
+"""
+
+
+def test_a_benchmark_that_is_ended_ends_its_nodes():
+    pytest.importorskip('rclpy')
+    command, root = [sys.executable, '-c', STARTS_A_NODE], Path(__file__).parents[2]
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.PIPE, text=True) as benchmark:
+        node = psutil.Process(int(benchmark.stdout.readline()))
+        benchmark.terminate()
+        benchmark.wait(30.0)
+    assert not node.is_running()
