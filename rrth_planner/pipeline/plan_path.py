@@ -24,8 +24,8 @@ from rrth_planner.planning.pointing_goals import (
 # Clearance beyond the margin that the path is planned with, for its blends; in a narrow passage,
 # next to none [m].
 SPARES = (5e-3, 1e-5)
-# Shares of the reserve that are tried before, each with so many samples at most: where there is
-# room, few are needed.
+# Shares of the reserve that are tried before, each with few draws of goals and so many samples at
+# most: where there is room, few are needed.
 SHARES, FEW_SAMPLES = (1.0, 0.5, 0.25), 500
 
 
@@ -62,7 +62,7 @@ def find_path(
         if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
             continue
         goals = goal_configurations(arm, goal, roomy, q_start, FEW)
-        if len(goals.q_goals) == 0:
+        if len(goals.q_goals) == 0 and spare <= SPARES[0]:
             goals = goal_configurations(arm, goal, roomy, q_start, MANY)
         if len(goals.q_goals) == 0:
             continue
