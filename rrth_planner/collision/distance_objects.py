@@ -35,12 +35,15 @@ class Boxes:
         """
         least, nearest, library = math.inf, -1, self._library
         query, request, result = library.query, library.request, library.result
-        for j in np.argsort(bounds).tolist():
-            if bounds[j] - DOUBT >= least:
+        # Of a few boxes numpy's own sort and elements take longer.
+        known = bounds.tolist()
+        for j in sorted(range(len(known)), key=known.__getitem__):
+            if known[j] - DOUBT >= least:
                 break
-            bounds[j] = distance = query(item, self._shapes[j].item, request, result)
+            known[j] = distance = query(item, self._shapes[j].item, request, result)
             if distance < least:
                 least, nearest = distance, j
+        bounds[:] = known
         return least, nearest
 
 

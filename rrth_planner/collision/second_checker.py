@@ -166,16 +166,17 @@ class _Advancement:
             samples.append(_Sample(index, moved, max(0.0, distance - margin - DOUBT), bounds))
         return samples
 
-    def take_end(self, reach: float) -> None:
-        """Take samples of the pointing ray at the end, as far as the target [m]."""
+    def parts_at_end(self, reach: float) -> list[_Part]:
+        """Return the pointing ray as far as the target [m], and its pairs: for the end alone."""
         ray = self.bars[-1].k
-        parts: list[_Part] = [PlacedBar(self._arm, ray, reach, self._library)]
-        parts += [
-            PlacedPair(self._arm, pair, len(self.bars) + n, reach, self._library)
-            for n, pair in enumerate(pairs_of(self._arm))
-            if pair.outer == ray
+        return [
+            PlacedBar(self._arm, ray, reach, self._library),
+            *(
+                PlacedPair(self._arm, pair, len(self.bars) + n, reach, self._library)
+                for n, pair in enumerate(pairs_of(self._arm))
+                if pair.outer == ray
+            ),
         ]
-        self.take([(part, self.last, ()) for part in parts])
 
     def next_samples(self, gap: _Gap) -> list[int]:
         """Return where to sample next in a gap; nowhere when its ends prove it free."""
@@ -215,14 +216,18 @@ def first_violation(
     advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length, library)
     end = advancement.last
     starts = sorted({0, end // 2, end})
+    at_end = advancement.parts_at_end(reach) if reach > ray_guard_length else []
+    # All samples of a round are taken at once: the kinematics of one instant take as long as those
+    # of a dozen.
     samples = iter(
-        advancement.take([(part, index, ()) for part in advancement.parts for index in starts])
+        advancement.take(
+            [(part, index, ()) for part in advancement.parts for index in starts]
+            + [(part, end, ()) for part in at_end]
+        )
     )
     gaps: list[_Gap] = []
     for part in advancement.parts:
         gaps += [(part, *pair) for pair in pairwise(list(islice(samples, len(starts))))]
-    # All samples of a round are taken at once: the kinematics of one instant take as long as those
-    # of a dozen.
     while inner := [(gap, places) for gap in gaps if (places := advancement.next_samples(gap))]:
         samples = iter(
             advancement.take([(gap[0], i, gap[1:]) for gap, places in inner for i in places])
@@ -231,8 +236,6 @@ def first_violation(
         for (bar, before, after), places in inner:
             chain = (before, *islice(samples, len(places)), after)
             gaps += [(bar, *pair) for pair in pairwise(chain)]
-    if advancement.violation is None and reach > ray_guard_length:
-        advancement.take_end(reach)
     return advancement.violation
 
 
