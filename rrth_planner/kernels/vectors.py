@@ -17,7 +17,7 @@ def copy(q, to):
 
 @kernel(void(OUT_VEC, int64), is_inner=True)
 def sort(values, n):
-    """Sort the first few of some values; the compiler takes ten times as long for numpy's sort."""
+    """Sort the first n of some values; numpy's sort takes the compiler ten times as long."""
     for i in range(1, n):
         value, k = values[i], i
         while k > 0 and values[k - 1] > value:

@@ -21,7 +21,7 @@ from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionState, sample, StartState
 from rrth_planner.pipeline.rejection import goal_rejection
 from rrth_planner.planning.options import RRTHOptions
-from rrth_planner.planning.pointing_goals import GoalSet, target_in_mount
+from rrth_planner.planning.pointing_goals import FEW, GoalSet, MANY, target_in_mount
 from rrth_planner.timing.lead_in import lead_in
 from worlds import (
     dense_touch,
@@ -38,6 +38,7 @@ from worlds import (
 )
 
 pipeline = pytest.importorskip('rrth_planner.pipeline.plan_motion', exc_type=ImportError)
+path_planning = pytest.importorskip('rrth_planner.pipeline.plan_path', exc_type=ImportError)
 path_timing = pytest.importorskip('rrth_planner.pipeline.time_path', exc_type=ImportError)
 OPTIONS = RRTHOptions(club_attempts=2, improve_time=1000.0, time_limit=1000.0, max_samples=4000)
 
@@ -285,6 +286,21 @@ def test_another_second_checker_changes_no_motion(answers, monkeypatch):
     assert asked == {'coal'}
     with pytest.raises(OptionsError, match="second_checker: 'bullet', expected fcl or coal"):
         ask(wearer(), FOLDED, [1.5, 0.3, 0.4], second_checker='bullet')
+
+
+def test_a_reserve_costs_no_motion_and_few_draws_of_goals(answers, monkeypatch):
+    draws, goal_configurations = [], path_planning.goal_configurations
+
+    def counted(*arguments):
+        draws[-1].append(arguments[-1])
+        return goal_configurations(*arguments)
+
+    monkeypatch.setattr(path_planning, 'goal_configurations', counted)
+    for scene, q_start, target, before in answers:
+        draws.append([])
+        assert ask(scene, q_start, target, reserve=0.05).status is before.status
+    assert max(row.count(FEW) for row in draws) > len(path_planning.SPARES)
+    assert max(row.count(MANY) for row in draws) == len(path_planning.SPARES)
 
 
 def test_a_request_that_is_cancelled_gives_no_motion(answers):

@@ -302,11 +302,7 @@ class ExecutionMonitor:
             # The arm stops already; what is planned for after that does not begin.
             self._commitments.fail(why, is_fault)
             self.stop_reason, self.n_stops = why, self.n_stops + 1
-            self._stops = deque(
-                (replace(stop, is_replanned=False) for stop in self._stops), self._stops.maxlen
-            )
-            if not self._stops:
-                # The queue has taken the stop already.
+            if not self._stops or self._stops[-1].is_replanned:
                 with suppress(Exception):
                     self._record_stop(self.running.trajectory, None, is_replanned=False)
 
