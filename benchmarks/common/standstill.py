@@ -48,6 +48,11 @@ class Standstills:
         shared = np.minimum(self.ends, end) - np.maximum(self.begins, begin)
         return int(shared.clip(min=0).sum())
 
+    def longest(self, n: int) -> list[tuple[int, int]]:
+        """Return begin and end of the n longest, one after the other [ns]."""
+        chosen = np.sort(np.argsort(self.begins - self.ends, kind='stable')[:n])
+        return [(int(self.begins[k]), int(self.ends[k])) for k in chosen]
+
     def sentence(self) -> str:
         """Return how still the machine stood."""
         lengths = (self.ends - self.begins) * 1e-6

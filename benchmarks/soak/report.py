@@ -3,6 +3,7 @@
 """The report of a soak, docs/reliability.md: what was seen in, Markdown out."""
 
 from collections.abc import Sequence
+from datetime import datetime, timezone
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -32,6 +33,8 @@ from benchmarks.soak.targets import (
 AFTERWARDS = 1_000_000_000
 # Of what may happen often the worst are listed.
 MOST_LISTED = 10
+# Standstills of the machine that are listed with their time of day.
+MOST_STANDSTILLS = 40
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
 METHOD = """\
@@ -111,6 +114,8 @@ def report(
         parts += ['## Topics that are flooded', _flood_text(floods)]
     if people:
         parts += ['## Recorded people', _people_text(people)]
+    if still and len(still.begins):
+        parts += ['## Standstills of the machine', _standstill_text(still)]
     return '\n\n'.join([*parts, '## How this is measured', METHOD]) + '\n'
 
 
@@ -230,12 +235,28 @@ def _people_text(people: Sequence[PersonRecord]) -> str:
     return '\n\n'.join([table, *(['\n'.join(contacts)] if contacts else [])])
 
 
+def _standstill_text(still: Standstills) -> str:
+    rows = [
+        [_time_of_day(begin), f'{1e-6 * (end - begin):.1f}']
+        for begin, end in still.longest(MOST_STANDSTILLS)
+    ]
+    what = f'The {len(rows)} longest of {len(still.begins)}, in their order'
+    return f'{what}:\n\n{markdown_table(("began (UTC)", "lasted [ms]"), rows)}'
+
+
+def _time_of_day(time: int) -> str:
+    """Return a time of the system's clock [ns] as time of day, to the millisecond."""
+    moment = datetime.fromtimestamp(time // 1_000_000_000, timezone.utc)
+    return f'{moment:%H:%M:%S}.{time // 1_000_000 % 1000:03d}'
+
+
 def _stillness(still: Standstills | None, begin: int, end: int) -> str:
     """Return for how long the machine stood still between two times [ns]; empty: unknown."""
     if still is None:
         return ''
-    span = 1e-6 * (end - begin)
-    return f' (the machine stalled for {1e-6 * still.within(begin, end):.1f} of {span:.1f} ms)'
+    within, span = 1e-6 * still.within(begin, end), 1e-6 * (end - begin)
+    since = f' from {_time_of_day(begin)} on' if within else ''
+    return f' (the machine stalled for {within:.1f} of {span:.1f} ms{since})'
 
 
 def _percentiles(values: np.ndarray) -> list[str]:

@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import replace
 from multiprocessing import Pipe
 import os
+import re
 import signal
 import threading
 import time
@@ -203,15 +204,34 @@ def test_the_report_says_when_the_body_was_old_and_bodies_were_lost():
     assert (
         '- bodies were lost: 1, between two messages of diagnostics (the machine stalled' in text
     )
-    assert ' for 600.0 of 820.0 ms)' in text
+    assert ' for 600.0 of 820.0 ms from 00:00:0' in text
     running = report(late, None, '', still=united([(1_000_000_000, 1_570_000_000)], 10**10))
     assert 'older, 0 of them' in running
-    assert '- the body was 625.0 ms old (the machine stalled for 570.0 of 625.0 ms)' in running
+    assert '- the body was 625.0 ms old (the machine stalled for 570.0 of 625.0 ms' in running
     assert '- the body was 625.0 ms old\n' in report(late, None, '')
     many = [replace(looks[1], age=0.1 + 0.001 * k) for k in range(30)]
     assert report(plans(looks=many), None, '').count('- the body was') == 10
     assert 'older, ' not in report(plans(), None, '')
     assert 'were lost' not in report(plans(), None, '')
+
+
+@worlds.examples(100)
+@given(gaps=st.lists(st.tuples(st.integers(1, 10**10), st.integers(1, 10**9)), max_size=60))
+def test_the_longest_standstills_are_reported_with_their_time_of_day(gaps):
+    times = np.cumsum(np.array(gaps, dtype=np.int64).reshape(-1)) + 86_399 * 10**9
+    still = united(list(zip(times[::2].tolist(), times[1::2].tolist(), strict=True)), 10**12)
+    text = report(plans(), None, '', still=still)
+    rows = re.findall(r'^\| (\d\d):(\d\d):(\d\d)\.(\d{3}) \| ([\d.]+) \|$', text, re.M)
+    assert ('## Standstills of the machine' in text) == bool(gaps)
+    lengths = sorted((1e-6 * length for _, length in gaps), reverse=True)
+    assert sorted((float(row[-1]) for row in rows), reverse=True) == pytest.approx(
+        lengths[:40], abs=0.06
+    )
+    begins = [((int(h) * 60 + int(m)) * 60 + int(s)) * 1000 + int(ms) for h, m, s, ms, _ in rows]
+    known = {begin // 10**6 % 86_400_000 for begin in times[::2].tolist()}
+    assert set(begins) <= known
+    order = [(begin - 86_399_000) % 86_400_000 for begin in begins]
+    assert order == sorted(order)
 
 
 @worlds.examples(100)
