@@ -228,6 +228,33 @@ def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypat
     assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message')
 
 
+@pytest.mark.usefixtures('tf')
+def test_what_is_no_body_stands_rejected_though_one_before_it_is_read_later(start, monkeypatch):
+    monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 1e6)
+    planner, stranger = start()
+    say_all(planner, stranger)
+    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
+    now = planner.get_clock().now()
+    hat = box('hat', center=(0.0, 1.0, 0.7), size=(0.3, 0.2, 0.1), frame='camera')
+    hat.header.stamp = now.to_msg()
+    out = stranger.publishers['body_boxes']
+    out.publish(array(hat))
+    out.publish(b'\0\1\0\0' + b'\xff' * 40)
+    stranger.wait_until(lambda: len(waiting) == 1 and body.is_last_rejected)
+    n_good, measured = body.n_good, body.measured
+    planner._scene_monitor._frames._buffer.newest = now.nanoseconds
+    stranger.wait_until(lambda: body.n_good == n_good + 1)
+    assert body.value.without(['hat']) == []
+    assert body.is_last_rejected
+    assert body.measured == measured
+    assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message')
+    hat.header.stamp = planner.get_clock().now().to_msg()
+    planner._scene_monitor._frames._buffer.newest = now.nanoseconds + 10**12
+    out.publish(array(hat))
+    stranger.wait_until(lambda: not body.is_last_rejected)
+    assert stranger.answer().success
+
+
 @pytest.fixture(name='clock')
 def _clock(spinning):
     node = Node('clock')

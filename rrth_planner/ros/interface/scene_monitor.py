@@ -71,6 +71,8 @@ class SceneMonitor:
         self._order = MarkerOrder()
         # Bodies in frames whose poses are not known yet, and since when they wait [s].
         self._waiting: deque[tuple[MarkerArray, Arrival, float]] = deque()
+        # When the last message came that was no body at all [s].
+        self._undecoded = -float('inf')
         if self._frames.is_available:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
@@ -82,7 +84,7 @@ class SceneMonitor:
         }
         self._subscriptions = [
             OpenSubscription(
-                node, kind, topic, take, partial(self._reject, source), on_error, **options
+                node, kind, topic, take, partial(self._on_undecoded, source), on_error, **options
             )
             for kind, topic, source, take, options in (
                 (MarkerArray, 'body_boxes', inputs.body, self._on_body, fast),
@@ -90,6 +92,11 @@ class SceneMonitor:
                 (JointState, 'joint_states', inputs.joints, self._on_joints, {}),
             )
         ]
+
+    def _on_undecoded(self, source: Input[Any], problem: Exception) -> None:
+        if source is self._inputs.body:
+            self._undecoded = time.monotonic()
+        self._reject(source, problem)
 
     def _reject(self, source: Input[Any], problem: Exception) -> None:
         def read() -> Any:
@@ -127,16 +134,20 @@ class SceneMonitor:
             else:
                 # The wait for its frame is no delay of this node.
                 read = time.time_ns() if waited > WAIT_PERIOD else arrival.received
-                self._take_body(edits, arrival, read)
+                # What was rejected while it waited is newer, and stands.
+                is_news = arrival.is_newer is None and since > self._undecoded
+                self._take_body(edits, arrival, read, is_news)
 
-    def _take_body(self, edits: Sequence[Edit], arrival: Arrival, arrived: int) -> None:
+    def _take_body(
+        self, edits: Sequence[Edit], arrival: Arrival, arrived: int, is_news: bool
+    ) -> None:
         now, body = self._now(), self._inputs.body
 
         def read() -> WearerBody:
             return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
 
         measured = measured_at(edits, now - self._latency)
-        self._take(body, read, measured, is_news=arrival.is_newer is None)
+        self._take(body, read, measured, is_news)
         self._inputs.body_came()
         self._notify_body(body.value, arrived, not arrival.is_followed)
 
