@@ -503,6 +503,25 @@ def test_old_inputs_are_rejected_with_their_age(start, timeout, answer):
     assert f's old, expected at most 1e-06 s ({timeout})' in message
 
 
+def test_joint_positions_age_from_their_stamp_on(start):
+    planner, stranger = start(joint_timeout=1.0)
+    say_all(planner, stranger)
+    source, old = inputs_of(planner).joints, joints()
+    for age, is_fresh in ((5.0, False), (0.01, True), (3600.0, False), (-3600.0, True)):
+        n_good = source.n_good
+        stamp = planner.get_clock().now() - Duration(seconds=age)
+        old.header.stamp = stamp.to_msg()
+        stranger.publishers['joint_states'].publish(old)
+        stranger.wait_until(lambda n=n_good: source.n_good > n)
+        message = stranger.answer().message
+        if is_fresh:
+            assert message.startswith('SUCCESS'), message
+        else:
+            assert message.startswith('ROBOT_STATE_STALE (-23)'), message
+            assert f' is {age:.0f}.' in message
+            assert ' s old, expected at most 1 s (joint_timeout)' in message
+
+
 @pytest.mark.parametrize(
     ('option', 'value', 'answer'),
     [('max_samples', 100, 'PLANNING_FAILED (-1): '), ('time_limit', 0.05, 'TIMED_OUT (-6): ')],

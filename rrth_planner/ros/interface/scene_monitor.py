@@ -18,7 +18,7 @@ from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import FrameIsLateError, Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
-from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
+from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading, stamped_at
 from rrth_planner.ros.messages.marker_edits import Edit, measured_at, read_edits
 from rrth_planner.ros.messages.marker_order import MarkerOrder
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
@@ -161,7 +161,11 @@ class SceneMonitor:
         if not has_joint_of(msg, self._joint_names):
             return
         now, source = self._now(), self._inputs.joints
-        self._take(source, lambda: joint_reading(msg, self._joint_names, now, source.value), now)
+        self._take(
+            source,
+            lambda: joint_reading(msg, self._joint_names, now, source.value),
+            stamped_at(msg, now),
+        )
         if set(self._joint_names) <= set(msg.name):
             self._inputs.joint_rejection = source.rejection if source.is_last_rejected else None
 

@@ -51,6 +51,16 @@ def configuration_from_msg(msg: JointState, joint_names: Sequence[str]) -> Array
     return frozen_array(q, (len(q),), label, 'rad', MessageError, FARTHEST)
 
 
+def stamped_at(msg: JointState, received: float) -> float:
+    """
+    Return when a message was measured [s]: its stamp.
+
+    Where that is not set or of the future, this is the reception.
+    """
+    stamp = seconds_of(msg.header.stamp)
+    return stamp if 0.0 < stamp <= received else received
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class JointReading:
     """
@@ -96,8 +106,8 @@ def joint_reading(
 
     """
     q = configuration_from_msg(msg, joint_names)
-    names, stamp = list(msg.name), seconds_of(msg.header.stamp)
-    taken = stamp if 0.0 <= received - stamp <= LONGEST_WAY else received
+    names, measured = list(msg.name), stamped_at(msg, received)
+    taken = measured if received - measured <= LONGEST_WAY else received
     if len(msg.velocity):
         if len(msg.velocity) != len(names):
             raise MessageError(
