@@ -4,6 +4,8 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+import math
+import time
 from typing import Any, Protocol
 
 from rrth_planner.collision.violation import Violation
@@ -19,6 +21,8 @@ from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
+# A process that has not answered so long after a cancellation hangs [s].
+LONGEST_STOP = 5.0
 
 
 class PlanningProcessError(RrthError):
@@ -147,14 +151,16 @@ class PlanningProcess:
 
     def _end(self, should_stop: Callable[[], bool]) -> Any:
         """Return the answer to the last call, or raise its error."""
-        is_stopped, number, answer = False, 0, None
+        stopped, number, answer = math.inf, 0, None
         try:
             # The answer to an earlier call, which nobody waited for, may come first.
             while number != self._n_asked:
                 while not self._channel.is_readable(POLL_PERIOD):
-                    if not is_stopped and should_stop():
-                        is_stopped = True
+                    if stopped == math.inf and should_stop():
+                        stopped = time.monotonic()
                         self._channel.send(STOP)
+                    if time.monotonic() - stopped > LONGEST_STOP:
+                        raise TimeoutError(f'no answer {LONGEST_STOP:g} s after a cancellation')
                 number, answer = self._channel.receive()
         except Exception as problem:
             raise PlanningProcessError(self._restart('while working')) from problem

@@ -18,6 +18,7 @@ from rrth_planner.model.errors import ModelError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.status import PlanStatus
+from rrth_planner.pipeline import planning_process, worker_process
 from rrth_planner.pipeline.channel import Channel, REMEMBERED, STOP
 from rrth_planner.pipeline.planning_process import (
     PlanningProcess,
@@ -118,6 +119,18 @@ def test_cancelled_requests_end(process):
     assert process.plan(asked_for, should_stop).status is PlanStatus.CANCELLED
     assert time.monotonic() - begin < 0.5 * LONGEST_WAIT
     # The next one is planned to its end.
+    assert process.plan(question()).status is PlanStatus.SOLVED
+
+
+def test_one_that_hangs_is_replaced_once_its_request_is_cancelled(process, said, monkeypatch):
+    monkeypatch.setattr(planning_process, 'LONGEST_STOP', 0.2)
+    monkeypatch.setattr(worker_process, 'LONGEST_END', 0.2)
+    n_said = len(said)
+    assert process.plan(question()).status is PlanStatus.SOLVED
+    os.kill(process.pid, signal.SIGSTOP)
+    with pytest.raises(PlanningProcessError, match='ended with code -9 while working'):
+        process.plan(question(), lambda: True)
+    assert len(said) == n_said + 1
     assert process.plan(question()).status is PlanStatus.SOLVED
 
 
