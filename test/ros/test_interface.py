@@ -228,6 +228,32 @@ def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypat
     assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message')
 
 
+def test_what_measures_no_part_makes_no_body_younger(start):
+    planner, stranger = start(body_timeout=1.0)
+    say_all(planner, stranger)
+    body, out = inputs_of(planner).body, stranger.publishers['body_boxes']
+    measured = body.measured
+
+    def is_old():
+        out.publish(array())
+        out.publish(array(command(Marker.DELETE, 'scarf')))
+        return body.age(seconds(planner)) > 1.0
+
+    stranger.wait_until(is_old)
+    assert body.measured == measured
+    assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last good message')
+    # Nor does it lift a rejection.
+    out.publish(array(box('hat', center=(float('nan'), 0.0, 0.7))))
+    stranger.wait_until(lambda: body.is_last_rejected)
+    n_good = body.n_good
+    out.publish(array())
+    stranger.wait_until(lambda: body.n_good > n_good)
+    assert stranger.answer().message.startswith('SENSOR_INFO_STALE (-24): the last message on')
+    out.publish(wearer())
+    stranger.wait_until(lambda: not body.is_last_rejected)
+    assert stranger.answer().success
+
+
 @pytest.mark.usefixtures('tf')
 def test_what_is_no_body_stands_rejected_though_one_before_it_is_read_later(start, monkeypatch):
     monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 1e6)

@@ -142,6 +142,8 @@ class SceneMonitor:
         self, edits: Sequence[Edit], arrival: Arrival, arrived: int, is_news: bool
     ) -> None:
         now, body = self._now(), self._inputs.body
+        # What measures no part says nothing about those that are known.
+        is_news &= body.measured is None or any(edit.part is not None for edit in edits)
 
         def read() -> WearerBody:
             return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
