@@ -13,7 +13,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.task import Future  # noqa: E402
 from rrth_planner.ros.middleware import executor as executor_module  # noqa: E402
-from rrth_planner.ros.middleware.executor import OneThreadExecutor  # noqa: E402
+from rrth_planner.ros.middleware.executor import OneThreadExecutor, spin  # noqa: E402
 from std_msgs.msg import Int32  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
@@ -207,3 +207,21 @@ def test_an_error_of_a_callback_reaches_whoever_spins(node):
     out.publish(Int32())
     with pytest.raises(ValueError, match='of the callback'):
         _spin_until(executor, lambda: False)
+
+
+def test_an_error_in_the_report_of_an_error_does_not_end_the_node(node):
+    seen = []
+
+    def fail():
+        raise ValueError('of the callback')
+
+    def on_error(what):
+        seen.append(what)
+        raise ValueError('of the report')
+
+    timer = node.create_timer(0.001, fail)
+    try:
+        spin(node, on_error, is_over=lambda: len(seen) > 2)
+    finally:
+        node.destroy_timer(timer)
+    assert seen[:2] == ['ValueError: of the callback'] * 2

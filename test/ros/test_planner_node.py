@@ -888,6 +888,28 @@ def test_a_plan_from_before_a_stop_is_not_published(start, monkeypatch):
     assert stranger.answer().success
 
 
+def test_a_request_from_before_an_error_moves_no_arm_after_it(start, monkeypatch):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    plan_motion, errors = in_process_planner.plan_question, ['the monitor failed']
+
+    def plan_while_the_monitor_fails(*args, **kwargs):
+        if errors:
+            # As `fail` of a motion in progress.
+            planner._monitor.n_stops += 1
+            planner._monitor.n_faults += 1
+            planner._monitor.stop_reason = errors.pop()
+        return plan_motion(*args, **kwargs)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(in_process_planner, 'plan_question', plan_while_the_monitor_fails)
+        message = stranger.answer().message
+    assert message.startswith('FAILURE (99999): an error while the motion was planned: the monit')
+    assert not errors
+    assert not stranger.received['joint_trajectory']
+    assert stranger.answer().success
+
+
 def test_after_a_stop_it_plans_for_nothing_once_another_motion_has_begun(start, monkeypatch):
     monkeypatch.setattr(request_queue, 'LONGEST_SETTLING', 30.0)
     planner, stranger = start()

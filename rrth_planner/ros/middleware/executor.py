@@ -244,7 +244,10 @@ def spin(
                 if not rclpy.ok():
                     return
                 node.get_logger().error(traceback.format_exc())
-                on_error(one_line(f'{type(problem).__name__}: {problem}'))
+                try:
+                    on_error(one_line(f'{type(problem).__name__}: {problem}'))
+                except Exception:
+                    node.get_logger().error(traceback.format_exc())
     finally:
         executor.close()
 

@@ -288,6 +288,7 @@ class PlanQueue:
         """
         longest = parameters.options.time_limit if patience is None else patience
         monitor, end = self._monitor, time.monotonic() + longest
+        n_faults = monitor.n_faults
         self._await_clear_ray(parameters, ticket)
         while True:
             n_stops = monitor.n_stops
@@ -300,6 +301,11 @@ class PlanQueue:
                 msg = self._publishers.motion(outcome.trajectory, parameters, start)
 
                 def publish_now() -> bool:
+                    if monitor.n_faults != n_faults:
+                        raise RequestError(
+                            ErrorCode.FAILURE,
+                            f'an error while the motion was planned: {monitor.stop_reason}',
+                        )
                     is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
                     if is_published:
                         settle_published(outcome)
