@@ -382,6 +382,95 @@ def test_a_stop_comes_after_all_where_the_commitment_is_not_proven_any_more(
     assert arm.is_over
 
 
+def test_a_stop_that_the_arm_missed_comes_again_though_not_proven_where_nothing_is(
+    separated, monkeypatch
+):
+    arm = separated()
+    arm.frames(60)
+    kept, begin = arm.published[-1]
+    unproven = separation.Blocked(0.0, 'bar', 'box')
+    monkeypatch.setattr(commitments, 'first_unproven', lambda *_: unproven)
+    arm.monitor.fail('of the test')
+    assert len(arm.published) == 2
+    for _ in range(30):
+        # It goes on with the whole rest.
+        arm.now += FRAME
+        arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
+        arm.see(FAR)
+        arm.monitor._on_timer()
+    assert len(arm.published) >= 3
+
+
+def test_an_arm_that_begins_the_whole_rest_late_is_stopped_when_it_is_given_up(separated):
+    arm = separated()
+    assert arm.monitor._commitments.is_whole
+    frames_until_given_up(arm, SWING.positions[0], FAR)
+    assert len(arm.published) == 2
+    stop = arm.published[-1][0]
+    assert np.abs(stop.positions[-1] - SWING.positions[-1]).max() > 0.1
+    assert np.abs(stop.velocities[-1]).max() == 0.0
+    assert arm.monitor.take_stops()[-1].trajectory is stop
+
+
+def test_the_whole_rest_that_an_arm_still_executes_is_proven_again(separated):
+    arm, hand = separated(), near(0.7)
+    arm.period = 1 / 30
+    arm.frames(5)
+    kept, begin = arm.published[-1]
+    found = arm.monitor._commitments
+    assert found.is_whole
+    arm.frames(1, FAR, hand)
+    assert found.present.start_time > begin
+    arm.said.clear()
+    while found.present.start_time != begin:
+        # The controller has rejected what came since, and goes on with the whole rest.
+        assert 'stopped' not in arm.said
+        arm.now += arm.period
+        arm.read(*(row[0] for row in sample(kept, [arm.now - begin])[:2]))
+        arm.see(FAR, hand)
+        arm.monitor._on_timer()
+    assert 'stopped' in arm.said
+
+
+def test_the_whole_rest_is_remembered_however_often_it_was_replaced(separated):
+    arm, hand = separated(), near(0.5)
+    arm.frames(15)
+    kept = arm.monitor._commitments.present
+    assert kept.is_whole
+    n = len(arm.published)
+    arm.frames(2 * commitments.REMEMBERED, FAR, hand)
+    assert len(arm.published) > n + commitments.REMEMBERED
+    recent = arm.monitor._commitments._recent
+    assert len(recent) == commitments.REMEMBERED
+    assert recent[0] is kept
+    assert recent[-1] is arm.monitor._commitments.present
+
+
+def test_a_report_that_fails_keeps_no_arm_from_being_stopped(separated):
+    arm, hand = beside(separated, 0.3)
+    n = len(arm.published)
+
+    def fail(_):
+        raise ZeroDivisionError('of the test')
+
+    arm.reporter.separation_status = fail
+    arm.monitor.fail('an error', is_replanned=False)
+    assert len(arm.published) == n + 1
+    assert arm.monitor._commitments.fault == 'an error'
+
+
+def test_an_arm_off_its_motion_is_stopped_where_no_body_comes(separated):
+    arm = separated()
+    arm.frames(20)
+    n = len(arm.published)
+    for _ in range(40):
+        arm.now += FRAME
+        arm.read(arm.commanded(arm.now)[0] + 0.5, np.ones(4))
+        arm.monitor._on_timer()
+    assert 'body_timeout' in arm.monitor.stop_reason
+    assert len(arm.published) == n + 1
+
+
 def withheld(arm, monkeypatch):
     """Let a stop be withheld, after which no motion is proven; return how many were published."""
     unproven = separation.Blocked(0.0, 'bar', 'box')

@@ -438,6 +438,16 @@ def test_an_arm_off_its_trajectory_is_reported(monitored):
     assert 'monitoring suspended' in monitored.reporter.monitor_state[1]
 
 
+def test_an_arm_off_its_trajectory_is_not_said_to_be_monitored_where_no_body_comes(monitored):
+    monitored.reporter.parameters = replace(monitored.reporter.parameters, body_timeout=0.2)
+    begin = monitored.now
+    monitored.run(0.8, lambda after: (monitored.motion.positions[0] + 0.5, np.full(4, 0.2)))
+    # A stop is due, and where it would begin is not known.
+    assert monitored.published == []
+    assert 'body_timeout' in monitored.monitor.pending_stop
+    assert 0.1 < max(monitored.alive) - begin < 0.25
+
+
 @pytest.mark.parametrize('replan', [False, True])
 def test_it_plans_again_for_the_same_goal_only_where_it_may(monitored, replan):
     monitored.reporter.parameters = replace(monitored.reporter.parameters, replan=replan)

@@ -147,10 +147,10 @@ class Reporter:
         self._publish_state()
 
     def _publish_state(self) -> None:
-        self._published_state = self._separation
         if self._state is not None:
             name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
             self._state.publish(separation_to_msg(name, self._separation))
+        self._published_state = self._separation
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""

@@ -307,6 +307,9 @@ class Commitments:
         self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
         # A reset counts for the stop that it follows, and no later one.
         self.present, self._is_news, self._is_reset = found, False, False
+        if len(self._recent) == REMEMBERED and self._recent[0].is_whole:
+            # A controller that has rejected all since would execute it to the end.
+            del self._recent[1]
         self._recent.append(found)
         # An error in the report must not hide what was published.
         with suppress(Exception):
@@ -333,7 +336,9 @@ class Commitments:
         if is_fault:
             self.fault = why
         state = SeparationState.FAULT if is_fault else SeparationState.PROTECTIVE_STOP
-        self._reporter.separation_status(SeparationStatus(state, why, 0.0))
+        # An error in the report must not keep the arm from being stopped.
+        with suppress(Exception):
+            self._reporter.separation_status(SeparationStatus(state, why, 0.0))
 
     def reset(self) -> str:
         """Allow motions again after a fault, and a stopped one to go on; return what was reset."""
@@ -365,7 +370,8 @@ class Commitments:
         k = int(np.argmin(gaps))
         if gaps[k] >= nearer * gap:
             return False
-        self.present = begun[k]
+        # What has come since it was proven, and since later ones were, counts again.
+        self.present, self._is_news = begun[k], True
         self._recent = deque([begun[k]], maxlen=REMEMBERED)
         if self.planned is not None and begun[k].motion is not self.planned.trajectory:
             # It is of the motion before that.

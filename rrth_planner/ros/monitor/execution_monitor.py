@@ -128,6 +128,8 @@ class ExecutionMonitor:
         self._state = MonitorState.IDLE
         # A motion planned before a stop must not follow it, nor a replanned motion another one.
         self.n_stops, self.n_motions = 0, 0
+        # Nor may one planned before an error follow that.
+        self.n_faults = 0
         # The reason of the last published stop, and of one that is still to be published; since
         # when [s], and whether to plan again after it.
         self.stop_reason = self.pending_stop = ''
@@ -291,6 +293,7 @@ class ExecutionMonitor:
 
     def _stop_unless_over(self, why: str, is_replanned: bool, is_fault: bool) -> None:
         """Stop the arm, if it executes a motion; the lock is held."""
+        self.n_faults += is_fault and self.running is not None
         if self.running is not None and self._state is MonitorState.MONITORING:
             self._commitments.fail(why, is_fault)
             # What is not to be planned again does not become so by what fails later.
@@ -472,8 +475,9 @@ class ExecutionMonitor:
     def _monitored_phase(self, now: float) -> float | None:
         """Return the time within a monitored motion [s]; stop the arm where an input is stale."""
         phase = self._phase(now)
-        if phase is None or self._state is not MonitorState.MONITORING:
+        if self._state is not MonitorState.MONITORING:
             return None
+        # Also of an arm that is off its motion.
         try:
             self._inputs.require_fresh(now, self._reporter.parameters)
         except RequestError as problem:
@@ -488,8 +492,7 @@ class ExecutionMonitor:
             return
         before, phase = found
         stop = replace(self._stop_of(before, phase, now), start_time=now)
-        if self._commitments.is_active and not self._is_separate(stop, now):
-            # The motion that it executes comes to rest by itself.
+        if self._is_withheld(stop, before, now):
             return
         self._tracker.motion = stop
         self._publishers.publish_motion(stop.trajectory, self._parameters, now)
@@ -514,6 +517,12 @@ class ExecutionMonitor:
         if self._state is MonitorState.MONITORING and self._commitments.is_ignored(reading):
             # An arm that ignores one motion after the other, as with its drives off, holds.
             self._n_ignored = 0 if self._commitments.has_moved(reading) else self._n_ignored + 1
+            running, now = self.running, self._now()
+            if running is not None and self._commitments.is_whole:
+                # One that is only late would execute all of it.
+                stop = self._stop_of(running, 0.0, now)
+                self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+                self._tracker.stop(stop)
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
 
@@ -569,7 +578,9 @@ class ExecutionMonitor:
             now = self._now()
             phase = self._phase_or_elapsed(running, now)
             if phase is None:
-                return
+                if not self._commitments.is_active:
+                    return
+                phase = now - running.start_time
             if phase >= running.trajectory.duration:
                 # The motion has ended.
                 self.pending_stop = ''
