@@ -225,13 +225,15 @@ def towards(start, end, left):
 
 def seen_by(tracker, person):
     """Return what a tracker reports of a person."""
-    seen = SEEN[tracker](person)
+    return posture_of(SEEN[tracker](person), tracker not in ('azure_kinect', 'mediapipe'))
+
+
+def posture_of(seen, has_rotations=True):
+    """Return places and rotations by name as a posture."""
     return Posture(
         names=tuple(seen),
         positions=np.array([position for position, _ in seen.values()]),
-        rotations=None
-        if tracker in ('azure_kinect', 'mediapipe')
-        else np.array([rotation for _, rotation in seen.values()]),
+        rotations=np.array([rotation for _, rotation in seen.values()]) if has_rotations else None,
     )
 
 
@@ -272,6 +274,30 @@ def xsens(person):
         segments |= {f'{side.title()}{name}': f'{side} {frame}' for name, frame in joints.items()}
     seen = {name: (person.at(frame), person.frames[frame][0]) for name, frame in segments.items()}
     return {**seen, 'T8': (person.at('thorax', [-0.06, 0.0, 0.0]), person.frames['thorax'][0])}
+
+
+def xsens_bvh(person):
+    """Return the same as joints in frames with x left, y up and z forward, by other names."""
+    turned, seen = np.column_stack([Y, Z, X]), {}
+    names = {'UpperArm': 'Shoulder', 'ForeArm': 'Elbow', 'Hand': 'Wrist', 'Foot': 'Ankle'}
+    names |= {'UpperLeg': 'Hip', 'LowerLeg': 'Knee', 'Pelvis': 'Hips', 'T8': 'Chest4'}
+    for segment, (place, rotation) in xsens(person).items():
+        side = next((side for side in ('Left', 'Right') if segment.startswith(side)), '')
+        name = segment.removeprefix(side)
+        seen[side + names.get(name, name)] = place, rotation @ turned
+    return seen
+
+
+def plates(person):
+    """Return rigid bodies on chest, upper arms and hands, placed as docs/trackers.md advises."""
+    seen = {'chest': (person.at('base', [-0.1, 0.0, 0.0]), person.frames['base'][0])}
+    for side, sign in SIDES:
+        hanging = turn(X, 90 * sign)
+        upper, hand = (person.frames[f'{side} {p}'][0] @ hanging for p in ('upper arm', 'hand'))
+        middle = 0.5 * (person.at(f'{side} upper arm') + person.at(f'{side} forearm'))
+        seen[f'{side}_arm'] = middle + upper @ [0.0, 0.05 * sign, 0.0], upper
+        seen[f'{side}_hand'] = person.at(f'{side} hand') + hand @ [0.0, 0.0, -0.05], hand
+    return seen
 
 
 def cmu_bvh(person):
@@ -360,6 +386,7 @@ SEEN = {
     'azure_kinect': azure_kinect,
     'mediapipe': mediapipe,
     'xsens': xsens,
+    'xsens_bvh': xsens_bvh,
     'cmu_bvh': cmu_bvh,
     'ros4hri': ros4hri,
     'tum_bvh': tum_bvh,

@@ -23,10 +23,12 @@ from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
 from visualization_msgs.msg import MarkerArray
 
 NAME = 'body_boxes_node'
+# Stamps have seconds of 32 bits [ns].
+MOST_STAMP = 2**31 * NANOSECONDS
 
 
 class BodyBoxesNode(Node):
-    """Publishes the boxes of each posture that comes, in the base frame, with its stamp."""
+    """Publishes the boxes of each posture that comes, in the base frame, with its own stamp."""
 
     def __init__(self, **options: Any) -> None:
         """Declare parameters and interfaces; bad values raise, naming the parameter."""
@@ -45,7 +47,10 @@ class BodyBoxesNode(Node):
         self._reporter.received()
         try:
             tracked = read()
-            # Without a stamp it is as old as it is here.
+            if not 0 <= tracked.stamp < MOST_STAMP:
+                raise MessageError(
+                    f'header.stamp: {tracked.stamp / NANOSECONDS:g} s, expected a time since 1970'
+                )
             measured = tracked.stamp or self.get_clock().now().nanoseconds
             msg, lost = self._boxes_of(tracked, measured)
         except (MessageError, SceneError) as problem:
@@ -57,7 +62,11 @@ class BodyBoxesNode(Node):
     def _boxes_of(
         self, tracked: TrackedPosture, measured: int
     ) -> tuple[MarkerArray, tuple[str, ...]]:
-        """Return the boxes of a posture measured at a time [ns], and the parts that are lost."""
+        """
+        Return the boxes of a posture, and the parts that are lost.
+
+        measured: its stamp; without one, the time of its reception [ns].
+        """
         settings = self._settings
         self._before = without_jumps(
             self._before, tracked.posture, measured / NANOSECONDS, settings.max_jump
@@ -70,7 +79,8 @@ class BodyBoxesNode(Node):
             )
         # A tracker that reports in the base frame has its own name for it.
         own = tracked.frame if settings.skeleton.base is None else ''
-        stamp = Time(nanoseconds=measured).to_msg()
+        # One that is not set is handed on as such: whoever receives it adds the tracker's latency.
+        stamp = Time(nanoseconds=tracked.stamp).to_msg()
         return self._markers.message(scene, own or settings.base_frame, stamp), lost
 
 

@@ -25,7 +25,15 @@ def changed(folder, name, change):
 
 
 def test_all_ready_made_ones_are_there():
-    assert READY == ['azure_kinect', 'cmu_bvh', 'mediapipe', 'ros4hri', 'tum_bvh', 'xsens']
+    assert READY == [
+        'azure_kinect',
+        'cmu_bvh',
+        'mediapipe',
+        'ros4hri',
+        'tum_bvh',
+        'xsens',
+        'xsens_bvh',
+    ]
 
 
 @pytest.mark.parametrize('name', READY)

@@ -29,10 +29,11 @@ from rrth_planner.io.skeleton_file import load_skeleton  # noqa: E402
 from rrth_planner.model.rotation import quaternion_xyzw  # noqa: E402
 from rrth_planner.ros import body_boxes_node  # noqa: E402
 from rrth_planner.ros.body_boxes_node import BodyBoxesNode  # noqa: E402
-from rrth_planner.ros.interface import tracker_reporter  # noqa: E402
+from rrth_planner.ros.interface import posture_inputs, tracker_reporter  # noqa: E402
 from rrth_planner.ros.interface.posture_inputs import points_of  # noqa: E402
 from rrth_planner.ros.messages import frames  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody  # noqa: E402
+from rrth_planner.ros.messages.marker_edits import measured_at, read_edits  # noqa: E402
 from rrth_planner.ros.messages.tracked_person import points_to_msg, poses_to_msg  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.wearer.body_boxes import body_boxes  # noqa: E402
@@ -57,6 +58,7 @@ TRACKERS = [
     ('mediapipe', 'poses'),
     ('xsens', 'poses'),
     ('cmu_bvh', 'poses'),
+    ('xsens_bvh', 'poses'),
     ('xsens', 'bodies'),
     ('tum_bvh', 'bodies'),
     ('ros4hri', 'bodies'),
@@ -306,15 +308,29 @@ def test_joint_states_of_a_person_with_a_urdf_become_boxes(start):
     assert parts - seen == {'left forearm', 'left hand'}
 
 
-def test_without_a_stamp_boxes_have_the_time_of_reception(start):
-    tracker = start('azure_kinect', 'markers')
-    before = tracker.get_clock().now()
-    tracker.send(person_of('azure_kinect'), 0)
+@pytest.mark.parametrize(('name', 'source'), [('azure_kinect', 'markers'), ('xsens', 'poses')])
+def test_without_a_stamp_the_planner_counts_the_latency_of_the_tracker(start, name, source):
+    tracker = start(name, source)
+    tracker.send(person_of(name), 0)
     wait_until(lambda: tracker.boxes)
-    stamp = RosTime.from_msg(
-        tracker.boxes[0].markers[0].header.stamp, clock_type=before.clock_type
-    )
-    assert before <= stamp <= tracker.get_clock().now()
+    edits = read_edits(tracker.boxes[0], 1e9, 'torso', latency=0.15)
+    assert measured_at(edits, 0.0) == 1e9 - 0.15
+    wait_until(lambda: float(tracker.figures.get('age of the last measurement [s]') or 'inf') < 30)
+
+
+@pytest.mark.parametrize('stamp', [-(10**9), (2**31 - 1) * 10**9 + 2 * 10**9])
+def test_a_stamp_that_is_no_time_is_rejected_and_forgotten(start, stamp):
+    tracker = start('xsens', 'poses')
+    posture = person_of('xsens')
+    expect(tracker.hear(posture, NOW), tracker.skeleton, posture)
+    sec = stamp // 10**9
+    msg = poses_to_msg(posture, tracker.skeleton, 'camera', stamp_of(NOW))
+    msg.header.stamp = Time(sec=min(sec, 2**31 - 1), nanosec=2**31 if sec > 0 else 0)
+    tracker.publishers_of['poses'].publish(msg)
+    tracker.wait_for_rejection(r'header\.stamp: .* s, expected a time since 1970')
+    # The next jump is still held back.
+    far = moved(posture, 'LeftHand', 0.5)
+    expect(tracker.hear(far, NOW + STEP), tracker.skeleton, posture)
 
 
 def test_the_log_says_what_is_waited_for_and_when_the_first_body_is_published(start):
@@ -437,6 +453,32 @@ def test_a_rigid_body_that_is_lost_delays_no_other(start):
     expect(tracker.hear(posture, NOW + 10 * STEP), tracker.skeleton, posture)
 
 
+def test_rigid_bodies_whose_stamps_never_fit_are_named(start):
+    tracker = start('tum_bvh', 'bodies')
+    posture = person_of('tum_bvh')
+    last = points_of(tracker.skeleton)[-1]
+
+    def part_of(names):
+        chosen = [posture.names.index(name) for name in names]
+        return Posture(
+            names=tuple(names),
+            positions=posture.positions[chosen],
+            rotations=posture.rotations[chosen],
+        )
+
+    others = [name for name in points_of(tracker.skeleton) if name != last]
+    for k in range(15):
+        for names, stamp in ((others, NOW + k * STEP), ([last], NOW + k * STEP + 3_000_000)):
+            tracker.send(part_of(names), stamp)
+            wait_until(
+                lambda n=names, s=stamp: all(
+                    tracker.node._input._measured.get(one) == s for one in n
+                )
+            )
+    tracker.wait_for_rejection('stamps of the rigid bodies .* ms apart, expected at most 2 ms')
+    assert not tracker.boxes
+
+
 def test_rigid_bodies_of_two_measurements_are_not_mixed(start):
     tracker = start('tum_bvh', 'bodies')
     posture = person_of('tum_bvh')
@@ -465,6 +507,18 @@ def test_rigid_bodies_of_two_measurements_are_not_mixed(start):
     )
     expect(tracker.wait_for(NOW + 2 * STEP), tracker.skeleton, later)
     assert len(tracker.boxes) == 2
+
+
+@pytest.mark.usefixtures('tf')
+def test_where_tf_lacks_the_frame_of_the_chest_that_is_said(start, monkeypatch):
+    monkeypatch.setattr(posture_inputs, 'LONGEST_UNKNOWN', 0.1)
+    tracker = start('xsens', 'tf')
+    posture = person_of('xsens')
+    others = [name for name in posture.names if name != 'T8']
+    FakeBuffer.poses.update({name: np.eye(4) for name in others})
+    FakeBuffer.times.update(dict.fromkeys(others, NOW))
+    tracker.wait_for_rejection('frame "Pelvis", expected a frame that TF knows')
+    expect(tracker.hear(posture, NOW + STEP), tracker.skeleton, posture)
 
 
 @pytest.mark.usefixtures('tf')

@@ -63,6 +63,12 @@ def test_markers_are_the_points_of_one_person():
 def test_of_markers_with_several_stamps_the_oldest_counts():
     array = markers(sphere(0, stamp=Time(sec=13)), sphere(1))
     assert posture_from_markers(array, NAMES).stamp == NANOSECONDS
+    # One without a stamp makes the others no younger.
+    assert posture_from_markers(markers(sphere(0), sphere(1, stamp=Time())), NAMES).stamp == (
+        NANOSECONDS
+    )
+    unknown = markers(sphere(0, stamp=Time()), sphere(1, stamp=Time()))
+    assert posture_from_markers(unknown, NAMES).stamp == 0
 
 
 @pytest.mark.parametrize(

@@ -37,11 +37,14 @@ from visualization_msgs.msg import MarkerArray
 
 # Poses of rigid bodies whose stamps differ by at most this are of one measurement [ns].
 SAME_MEASUREMENT = 2_000_000
+APART = 'stamps of the rigid bodies {:.1f} ms apart, expected at most 2 ms in one measurement'
 # Messages whose stamps are so much older than the last ones are late; older ones are of a clock
 # that was set back [ns].
 LATE = round(LONGEST_GAP * NANOSECONDS)
 # A frame or body that is not heard of for so long is lost: others do not wait for it [ns].
 LONGEST_BEHIND = 100_000_000
+# TF that has known none of the frames for so long is reported [s].
+LONGEST_UNKNOWN = 1.0
 
 # Takes what reads a posture, or raises MessageError, and the time of arrival [ns].
 Take = Callable[[Callable[[], TrackedPosture], int], None]
@@ -132,8 +135,8 @@ class BodyInput:
         """Subscribe."""
         self._node, self._take = node, take
         self._names = points_of(parameters.skeleton)
-        # Of measurements that are not complete, by when they were [ns]: poses, and frames of them.
-        self._open: dict[int, tuple[dict[str, Any], set[str]]] = {}
+        # Of measurements that are not complete, by when they were [ns]: messages by body.
+        self._open: dict[int, dict[str, Any]] = {}
         # When each body was measured last, and when the last measurement was that is complete.
         self._measured: dict[str, int] = {}
         self._last = 0
@@ -164,23 +167,30 @@ class BodyInput:
         if -SAME_MEASUREMENT <= self._last - stamp < LATE:
             # It has been handed on without this one, or a newer one has.
             return
+        n_open = len(self._open)
         self._open = {t: found for t, found in self._open.items() if abs(stamp - t) < LATE}
+        behind = max(abs(stamp - t) for t in self._measured.values())
+        if len(self._open) < n_open and behind <= LONGEST_BEHIND:
+            # All are heard, and none of their measurements gets complete.
+            _reject(self._take, MessageError(APART.format(1e-6 * behind)))
         time_of = next((t for t in self._open if abs(stamp - t) <= SAME_MEASUREMENT), stamp)
-        poses, frames = self._open.setdefault(time_of, ({}, set()))
-        poses[name] = msg.pose
-        frames.add(msg.header.frame_id)
+        found = self._open.setdefault(time_of, {})
+        found[name] = msg
         if all(
-            other in poses or abs(stamp - t) > LONGEST_BEHIND
+            other in found or abs(stamp - t) > LONGEST_BEHIND
             for other, t in self._measured.items()
         ):
             self._last = time_of
             self._open = {t: found for t, found in self._open.items() if t > time_of}
-            self._take(lambda: self._read(poses, frames, time_of), arrival.received)
+            self._take(lambda: self._read(found, time_of), arrival.received)
 
-    def _read(self, poses: Mapping[str, Any], frames: set[str], stamp: int) -> TrackedPosture:
+    def _read(self, found: Mapping[str, Any], time_of: int) -> TrackedPosture:
+        frames = {msg.header.frame_id for msg in found.values()}
         if len(frames) > 1:
             raise MessageError(f'frames {sorted(frames)}, expected one for all rigid bodies')
-        return TrackedPosture(posture_of_poses(poses, self._names), stamp, *frames)
+        has_stamps = all(nanoseconds_of(msg.header.stamp) for msg in found.values())
+        posture = posture_of_poses({name: msg.pose for name, msg in found.items()}, self._names)
+        return TrackedPosture(posture, time_of if has_stamps else 0, *frames)
 
 
 class JointInput:
@@ -233,16 +243,26 @@ class TransformInput:
         if not self._frames.is_available:
             raise OptionsError('input: tf, expected where tf2_ros is installed (a system ROS)')
         self._last = 0
+        # When something was known last, or it was reported that nothing is [s].
+        self._known = time.monotonic()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0 / parameters.rate, self._look_up, clock=steady)
 
     def _look_up(self) -> None:
         """Hand on what is newer than the last time."""
-        arrived, times = time.time_ns(), {}
+        arrived, times, problem = time.time_ns(), {}, None
         for name in self._names:
             if name != self._reference:
-                with suppress(FrameError):
+                try:
                     times[name] = self._frames.newest(name)
+                except FrameError as error:
+                    problem = problem or error
+        if problem is None or times:
+            self._known = time.monotonic()
+        elif time.monotonic() - self._known > LONGEST_UNKNOWN:
+            # Its own frame may be what is missing, or has another name.
+            self._known = time.monotonic()
+            _reject(self._take, problem)
         newest = max(times.values(), default=0)
         # Those that are fixed are known at all times.
         seen = {name for name, t in times.items() if t == 0 or newest - t <= LONGEST_BEHIND}

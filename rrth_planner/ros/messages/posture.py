@@ -44,7 +44,7 @@ def posture_from_markers(
     """
     Return the points of a person, SPHERE markers with the id `100 person + joint`.
 
-    Other markers are ignored. Of stamps that differ, the oldest counts.
+    Other markers are ignored. Of stamps that differ, the oldest counts, of those that are set.
 
     Parameters
     ----------
@@ -89,13 +89,14 @@ def posture_from_markers(
     frames = {marker.header.frame_id for marker in markers.values()}
     if len(frames) > 1:
         raise MessageError(f'frames {shown(sorted(frames))}, expected one for all joints')
+    stamps = [nanoseconds_of(marker.header.stamp) for marker in markers.values()]
     positions = np.full((len(names), 3), math.nan)
     for joint, marker in markers.items():
         p = marker.pose.position
         positions[joint] = p.x, p.y, p.z
     return TrackedPosture(
         Posture(names=tuple(names), positions=positions),
-        min(nanoseconds_of(marker.header.stamp) for marker in markers.values()),
+        min(filter(None, stamps), default=0),
         frames.pop(),
     )
 
