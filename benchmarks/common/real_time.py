@@ -42,6 +42,16 @@ def run_in_real_time(pid: int, priority: int = CONTROLLER) -> bool:
     return True
 
 
+def give_way() -> None:
+    """
+    Run this thread at ordinary priority.
+
+    To work for more than a second in real time would look like a stall of the machine: the kernel
+    (Linux 6.12 and later) gives 50 ms of each second to whatever else waits for the processor.
+    """
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
 @contextmanager
 def staying_off(threads: Sequence[int], others: Sequence[int] = ()) -> Iterator[None]:
     """Keep the last processor for some threads; others, and this process, stay off it."""

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from benchmarks.common.client import ros_client
 from benchmarks.common.random_draws import random_target
-from benchmarks.common.real_time import put_ahead, staying_off
+from benchmarks.common.real_time import give_way, put_ahead, staying_off
 from benchmarks.soak.body import BodyAt, BodyStream, scene_of_body, SWAY
 from benchmarks.soak.client import brakes_in, process_of, SoakClient, threads_of
 from benchmarks.soak.judge import EACH, FREE, judge_bytes, MARGIN, name_of, newest_before, RAY
@@ -226,7 +226,7 @@ def judge_all(
 
     progress = {'desc': 'judged', 'file': sys.stderr, 'mininterval': PROGRESS}
     with (
-        get_context('spawn').Pool() as pool,
+        get_context('spawn').Pool(initializer=give_way) as pool,
         tqdm(total=len(client.motions), unit='motion', **progress) as bar,
     ):
         words = pool.imap(judge_bytes, tasks(), chunksize=20)

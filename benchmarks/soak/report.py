@@ -38,6 +38,9 @@ MOST_STANDSTILLS = 40
 HEADER = ('what', 'target', 'measured', 'met')
 PICTURE = 'memory.png'
 METHOD = """\
+- **Without separation**, all of this: it shows what planning and monitor do by themselves. With
+  separation, the default, an arm is mostly too slow beside a person to come near him: what it
+  does then is in [separation.md](separation.md#how-it-was-tested).
 - **Plans**: the planner node is a process of its own, with `replan:=false`. The client
   publishes the body at 100 Hz from a thread, boxes that sway at no more than 5 cm/s, limbs
   behind the trunk, a new wearer every 1,000 plans. It asks back to back, each time for another
@@ -255,8 +258,8 @@ def _stillness(still: Standstills | None, begin: int, end: int) -> str:
     if still is None:
         return ''
     within, span = 1e-6 * still.within(begin, end), 1e-6 * (end - begin)
-    since = f' from {_time_of_day(begin)} on' if within else ''
-    return f' (the machine stalled for {within:.1f} of {span:.1f} ms{since})'
+    since = _time_of_day(begin)
+    return f' (from {since} on; the machine stalled for {within:.1f} of {span:.1f} ms)'
 
 
 def _percentiles(values: np.ndarray) -> list[str]:
