@@ -522,6 +522,34 @@ def test_joint_positions_age_from_their_stamp_on(start):
             assert ' s old, expected at most 1 s (joint_timeout)' in message
 
 
+def test_joint_states_that_waited_for_a_busy_node_are_all_taken_at_once(start, wait_until):
+    planner, stranger = start()
+    say_all(planner, stranger)
+    source, order = inputs_of(planner).joints, []
+    timer = planner.create_timer(0.001, lambda: order.append('another callback'))
+    accept = source.accept
+
+    def accepted(*arguments):
+        order.append('joint state')
+        return accept(*arguments)
+
+    source.accept = accepted
+
+    def are_taken_at_once():
+        # A busy machine may deliver some of them later.
+        order.clear()
+        n_good = source.n_good
+        planner.executor.create_task(lambda: time.sleep(0.3))
+        for _ in range(8):
+            stranger.publishers['joint_states'].publish(joints())
+        wait_until(lambda: source.n_good == n_good + 8)
+        begin = order.index('joint state')
+        return order[begin : begin + 8] == ['joint state'] * 8
+
+    assert any(are_taken_at_once() for _ in range(5))
+    planner.destroy_timer(timer)
+
+
 @pytest.mark.parametrize(
     ('option', 'value', 'answer'),
     [('max_samples', 100, 'PLANNING_FAILED (-1): '), ('time_limit', 0.05, 'TIMED_OUT (-6): ')],

@@ -76,12 +76,10 @@ class SceneMonitor:
         if self._frames.is_available:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
+        # The node may be busy for a while: what came meanwhile must not get old in a queue.
+        all_at_once: dict[str, Any] = {'takes_all': True}
         # The monitor waits for bodies.
-        fast: dict[str, Any] = {
-            'decode': fast_decoder(MarkerArray),
-            'takes_late': True,
-            'takes_all': True,
-        }
+        fast = {**all_at_once, 'decode': fast_decoder(MarkerArray), 'takes_late': True}
         self._subscriptions = [
             OpenSubscription(
                 node, kind, topic, take, partial(self._on_undecoded, source), on_error, **options
@@ -89,7 +87,7 @@ class SceneMonitor:
             for kind, topic, source, take, options in (
                 (MarkerArray, 'body_boxes', inputs.body, self._on_body, fast),
                 (PointStamped, 'target', inputs.target, self._on_target, {}),
-                (JointState, 'joint_states', inputs.joints, self._on_joints, {}),
+                (JointState, 'joint_states', inputs.joints, self._on_joints, all_at_once),
             )
         ]
 
