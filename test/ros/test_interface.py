@@ -199,18 +199,23 @@ def test_frames_that_tf_knows_are_transformed_and_others_named(start):
     assert message.isprintable()
 
 
-@pytest.mark.usefixtures('tf')
-def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypatch):
+def with_late_hat(start, monkeypatch):
+    """Publish a hat before its frame is known; return planner, stranger, hat and its stamp."""
     monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 1e6)
     planner, stranger = start()
     say_all(planner, stranger)
-    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
-    buffer = planner._scene_monitor._frames._buffer
     now = planner.get_clock().now()
     hat = box('hat', center=(0.0, 1.0, 0.7), size=(0.3, 0.2, 0.1), frame='camera')
     hat.header.stamp = now.to_msg()
-    out = stranger.publishers['body_boxes']
-    out.publish(array(hat))
+    stranger.publishers['body_boxes'].publish(array(hat))
+    return planner, stranger, hat, now
+
+
+@pytest.mark.usefixtures('tf')
+def test_a_body_waits_for_its_frame_and_those_after_it_wait_too(start, monkeypatch):
+    planner, stranger, hat, now = with_late_hat(start, monkeypatch)
+    body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
+    buffer, out = planner._scene_monitor._frames._buffer, stranger.publishers['body_boxes']
     out.publish(array(command(Marker.DELETE, 'hat'), box('pack', center=(-1.0, 0.0, -1.0))))
     stranger.wait_until(lambda: len(waiting) == 2)
     n_good, n_boxes = body.n_good, body.value.n_boxes
@@ -256,15 +261,9 @@ def test_what_measures_no_part_makes_no_body_younger(start):
 
 @pytest.mark.usefixtures('tf')
 def test_what_is_no_body_stands_rejected_though_one_before_it_is_read_later(start, monkeypatch):
-    monkeypatch.setattr(scene_monitor, 'LONGEST_WAIT', 1e6)
-    planner, stranger = start()
-    say_all(planner, stranger)
+    planner, stranger, hat, now = with_late_hat(start, monkeypatch)
     body, waiting = inputs_of(planner).body, planner._scene_monitor._waiting
-    now = planner.get_clock().now()
-    hat = box('hat', center=(0.0, 1.0, 0.7), size=(0.3, 0.2, 0.1), frame='camera')
-    hat.header.stamp = now.to_msg()
     out = stranger.publishers['body_boxes']
-    out.publish(array(hat))
     out.publish(b'\0\1\0\0' + b'\xff' * 40)
     stranger.wait_until(lambda: len(waiting) == 1 and body.is_last_rejected)
     n_good, measured = body.n_good, body.measured
