@@ -33,15 +33,17 @@ class Flood(ChildProcess):
         What is published.
     folder : Path
         For its bytes, and the file that it is counted in.
+    rate : float
+        Messages in a second [Hz]; inf: as many as the process can.
 
     """
 
-    def __init__(self, topic: str, message: Any, folder: Path) -> None:
+    def __init__(self, topic: str, message: Any, folder: Path, rate: float = RATE) -> None:
         """Count from 0."""
         data, counter = folder / 'message', folder / 'counter'
         data.write_bytes(serialize_message(message))
         self._count = np.memmap(counter, dtype=np.int64, mode='w+', shape=())
-        arguments = [type_name(type(message)), topic, str(data), str(counter)]
+        arguments = [type_name(type(message)), topic, str(data), str(counter), str(rate)]
         super().__init__('benchmarks.common.flood', arguments, lambda _: None)
 
     @property
@@ -51,8 +53,8 @@ class Flood(ChildProcess):
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Publish until it is interrupted: type, topic, a file with the message, one that counts."""
-    kind, topic, data, counter = arguments
+    """Publish until it is interrupted: type, topic, a file with the message, a counter, rate."""
+    kind, topic, data, counter, rate = arguments
     rclpy.init()
     profile = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
     publisher = Node('flood').create_publisher(type_of_name(kind), topic, profile)
@@ -63,7 +65,7 @@ def main(arguments: Sequence[str]) -> None:
         publisher.publish(message)
         count[...] += 1
         now = time.monotonic()
-        due = max(due + 1.0 / RATE, now - LATE)
+        due = max(due + 1.0 / float(rate), now - LATE)
         if due > now:
             time.sleep(due - now)
 

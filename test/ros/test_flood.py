@@ -1,19 +1,17 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Another process writes to a topic 2000 times a second; requests are answered as before."""
+"""Another process writes to a topic as often as it can; requests are answered."""
 
+import math
 import os
 import sys
-import time
 
-import numpy as np
-import psutil
 import pytest
 
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from benchmarks.common.flood import Flood, RATE  # noqa: E402
+from benchmarks.common.flood import Flood  # noqa: E402
 from conftest import send, spinning, wait_until  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
@@ -32,18 +30,10 @@ TOPICS = {
     'joint_states': (JointState, samples.joints),
 }
 NODE = 'rrth_planner.ros.planner_node'
-# The clock of processor time ticks only a hundred times a second, so many requests are counted
-# without a flood. Under a flood, two requests may meet a machine that stands still.
-N_QUIET, N_FLOODED, N_STILL = 100, 25, 2
-# So many times the work of a request without a flood may the node do until it answers one under
-# a flood, in the mean and the worst: it reads what came until then (7 and 10 times on a quiet
-# machine), while a request that a flood holds up costs the second that the barrier waits for it,
-# 160 times. By a clock, or in messages of the flood, it would be the machine that is tested, and
-# what it does besides.
-MEAN, WORST = 15.0, 40.0
-# Where other processes leave the node too little of a processor, all it has goes to the flood for
-# a while: it has to answer in time in one of so many rounds.
-N_ROUNDS = 4
+# Requests while a topic is flooded. One that waited until nothing is left to be read would be
+# answered that the node is busy. How long answers take is judged by the soak: by a clock, it would
+# be the machine that is tested here. So many messages are published before.
+N_REQUESTS, N_MESSAGES = 50, 2000
 
 
 @pytest.fixture(name='client', scope='module')
@@ -74,51 +64,35 @@ def _planner(ros_context, udp):
         yield child
 
 
-def work_of_answers(client, planner, n, check):
-    """Return the processor time that the planner took for each of so many answers [s]."""
-    process, works = psutil.Process(planner.pid), []
-    for _ in range(n):
-        begin = processor_time(process)
-        future = client.plan.call_async(Trigger.Request())
-        wait_until(future.done)
-        works.append(processor_time(process) - begin)
-        assert future.result().success, future.result().message
-        check()
-        planner.check()
-        time.sleep(0.02)
-    return np.array(works)
-
-
-@pytest.fixture(name='quiet', scope='module')
-def _quiet(client, planner):
-    """Give the mean processor time of an answer without a flood [s], once all inputs are there."""
+@pytest.fixture(name='inputs', scope='module')
+def _inputs(client, planner):
+    """Send all inputs once."""
     with spinning(client):
         wait_until(client.plan.service_is_ready, 120.0)
         for name, (_, make) in TOPICS.items():
             send(client, client.publishers_of[name], make())
-        # The first request finds nothing loaded.
-        work_of_answers(client, planner, N_FLOODED, lambda: None)
-        return work_of_answers(client, planner, N_QUIET, lambda: None).mean()
+        ask(client, planner)
 
 
+def ask(client, planner):
+    """Request a plan, which succeeds."""
+    future = client.plan.call_async(Trigger.Request())
+    wait_until(future.done)
+    assert future.result().success, future.result().message
+    planner.check()
+
+
+@pytest.mark.usefixtures('inputs')
 @pytest.mark.parametrize('topic', TOPICS)
 def test_requests_are_answered_while_a_topic_is_flooded(
-    client, planner, quiet, monkeypatch, tmp_path, topic
+    client, planner, monkeypatch, tmp_path, topic
 ):
     monkeypatch.setenv('PYTHONPATH', os.pathsep.join(sys.path))
-    with spinning(client), Flood(f'/flooded/{topic}', TOPICS[topic][1](), tmp_path) as flood:
-        wait_until(lambda: flood.count > RATE)
+    message = TOPICS[topic][1]()
+    with spinning(client), Flood(f'/flooded/{topic}', message, tmp_path, math.inf) as flood:
+        wait_until(lambda: flood.count > N_MESSAGES)
         begin = flood.count
-        for _ in range(N_ROUNDS):
-            works = work_of_answers(client, planner, N_FLOODED, flood.check)
-            flooded = np.sort(works)[:-N_STILL]
-            if flooded.mean() <= MEAN * quiet and flooded[-1] <= WORST * quiet:
-                break
+        for _ in range(N_REQUESTS):
+            ask(client, planner)
+            flood.check()
         assert flood.count > begin
-    assert 0.0 < flooded.mean() <= MEAN * quiet, (quiet, flooded)
-    assert flooded[-1] <= WORST * quiet, (quiet, flooded)
-
-
-def processor_time(process):
-    times = process.cpu_times()
-    return times.user + times.system
