@@ -26,6 +26,7 @@ from rrth_planner.kernels.kept_code import (
     private_folder,
     use_slim_libraries,
 )
+from rrth_planner.kernels.type_resolution import resolving_once
 
 # Read-only types accept writable arrays too, and the compiler rejects writes to them:
 # a signature distinguishes inputs (VEC, MAT) from outputs (OUT_...). Edge checks take what
@@ -214,6 +215,8 @@ def kernel(
         'fastmath': {'contract', 'arcp', 'nsz'},
         'no_cfunc_wrapper': signature not in SEAMS,
         'no_cpython_wrapper': is_inner,
+        # They fuse expressions of whole arrays, which kernels do not have.
+        'no_rewrites': True,
     }
 
     def decorate(function: Callable[..., Any]) -> Any:
@@ -226,7 +229,7 @@ def kernel(
                 _announce(function)
             else:
                 compiled._cache = KeptCode(function, is_inlined, _folder, _announce, _give_up)
-            with calling_by_name():
+            with calling_by_name(), resolving_once():
                 compiled.compile(signature)
             compiled.disable_compile()
             if is_inner:

@@ -215,6 +215,13 @@ class SlimLibrary(JITCodeLibrary):
         if entry:
             self._long[entry] = self
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Leave it to what optimizes the module as a whole, once all that it calls is in it."""
+        if self._is_calling_by_name:
+            ll_module.data_layout = self._codegen._data_layout
+        else:
+            super()._optimize_functions(ll_module)
+
     def add_linking_library(self, library: Any) -> None:
         """Add what is called: by name, or its code, with that of all that it calls."""
         library._ensure_finalized()
