@@ -33,7 +33,7 @@ def pieces(a, b):
     out = np.empty(2)
     out[0], out[1] = first[0] // 2, second[1] % 3
     out[:1] += 1
-    return out[0], pair[1][0], -out[1] ** 2, 1 << b[0], int(a[0]) & b[1]
+    return out[0], pair[1][0], -(out[1] ** 2), 1 << b[0], int(a[0]) & b[1]
 
 
 def lists(a, b):
