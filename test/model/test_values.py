@@ -3,6 +3,7 @@
 """Values reject what describes nothing, in one sentence, and cannot be changed."""
 
 from dataclasses import FrozenInstanceError
+import pickle
 import warnings
 
 from hypothesis import given, strategies as st
@@ -425,6 +426,22 @@ def test_every_array_of_every_value_is_read_only():
                 setattr(value, name, part)
         assert n_arrays > 0
     assert isinstance(Scene(list(wearer().boxes)).boxes, tuple)
+
+
+@pytest.mark.parametrize('scene', [wearer(), Scene(())])
+def test_a_scene_is_sent_to_another_process_as_it_is(scene):
+    sent = pickle.loads(pickle.dumps(scene))
+    assert [box.name for box in sent.boxes] == [box.name for box in scene.boxes]
+    assert sent.numbers.tobytes() == scene.numbers.tobytes()
+    for one, other in zip(sent.boxes, scene.boxes, strict=True):
+        for name in ('center', 'size', 'rotation', 'numbers'):
+            values = getattr(one, name)
+            np.testing.assert_array_equal(values, getattr(other, name))
+            assert not values.flags.writeable
+            assert values.flags.aligned
+            with pytest.raises(ValueError, match='read-only|WRITEABLE'):
+                values.setflags(write=True)
+                values[...] = 0.0
 
 
 def test_the_paper_arm_is_the_one_in_the_package():
