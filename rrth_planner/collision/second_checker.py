@@ -4,17 +4,24 @@
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice, pairwise
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from rrth_planner.collision.bar_pairs import pairs_of
 from rrth_planner.collision.distance_library import DOUBT
-from rrth_planner.collision.distance_objects import boxes_of, PlacedBar, PlacedPair
+from rrth_planner.collision.distance_objects import (
+    boxes_of,
+    PlacedBar,
+    PlacedPair,
+    PlacedPart,
+    placements,
+)
 from rrth_planner.collision.violation import Violation
-from rrth_planner.model.arm import ArmModel, bars_of, forward_kinematics, is_called
+from rrth_planner.model.arm import ArmModel, bars_of, is_called
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Box, Scene
@@ -43,14 +50,12 @@ def nearest(
     arm: ArmModel, scene: Scene, q: Array, ray_length: float, library: str = 'fcl'
 ) -> Violation:
     """Return the part of the arm and the box that are closest at q, shape (dof,)."""
-    boxes, poses = boxes_of(scene, library), forward_kinematics(arm, q)
-    least, where = math.inf, ('', '')
-    for k in range(len(bars_of(arm))):
-        bar = PlacedBar(arm, k, ray_length, library)
-        distance, box = bar.nearest(boxes, _unknown(arm, scene, bar.name), q, poses)
-        if distance < least:
-            least, where = distance, (bar.name, box)
-    return Violation(0.0, least, *where)
+    boxes = boxes_of(scene, library)
+    bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
+    placed = placements(arm, bars, q[None], [0] * len(bars))
+    found = [(bar.nearest(boxes, _unknown(arm, scene, bar.name), placed, q), bar) for bar in bars]
+    (distance, box), bar = min(found, key=lambda one: one[0][0])
+    return Violation(0.0, distance, bar.name, box)
 
 
 def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_length: float) -> Array:
@@ -81,8 +86,7 @@ def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_lengt
     return np.array([np.interp(times, grid, bound) for bound in bounds])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Sample:
+class _Sample(NamedTuple):
     """
     The distances of a bar at an instant, given by its index.
 
@@ -91,28 +95,23 @@ class _Sample:
     distances of the boxes [m].
     """
 
-    index: int
+    instant: int
     displacement: float
     free: float
-    bounds: Array
-
-    def bounds_at(self, displacement: float) -> Array:
-        """Return lower bounds of the distances of the boxes at another displacement [m]."""
-        return self.bounds - abs(displacement - self.displacement)
+    bounds: list[float]
 
 
-def _unknown(arm: ArmModel, scene: Scene, bar: str) -> Array:
+def _unknown(arm: ArmModel, scene: Scene, bar: str) -> list[float]:
     """Return what is known of the distances of a bar from boxes: it may meet some, (m,) [m]."""
-    bounds = np.full(len(scene.boxes), -math.inf)
-    for part, name in arm.allowed:
-        if part == bar:
-            bounds[[is_called(box.name, name) for box in scene.boxes]] = math.inf
-    return bounds
+    allowed = [name for part, name in arm.allowed if part == bar]
+    return [
+        math.inf if any(is_called(box.name, name) for name in allowed) else -math.inf
+        for box in scene.boxes
+    ]
 
 
-_Part = PlacedBar | PlacedPair
 # A bar, or a pair, and two samples of it; whether it is free between them is open.
-_Gap = tuple[_Part, _Sample, _Sample]
+_Gap = tuple[PlacedPart, _Sample, _Sample]
 
 
 class _Advancement:
@@ -133,40 +132,46 @@ class _Advancement:
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
         self.displacements = displacements(arm, trajectory, self._times, ray_length)
         self.bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
-        self.parts: list[_Part] = [*self.bars]
+        self.parts: list[PlacedPart] = [*self.bars]
         self.parts += [
             PlacedPair(arm, pair, len(self.bars) + n, ray_length, library)
             for n, pair in enumerate(pairs_of(arm))
         ]
-        unknown = [_unknown(arm, scene, bar.name) for bar in self.bars]
-        # Of a pair there are no boxes.
-        self._unknown = unknown + [np.empty(0)] * (len(self.parts) - len(self.bars))
+        # The boxes do not matter to a pair.
+        self._unknown = np.array([_unknown(arm, scene, part.name) for part in self.parts])
         self.violation: Violation | None = None
 
-    def take(self, wanted: Sequence[tuple[_Part, int, tuple[_Sample, ...]]]) -> list[_Sample]:
+    def take(self, wanted: Sequence[tuple[PlacedPart, int, tuple[_Sample, ...]]]) -> list[_Sample]:
         """Return samples of bars at some instants; others: samples whose bounds carry over."""
-        q = positions_at(self._trajectory, self._times[[index for _, index, _ in wanted]])
-        poses = forward_kinematics(self._arm, q)
+        parts, indices, others = zip(*wanted, strict=True)
+        instants = sorted(set(indices))
+        q = positions_at(self._trajectory, self._times[instants])
+        places = [instants.index(index) for index in indices]
+        placed = placements(self._arm, parts, q, places)
+        ks = [part.k for part in parts]
+        moved, bounds = self.displacements[ks, indices], self._unknown[ks]
+        for side in zip(*others, strict=True):
+            since = np.abs(moved - [other.displacement for other in side])
+            bounds = np.maximum(
+                bounds, np.array([other.bounds for other in side]) - since[:, None]
+            )
         samples = []
-        for (bar, index, others), one_q, one_poses in zip(wanted, q, poses, strict=True):
-            moved = float(self.displacements[bar.k, index])
-            bounds = self._unknown[bar.k]
-            for other in others:
-                bounds = np.maximum(bounds, other.bounds_at(moved))
-            bounds = bounds.copy()
-            distance, box = bar.nearest(self._boxes, bounds, one_q, one_poses)
+        for part, index, place, way, known in zip(
+            parts, indices, places, moved.tolist(), bounds.tolist(), strict=True
+        ):
+            distance, box = part.nearest(self._boxes, known, placed, q[place])
             # Of itself the arm only has to be clear.
-            margin = self._margin if bar.k < len(self.bars) else 0.0
+            margin = self._margin if part.k < len(self.bars) else 0.0
             if distance < margin - TOLERANCE and (self.violation is None or index < self.last):
                 # Later instants need not be checked any more.
                 self.last = index
                 self.violation = Violation(
-                    float(self._times[index]), distance, bar.name, box, bar.k >= len(self.bars)
+                    float(self._times[index]), distance, part.name, box, part.k >= len(self.bars)
                 )
-            samples.append(_Sample(index, moved, max(0.0, distance - margin - DOUBT), bounds))
+            samples.append(_Sample(index, way, max(0.0, distance - margin - DOUBT), known))
         return samples
 
-    def parts_at_end(self, reach: float) -> list[_Part]:
+    def parts_at_end(self, reach: float) -> list[PlacedPart]:
         """Return the pointing ray as far as the target [m], and its pairs: for the end alone."""
         ray = self.bars[-1].k
         return [
@@ -182,13 +187,13 @@ class _Advancement:
         """Return where to sample next in a gap; nowhere when its ends prove it free."""
         bar, before, after = gap
         begin, end = before.displacement + before.free, after.displacement - after.free
-        room = after.index - before.index - 1
-        if begin >= end or room == 0 or before.index >= self.last:
+        room = after.instant - before.instant - 1
+        if begin >= end or room == 0 or before.instant >= self.last:
             return []
         # As many samples as are needed if the bar keeps its distance from the boxes.
         n = math.ceil(min(MAX_SAMPLES, room, (end - begin) / (before.free + after.free + 1e-9)))
         step = (end - begin) / n
-        moved, low, high = self.displacements[bar.k], before.index + 1, after.index - 1
+        moved, low, high = self.displacements[bar.k], before.instant + 1, after.instant - 1
         return sorted({bisect_left(moved, begin + (j + 0.5) * step, low, high) for j in range(n)})
 
 
@@ -293,8 +298,8 @@ def _entered(
     grown = [
         Box(box.name, box.center, box.size + 2.0 * radius, box.rotation) for box in scene.boxes
     ]
-    distances = np.full(len(grown), -math.inf)
+    distances = [-math.inf] * len(grown)
     ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length, library)
-    ray.nearest(boxes_of(Scene(tuple(grown)), library), distances, q, forward_kinematics(arm, q))
-    found: NDArray[np.bool_] = distances <= DOUBT
-    return found
+    boxes = boxes_of(Scene(tuple(grown)), library)
+    ray.nearest(boxes, distances, placements(arm, [ray], q[None], [0]), q)
+    return np.array(distances) <= DOUBT

@@ -180,12 +180,13 @@ def plan_question(
         if question.rules is not None:
             paths.insert(0, quickest_path(question, world, q_from, found.path))
         for path in dict.fromkeys(paths):
-            timed = time_path(question, world, path, lead, escape, should_stop)
+            reach = reach_to(arm, question.goal.target, path.waypoints[-1])
+            timed = time_path(question, world, path, lead, escape, reach, should_stop)
             if not isinstance(timed, Rejection):
                 break
         if isinstance(timed, Trajectory):
             found = replace(found, path=path)
-            return _solved(question, world, found, timed, begin, escape)
+            return _solved(question, world, found, timed, reach, begin, escape)
         if isinstance(timed, Disagreement):
             disagreement = timed
             rejection = Rejection(PlanStatus.NOT_CERTIFIED, timed.sentence(margin))
@@ -259,6 +260,7 @@ def _solved(
     world: World,
     result: PlanResult,
     trajectory: Trajectory,
+    reach: float,
     begin: float,
     escape: Escape | None,
 ) -> MotionPlan:
@@ -285,7 +287,7 @@ def _solved(
         path=path,
         trajectory=trajectory,
         clearance=clearance,
-        target_distance=reach_to(question.arm, question.goal.target, path.waypoints[-1]),
+        target_distance=reach,
         escape_time=escape_time,
         search=result,
     )

@@ -11,7 +11,6 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.trajectory_validation import violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import grown, World
-from rrth_planner.model.arm import reach_to
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
@@ -37,6 +36,7 @@ def time_path(
     path: Path,
     lead: LeadIn | None,
     escape: Escape | None,
+    reach: float,
     should_stop: Callable[[], bool],
 ) -> Trajectory | Disagreement | Rejection:
     """
@@ -52,6 +52,8 @@ def time_path(
         Precedes the path.
     escape : Escape or None
         The lead-in, where it is an escape.
+    reach : float
+        From the tool at the end of the path to the target [m].
     should_stop : callable
         Polled; True cancels.
 
@@ -94,7 +96,7 @@ def time_path(
         trajectory,
         question.margin,
         question.ray_guard_length,
-        reach_to(question.arm, question.goal.target, path.waypoints[-1]),
+        reach,
         escape_time,
         question.second_checker,
     )

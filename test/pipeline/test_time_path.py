@@ -56,7 +56,7 @@ def timed(path):
         ray_guard_length=RAY,
         seed=0,
     )
-    return time_path(question, WORLD, path, None, None, lambda: False)
+    return time_path(question, WORLD, path, None, None, 0.9 * RAY, lambda: False)
 
 
 def test_a_corner_without_room_is_a_stop_and_no_failure():
