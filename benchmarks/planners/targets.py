@@ -52,9 +52,9 @@ WHY_NOT: Mapping[str, str] = {
         'further, takes a millisecond and more.',
     ),
     'cold start of the node to service ready, p50': (
-        'Some 37 s of processor time for 169 kernels, in two processes: more than half of it '
-        'numba, the rest LLVM. More than a third of it is for the kernels that monitor and stop a '
-        'moving arm.'
+        'Nearly 170 kernels are compiled, in two processes: more than half of the time is '
+        "numba's own, the rest LLVM's. More than a third of it is for the kernels that monitor "
+        'and stop a moving arm.'
     ),
 }
 
