@@ -57,7 +57,7 @@ class PlacedBar:
     """
     One bar of an arm as a capsule, placed by each distance query.
 
-    `pose` (4, 4): of the capsule, in frame number `frame`: 0, that of the mount, or a link's.
+    `pose` (4, 4): of the capsule, in frame number `frame`: 0 is the mount's, i that of link i.
     """
 
     def __init__(self, arm: ArmModel, k: int, ray_length: float, library: str) -> None:
@@ -99,7 +99,7 @@ class PlacedBar:
         return (self,)
 
     def place(self, placement: Placement, q: Array) -> Any:
-        """Return the object where it is at q (dof,): a sliding one as if it had not slid."""
+        """Return the object at q (dof,); the placement of one that slides is that at 0."""
         (turn, middle), item = placement, self._capsule.item
         if self._slide is not None:
             slid = float(q[self._slide])
@@ -148,7 +148,7 @@ def placements(
     """
     Yield where the bars of some parts are, each part at one of the configurations q (n, dof).
 
-    places: which, by its number, for each part.
+    places: for each part, the index of its configuration.
     """
     bars = [(bar, place) for part, place in zip(parts, places, strict=True) for bar in part.bars]
     frames = np.empty((len(q), arm.dof + 2, 4, 4))

@@ -55,7 +55,7 @@ def nearest(
     placed = placements(arm, bars, q[None], [0] * len(bars))
     found = [(bar.nearest(boxes, _unknown(arm, scene, bar.name), placed, q), bar) for bar in bars]
     (distance, box), bar = min(found, key=lambda one: one[0][0])
-    return Violation(0.0, distance, bar.name, box)
+    return Violation(0.0, distance, bar.name if box else '', box)
 
 
 def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_length: float) -> Array:
@@ -146,7 +146,8 @@ class _Advancement:
         parts, indices, others = zip(*wanted, strict=True)
         instants = sorted(set(indices))
         q = positions_at(self._trajectory, self._times[instants])
-        places = [instants.index(index) for index in indices]
+        place_of = {index: place for place, index in enumerate(instants)}
+        places = [place_of[index] for index in indices]
         placed = placements(self._arm, parts, q, places)
         ks = [part.k for part in parts]
         moved, bounds = self.displacements[ks, indices], self._unknown[ks]

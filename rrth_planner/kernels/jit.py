@@ -215,7 +215,8 @@ def kernel(
         'fastmath': {'contract', 'arcp', 'nsz'},
         'no_cfunc_wrapper': signature not in SEAMS,
         'no_cpython_wrapper': is_inner,
-        # They fuse expressions of whole arrays, which kernels do not have.
+        # Rewrites fuse expressions of whole arrays and prune branches on constants; kernels need
+        # neither.
         'no_rewrites': True,
     }
 

@@ -216,7 +216,7 @@ class SlimLibrary(JITCodeLibrary):
             self._long[entry] = self
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Leave it to what optimizes the module as a whole, once all that it calls is in it."""
+        """Do nothing: a module is optimized as a whole, once it contains all that it calls."""
         if self._is_calling_by_name:
             ll_module.data_layout = self._codegen._data_layout
         else:

@@ -10,13 +10,15 @@ from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.targetconfig import ConfigStack
 
-# Types of arguments that say all by themselves, unlike lists whose items are not known yet.
+# Types of arguments that are complete in themselves, unlike a list of items not known yet.
 PLAIN = types.Number, types.Boolean, types.Array, types.BaseTuple, types.NoneType, types.SliceType
 
 _search = types.Function.get_call_type
-# The function, whose number no other one may take, and its signature.
-_found: dict[tuple[Any, ...], tuple[Any, Any]] = {}
-# Sets of options of kernels, numbered: they take long to compare. The one last met, its number.
+# By function, types and options: the function, kept alive so that its id is not reused, its
+# signature, and the implementation of that.
+_found: dict[tuple[Any, ...], tuple[Any, Any, Any]] = {}
+# Sets of options of kernels, numbered, since they take long to compare; then the set met last,
+# with its number.
 _numbers: dict[Any, int] = {}
 _met: tuple[Any, int] = None, -1
 
@@ -49,5 +51,9 @@ def _call_type(function: Any, context: Any, args: Any, kws: Any) -> Any:
         _met = options, _numbers.setdefault(options, len(_numbers))
     key = id(function), tuple(args), _met[1]
     if key not in _found:
-        _found[key] = function, _search(function, context, args, kws)
-    return _found[key][1]
+        signature = _search(function, context, args, kws)
+        _found[key] = function, signature, function._impl_keys[signature.args]
+    _, signature, implementation = _found[key]
+    # Where numba looks for it; a kernel with other options may have left its own there.
+    function._impl_keys[signature.args] = implementation
+    return signature

@@ -114,7 +114,7 @@ class Scene:
 
 
 def _of_rows(names: tuple[str, ...], rows: bytes) -> Scene:
-    """Return the scene that was sent so; it is not checked again."""
-    # An array of bytes cannot be changed.
+    """Return the scene that was sent in this way; it is not checked again."""
+    # An array over bytes is read-only.
     numbers = np.frombuffer(rows).reshape(len(names), NUMBERS)
     return Scene(tuple(map(Box.of_row, names, numbers)))

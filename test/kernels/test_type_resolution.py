@@ -6,6 +6,7 @@ import operator
 
 import numba
 from numba import types
+from numba.extending import overload
 import numpy as np
 import pytest
 from rrth_planner.kernels import type_resolution
@@ -104,3 +105,26 @@ def test_numba_looks_up_by_itself_afterwards_whatever_happened():
         assert types.Function.get_call_type is not before
         compiled(wrong, (types.float64,))
     assert types.Function.get_call_type is before
+
+
+def ratio(a, b):
+    """Stand for a function of numpy that numba has as an overload."""
+
+
+@overload(ratio)
+def _ratio_overload(a, b):
+    return lambda a, b: a / b
+
+
+def test_a_kernel_keeps_its_options_whatever_was_compiled_with_others_before():
+    def divided(a, b):
+        return ratio(a, b)
+
+    signature = types.float64, types.float64
+    for _ in range(2):
+        with resolving_once():
+            found = compiled(divided, signature, error_model='numpy')
+        assert found(1.0, 0.0) == np.inf
+        # This one raises an error instead, and leaves its implementation where numba looks.
+        with pytest.raises(ZeroDivisionError):
+            compiled(divided, signature, error_model='python')(1.0, 0.0)

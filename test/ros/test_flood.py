@@ -30,10 +30,10 @@ TOPICS = {
     'joint_states': (JointState, samples.joints),
 }
 NODE = 'rrth_planner.ros.planner_node'
-# Requests while a topic is flooded. One that waited until nothing is left to be read would be
-# answered that the node is busy. How long answers take is judged by the soak: by a clock, it would
-# be the machine that is tested here. So many messages are published before.
-N_REQUESTS, N_MESSAGES = 50, 2000
+# Messages published before the first request, and requests. One that waited until nothing is left
+# to be read would be answered that the node is busy. How long answers take is judged by the soak:
+# here the speed of the machine would decide.
+N_MESSAGES, N_REQUESTS = 2000, 50
 
 
 @pytest.fixture(name='client', scope='module')
