@@ -15,6 +15,8 @@ from rrth_planner.kernels.vectors import sort
 # between close points the jerk is mostly rounding, and between distant ones a jump of the jerk
 # without a point is displaced.
 SPACINGS, CLOSEST, CLOSEST_FIRST = (0.05, 0.0125, 0.003125), 5e-5, 1e-5
+# Of a spacing: phases often last a multiple of one, and must not be cut anew by their rounding.
+EVEN = 1e-6
 # Samples of a piece, as shares of it, at which a stop is compared with its path; tolerance of each
 # joint there [rad], so that it is nowhere further than 1e-4 rad.
 SHARES, OFF_PATH = (0.25, 0.5, 0.75), 8e-5
@@ -75,7 +77,7 @@ def stop_times(rows, pieces, phases, begin, spacing, points):
         is_close = mark - kept < (CLOSEST_FIRST if kept == 0.0 else CLOSEST)
         if i < m and (is_close or after - mark < CLOSEST):
             continue
-        parts = 1 if mark <= start else max(1, math.ceil((mark - kept) / spacing))
+        parts = 1 if mark <= start else max(1, math.ceil((mark - kept) / spacing - EVEN))
         for part in range(1, parts + 1):
             points[n] = math.ceil((kept + (mark - kept) * part / parts) / TICK) * TICK
             n += 1
