@@ -25,7 +25,7 @@ SHARES = (
         'trajectory.quintics',
         'trajectory.fast_stop',
         'search.shortcut',
-        'trajectory.speed_profile',
+        'trajectory.timed_path',
         'trajectory.rate_profile',
         'search.rrt',
         'search.rrt_h',

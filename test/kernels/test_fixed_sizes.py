@@ -126,6 +126,12 @@ NUMBERS = {
         '4': 'derivatives; columns',
         '6': 'coefficients of a quintic',
     },
+    'timed_path': {
+        '2': 'ways to cut blends',
+        '3': 'origin, direction, turn',
+        '4': 'columns',
+        '5': 'columns',
+    },
     'lookahead': {'3': 'derivatives', '4': 'derivatives'},
 }
 MADE = {

@@ -5,7 +5,7 @@
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
-from rrth_planner.kernels.trajectory.quintics import bound, fit, larger
+from rrth_planner.kernels.trajectory.quintics import bound, fit, larger, peaks
 from rrth_planner.model.bernstein import to_bernstein
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.trajectory import piece_coefficients, Trajectory
@@ -55,6 +55,44 @@ def test_bounds_are_the_largest_bernstein_coefficients(seed, size):
         wanted = np.abs(matrix @ values).max(axis=1)
         assert np.allclose(found, wanted, rtol=1e-9)
         assert (found > wanted * (1.0 + 5e-13)).all()
+
+
+@examples(200)
+@given(seed=SEEDS, n_instants=st.integers(2, 33))
+def test_peaks_are_those_of_plain_numpy_and_bound_every_instant(seed, n_instants):
+    times, *state = points(np.random.default_rng(seed))
+    curves, T = piece_coefficients(trajectory((times, *state))), np.diff(times)[:, None]
+    found = np.empty((3, 3))
+    peaks(curves, times, n_instants, found)
+
+    def derivative(order, u):
+        c = curves
+        for _ in range(order):
+            c = c[:, 1:] * np.arange(1, c.shape[1])[:, None]
+        return u[:, None] ** np.arange(c.shape[1]) @ c
+
+    instants, many = np.linspace(0.0, 1.0, n_instants), np.linspace(0.0, 1.0, 501)
+    for order, most in enumerate(found, start=1):
+        sampled = np.abs(derivative(order, instants)).max(axis=1)
+        # Largest at the ends of [0, 1]: of the sum of the magnitudes of all terms.
+        c = np.abs(curves)
+        for _ in range(order + 2):
+            c = c[:, 1:] * np.arange(1, c.shape[1])[:, None]
+        between = c.sum(axis=1) / 8 / (n_instants - 1) ** 2
+        wanted = ((sampled + between) / T**order).max(axis=0)
+        assert np.allclose(most, wanted, rtol=1e-9)
+        seen = (np.abs(derivative(order, many)).max(axis=1) / T**order).max(axis=0)
+        assert (seen <= most * (1 + 1e-9)).all()
+
+
+def test_a_peak_that_is_no_number_is_none():
+    times, q, v, a = points(np.random.default_rng(0))
+    curves = piece_coefficients(trajectory((times, q, v, a))).copy()
+    curves[1, 2, 0] = np.nan
+    found = np.empty((3, 3))
+    peaks(curves, times, 33, found)
+    assert np.isnan(found[:2, 0]).all()
+    assert np.isfinite(found[:, 1:]).all()
 
 
 @pytest.mark.parametrize('power', range(1, 6))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rrth_planner.collision.reference_checker import quintic_states
 from rrth_planner.collision.world import arm_world
+from rrth_planner.model.errors import RrthError
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
@@ -292,3 +293,12 @@ def test_before_and_after_the_motion_the_arm_stands_still():
     assert np.array_equal(q, [[0.0, 0.0], [1.0, 2.0]])
     assert not v.any()
     assert not a.any()
+
+
+def test_blends_and_limits_of_another_path_are_rejected():
+    path = Path(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]))
+    bounds = random_limits(np.random.default_rng(0), 2)
+    with pytest.raises(RrthError, match='blends: 0, expected one for each of 1 corners'):
+        parameterize(path, (), bounds)
+    with pytest.raises(RrthError, match=r'path: shape \(3, 2\), expected a value for each of 4'):
+        parameterize(path, blends_of(path), limits())

@@ -4,7 +4,7 @@
 
 import math
 
-from numba.core.types import float64, void
+from numba.core.types import float64, int64, void
 import numpy as np
 from rrth_planner.kernels.jit import CUBE, kernel, MAT, OUT_CUBE, OUT_MAT, OUT_VEC, VEC
 
@@ -66,6 +66,36 @@ def bound(curves, quartic, cubic, speeds, curvatures):
                 curvature = larger(curvature, abs(value))
             speeds[i, k] = speed * (1 + SHARE) + LEAST
             curvatures[i, k] = curvature * (1 + SHARE) + LEAST
+
+
+@kernel(void(CUBE, VEC, int64, OUT_MAT), is_short=True)
+def peaks(curves, times, n_instants, most):
+    """
+    Write bounds of the velocity, acceleration and jerk of each joint, (3, dof).
+
+    curves, times: as for `state_at`. Each piece is sampled at some instants, its ends included;
+    between two of these, h apart, a function f is no greater than there by more than
+    h^2 / 8 max|f''|.
+    """
+    between = 0.125 / (n_instants - 1) ** 2
+    most[:] = 0.0
+    for i in range(curves.shape[0]):
+        T = times[i + 1] - times[i]
+        for k in range(curves.shape[2]):
+            c1, c2, c3 = curves[i, 1, k], curves[i, 2, k], curves[i, 3, k]
+            c4, c5 = curves[i, 4, k], curves[i, 5, k]
+            v, a, j = 0.0, 0.0, 0.0
+            for instant in range(n_instants):
+                u = instant / (n_instants - 1)
+                v = larger(v, abs((((5 * c5 * u + 4 * c4) * u + 3 * c3) * u + 2 * c2) * u + c1))
+                a = larger(a, abs(((20 * c5 * u + 12 * c4) * u + 6 * c3) * u + 2 * c2))
+                j = larger(j, abs((60 * c5 * u + 24 * c4) * u + 6 * c3))
+            v += between * (6 * abs(c3) + 24 * abs(c4) + 60 * abs(c5))
+            a += between * (24 * abs(c4) + 120 * abs(c5))
+            j += between * 120 * abs(c5)
+            most[0, k] = larger(most[0, k], v / T)
+            most[1, k] = larger(most[1, k], a / T**2)
+            most[2, k] = larger(most[2, k], j / T**3)
 
 
 @kernel(void(CUBE, VEC, float64, OUT_VEC, OUT_VEC))

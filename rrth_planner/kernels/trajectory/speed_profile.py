@@ -10,6 +10,9 @@ from rrth_planner.kernels.jit import kernel, MAT, OUT_MAT, OUT_VEC, VEC
 
 # Rows of the limits of the joints, (3, dof).
 VELOCITY, ACCELERATION, JERK = 0, 1, 2
+# Columns of `places`: begin and end of a cell as shares of its segment, the segment's length, and
+# its row.
+BEGIN, END, WIDTH, SEGMENT = 0, 1, 2, 3
 # Columns of `cells`: length, and the greatest speed, acceleration and jerk along the path.
 LENGTH, V_MAX, A_MAX, J_MAX = 0, 1, 2, 3
 # Share of the limit of jerk for the curvature of the path at constant speed, and share of the
@@ -110,10 +113,10 @@ def bound_derivatives(directions, turns, row, place, q_s):
     """
     Write bounds of the derivatives of the path by its length within a cell, (3, dof).
 
-    place (3,): begin and end of the cell as shares of its segment, and the segment's length. The
-    direction turns from u to u + turn by the smooth step w(x) = 3 x^2 - 2 x^3, which is monotone.
+    place (4,): of the cell, in a segment of this row. The direction turns from u to u + turn by
+    the smooth step w(x) = 3 x^2 - 2 x^3, which is monotone.
     """
-    begin, end, width = place[0], place[1], place[2]
+    begin, end, width = place[BEGIN], place[END], place[WIDTH]
     w_begin, w_end = begin * begin * (3 - 2 * begin), end * end * (3 - 2 * end)
     w_dot = max(6 * begin * (1 - begin), 6 * end * (1 - end))
     if begin < 0.5 < end:
@@ -191,7 +194,7 @@ def ramped(speed, other, cell):
     return reachable_speed(other, length, speed, cell[A_MAX], cell[J_MAX])
 
 
-@kernel(float64(MAT, MAT, MAT, MAT, float64, OUT_MAT, OUT_VEC))
+@kernel(float64(MAT, MAT, MAT, MAT, float64, OUT_MAT, OUT_VEC), is_inner=True)
 def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     """
     Write the limits of each cell and the speed at each knot between cells; return the duration.
@@ -201,18 +204,19 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     cells in place of points; then the same with ramps of limited jerk, from and to constant speed
     at the knots. The duration is infinite where the arm cannot slow down in time from `v_start`.
 
-    directions, turns (n, dof): of the segment of each cell, the direction at its begin, and the
-    change of direction to its end; places (n, 3): as `place` of `bound_derivatives`; limits
-    (3, dof): velocity, acceleration, jerk; v_start: speed at the first knot [rad/s]. cells (n, 4)
-    are written in rad, and speeds (n + 1,) [rad/s].
+    directions, turns (m, dof): the direction at the begin of each segment, and the change of
+    direction to its end; places (n, 4): of each cell; limits (3, dof): velocity, acceleration,
+    jerk; v_start: speed at the first knot [rad/s]. cells (n, 4) are written in rad, and speeds
+    (n + 1,) [rad/s].
     """
-    n, dof = directions.shape
+    n, dof = places.shape[0], directions.shape[1]
     q_s, squares = np.empty((3, dof)), np.empty(n + 1)
     squares[:] = math.inf
     squares[0], squares[n] = v_start * v_start, 0.0
     for i in range(n):
-        bound_derivatives(directions, turns, i, places[i], q_s)
-        cells[i, LENGTH] = (places[i, 1] - places[i, 0]) * places[i, 2]
+        row = int(places[i, SEGMENT])
+        bound_derivatives(directions, turns, row, places[i], q_s)
+        cells[i, LENGTH] = (places[i, END] - places[i, BEGIN]) * places[i, WIDTH]
         cells[i, V_MAX] = constant_speed(q_s, limits)
         if i == 0:
             # The present speed is given.
@@ -221,15 +225,16 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
         squares[i] = min(squares[i], square)
         for k in range(dof):
             # A corner without a blend.
-            jump = directions[i, k] - directions[i - 1, k] - turns[i - 1, k]
-            if i > 0 and places[i, 0] == 0.0 and abs(jump) > ROUNDING:
-                squares[i] = 0.0
+            if row > 0 and places[i, BEGIN] == 0.0:
+                jump = directions[row, k] - directions[row - 1, k] - turns[row - 1, k]
+                if abs(jump) > ROUNDING:
+                    squares[i] = 0.0
         squares[i + 1] = min(squares[i + 1], square)
     for i in range(n - 1, -1, -1):
-        bound_derivatives(directions, turns, i, places[i], q_s)
+        bound_derivatives(directions, turns, int(places[i, SEGMENT]), places[i], q_s)
         squares[i] = slowed_square(q_s, limits, cells[i, LENGTH], squares[i + 1], squares[i])
     for i in range(n):
-        bound_derivatives(directions, turns, i, places[i], q_s)
+        bound_derivatives(directions, turns, int(places[i, SEGMENT]), places[i], q_s)
         squares[i + 1] = slowed_square(q_s, limits, cells[i, LENGTH], squares[i], squares[i + 1])
         bend = 0.0
         for k in range(dof):
@@ -254,7 +259,7 @@ def cell_speeds(directions, turns, places, limits, v_start, cells, speeds):
     return duration
 
 
-@kernel(int64(MAT, VEC, OUT_MAT))
+@kernel(int64(MAT, VEC, OUT_MAT), is_inner=True)
 def knots(cells, speeds, rows):
     """
     Write the ends of all phases of constant jerk; return their number.
