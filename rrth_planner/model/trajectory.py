@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 import functools
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,7 +83,7 @@ class Trajectory:
     def __post_init__(self) -> None:
         """Validate and freeze."""
         times = frozen_array(self.times, (None,), 'times', 's', RrthError)
-        if len(times) == 0 or times[0] != 0.0 or not (np.diff(times) > 0.0).all():
+        if len(times) == 0 or times[0] != 0.0 or not (times[1:] > times[:-1]).all():
             raise RrthError('times: expected at least one, from 0, strictly increasing [s]')
         object.__setattr__(self, 'times', times)
         dof: int | None = None
@@ -96,6 +97,11 @@ class Trajectory:
             dof = value.shape[1]
             object.__setattr__(self, name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be sent as one array, in half of the time that four take."""
+        arrays = self.times, *self.states
+        return _of_bytes, (len(self.times), b''.join(array.tobytes() for array in arrays))
+
     @property
     def duration(self) -> float:
         """Time of the last point [s]."""
@@ -105,6 +111,18 @@ class Trajectory:
     def states(self) -> tuple[Array, Array, Array]:
         """Positions, velocities and accelerations."""
         return self.positions, self.velocities, self.accelerations
+
+
+def _of_bytes(n: int, data: bytes) -> Trajectory:
+    """Return the trajectory of n points that was sent in this way; it is not checked again."""
+    # An array over bytes is read-only.
+    numbers = np.frombuffer(data)
+    trajectory: Trajectory = object.__new__(Trajectory)
+    object.__setattr__(trajectory, 'times', numbers[:n])
+    states = numbers[n:].reshape(3, n, -1)
+    for name, values in zip(('positions', 'velocities', 'accelerations'), states, strict=True):
+        object.__setattr__(trajectory, name, values)
+    return trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

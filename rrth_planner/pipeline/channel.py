@@ -3,7 +3,6 @@
 """What the planning process and its owner send each other."""
 
 from dataclasses import dataclass
-import io
 from multiprocessing.connection import Connection
 import pickle
 import select
@@ -14,10 +13,10 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import TreeOptions
 
-# What is sent once; a channel remembers so many of them, more than any message holds.
+# What is sent once; a channel remembers so many of them, more than any message has parts.
 SENT_ONCE, REMEMBERED = (ArmModel, Scene, MotionLimits, TreeOptions), 64
-# Sent while the process works, to cancel that.
-STOP = None
+# The one part of a message that cancels what the process works on.
+STOP = 'stop'
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +31,9 @@ class Channel:
     """
     One end of a pipe to another process.
 
-    What lasts from question to question, `SENT_ONCE`, is sent once, and then named by its identity
-    at the sender. So the receiver has the same object each time, and keeps what it derives from
-    it.
+    A message has some parts. What lasts from question to question, `SENT_ONCE`, is sent once, and
+    then named by its identity at the sender. So the receiver has the same object each time, and
+    keeps what it derives from it.
 
     Parameters
     ----------
@@ -51,59 +50,34 @@ class Channel:
         self._sent: dict[int, Any] = {}
         self._received: dict[int, Any] = {}
 
-    def send(self, value: Any) -> None:
-        """Send a value."""
-        out = io.BytesIO()
-        pickler = _Pickler(out, self._sent)
-        pickler.dump(value)
+    def send(self, *parts: Any) -> None:
+        """Send a message."""
+        known = {id(part): part for part in parts if isinstance(part, SENT_ONCE)}
+        # Kept alive, so that nothing else can have its identity.
+        news = {name: part for name, part in known.items() if name not in self._sent}
+        names = [id(part) if id(part) in known else None for part in parts]
+        others = [part for part, name in zip(parts, names, strict=True) if name is None]
         # In one call: each one releases the interpreter, and waits for it again.
-        self.line.send_bytes(pickle.dumps((pickler.news, out.getvalue()), protocol=5))
-        self._sent.update(pickler.news)
+        self.line.send_bytes(pickle.dumps((news, names, others), protocol=5))
+        self._sent.update(news)
         _forget_first(self._sent)
 
     def is_readable(self, timeout: float) -> bool:
         """
-        Return whether a value or the end of the line is there, or comes within a time [s].
+        Return whether a message or the end of the line is there, or comes within a time [s].
 
         A hundred times as fast as the connection's own `poll`: planning asks it often.
         """
         return bool(self._readable.poll(1e3 * timeout))
 
-    def receive(self) -> Any:
-        """Return the next value; what was read-only is read-only."""
-        news, data = pickle.loads(self.line.recv_bytes())
+    def receive(self) -> tuple[Any, ...]:
+        """Return the parts of the next message; what was read-only is read-only."""
+        news, names, others = pickle.loads(self.line.recv_bytes())
         self._received.update(news)
-        value = _Unpickler(data, self._received).load()
+        rest = iter(others)
+        parts = tuple(next(rest) if name is None else self._received[name] for name in names)
         _forget_first(self._received)
-        return value
-
-
-class _Pickler(pickle.Pickler):
-    """Writes identities of what is sent once; `news` are those objects that were not sent yet."""
-
-    def __init__(self, out: io.BytesIO, sent: dict[int, Any]) -> None:
-        super().__init__(out, protocol=5)
-        self._sent = sent
-        self.news: dict[int, Any] = {}
-
-    def persistent_id(self, part: Any) -> int | None:
-        if not isinstance(part, SENT_ONCE):
-            return None
-        if id(part) not in self._sent:
-            # Kept alive, so that nothing else can have its identity.
-            self.news[id(part)] = part
-        return id(part)
-
-
-class _Unpickler(pickle.Unpickler):
-    """Reads what `_Pickler` writes."""
-
-    def __init__(self, data: bytes, received: dict[int, Any]) -> None:
-        super().__init__(io.BytesIO(data))
-        self._received = received
-
-    def persistent_load(self, identity: int) -> Any:
-        return self._received[identity]
+        return parts
 
 
 def _forget_first(parts: dict[int, Any]) -> None:

@@ -15,7 +15,7 @@ from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.channel import Channel, Raised, STOP
 from rrth_planner.pipeline.motion_plan import MotionPlan
-from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.pipeline.request import parts_of, PlanQuestion
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.planning.options import TreeOptions
 
@@ -106,7 +106,7 @@ class PlanningProcess:
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
         """As of `Planner`."""
-        plan: MotionPlan = self._ask('plan', question, should_stop=should_stop)
+        plan: MotionPlan = self._ask('plan', *parts_of(question), should_stop=should_stop)
         return plan
 
     def violation_seen(self, *arguments: Any) -> Violation | None:
@@ -146,7 +146,7 @@ class PlanningProcess:
         self._n_asked += 1
         # A dead process is detected while waiting for the answer.
         with suppress(OSError):
-            self._channel.send((self._n_asked, name, arguments))
+            self._channel.send(self._n_asked, name, *arguments)
         self._is_busy = True
 
     def _end(self, should_stop: Callable[[], bool]) -> Any:

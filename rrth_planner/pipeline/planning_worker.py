@@ -15,6 +15,7 @@ from typing import Any, TYPE_CHECKING
 from rrth_planner.kernels.jit import is_compiled
 from rrth_planner.model.errors import one_line
 from rrth_planner.pipeline.channel import Channel, Raised, STOP
+from rrth_planner.pipeline.request import asked
 
 # Loading it compiles kernels that are not compiled yet.
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def main() -> None:
     work: dict[str, Callable[..., Any]] = {
         'warm_up': lambda *arguments: _planner().warm_up(*arguments),
         # Whatever comes meanwhile is a STOP, or the end of the owner.
-        'plan': lambda question: _planner().plan(question, lambda: channel.is_readable(0.0)),
+        'plan': lambda *parts: _planner().plan(asked(parts), lambda: channel.is_readable(0.0)),
         'violation_seen': lambda *arguments: _planner().violation_seen(*arguments),
     }
     serve(channel, work)
@@ -49,15 +50,15 @@ def serve(channel: Channel, work: Mapping[str, Callable[..., Any]]) -> None:
     while True:
         try:
             request = channel.receive()
-            if request is STOP:
+            if request == (STOP,):
                 # It came after the answer was sent.
                 continue
-            number, name, arguments = request
+            number, name, *arguments = request
             try:
                 answer = work[name](*arguments)
             except Exception as problem:
                 answer = _portable(problem)
-            channel.send((number, answer))
+            channel.send(number, answer)
         except (EOFError, OSError):
             return
 

@@ -2,7 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """All inputs of a plan in one value: the same question has the same answer."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from operator import attrgetter
+from typing import Any
 
 from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.model.arm import ArmModel
@@ -94,3 +97,16 @@ class PlanQuestion:
             )
         if self.seed < 0:
             raise OptionsError(f'seed: {self.seed}, expected a whole number >= 0')
+
+
+_NAMES = tuple(field.name for field in fields(PlanQuestion))
+# The parts of a question, as `asked` takes them.
+parts_of: Callable[[PlanQuestion], tuple[Any, ...]] = attrgetter(*_NAMES)
+
+
+def asked(parts: Sequence[Any]) -> PlanQuestion:
+    """Return the question with these parts, which are those of one: it is not checked again."""
+    question: PlanQuestion = object.__new__(PlanQuestion)
+    for name, part in zip(_NAMES, parts, strict=True):
+        object.__setattr__(question, name, part)
+    return question

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A part of a trajectory is that trajectory, wherever it is cut."""
 
+import pickle
+
 from hypothesis import given, strategies as st
 import numpy as np
 import pytest
@@ -167,3 +169,18 @@ def test_where_nothing_is_left_a_single_point_is(begin, end):
     part = part_of(motion, begin, end)
     assert part.times.tolist() == [0.0]
     assert part.positions[0] == positions_at(motion, [min(max(end, 0.0), 1.0)])[0]
+
+
+@examples(50)
+@given(seed=SEEDS)
+def test_a_trajectory_that_was_sent_is_the_same_and_cannot_be_changed(seed):
+    motion = a_motion(np.random.default_rng(seed))
+    sent = pickle.loads(pickle.dumps(motion))
+    for before, after in zip(
+        (motion.times, *motion.states), (sent.times, *sent.states), strict=True
+    ):
+        np.testing.assert_array_equal(before, after)
+        # As compiled code takes it.
+        assert after.flags.c_contiguous
+        assert after.flags.aligned
+        assert not after.flags.writeable

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Planning in a process of its own: the same answers, cancelled, killed, left alone."""
 
+import dataclasses
 from multiprocessing.connection import Pipe
 import os
 from pathlib import Path
@@ -25,7 +26,7 @@ from rrth_planner.pipeline.planning_process import (
     PlanningProcessError,
     PlanningTraceback,
 )
-from rrth_planner.pipeline.request import PlanQuestion
+from rrth_planner.pipeline.request import asked, parts_of, PlanQuestion
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.planning.options import RRTHOptions
 import worlds
@@ -139,7 +140,7 @@ def test_a_stop_that_comes_after_the_answer_stops_nothing():
     thread = Thread(target=worker.serve, args=(theirs, {'double': lambda k: 2 * k}))
     thread.start()
     for k in range(3):
-        ours.send((k, 'double', (k,)))
+        ours.send(k, 'double', k)
         assert ours.receive() == (k, 2 * k)
         ours.send(STOP)
     ours.line.close()
@@ -168,10 +169,18 @@ def test_what_cannot_be_sent_was_not_sent():
     ours, theirs = map(Channel, Pipe())
     arm = worlds.table_1_arm()
     with pytest.raises(Exception, match='pickle'):
-        ours.send((arm, lambda: None))
+        ours.send(arm, lambda: None)
     ours.send(arm)
-    np.testing.assert_array_equal(theirs.receive().dh, arm.dh)
+    (sent,) = theirs.receive()
+    np.testing.assert_array_equal(sent.dh, arm.dh)
     ours.line.close()
+
+
+def test_a_question_is_made_of_its_parts():
+    whole = question()
+    again = asked(parts_of(whole))
+    for field in dataclasses.fields(PlanQuestion):
+        assert getattr(again, field.name) is getattr(whole, field.name)
 
 
 def test_arms_and_scenes_are_sent_once():
@@ -179,7 +188,7 @@ def test_arms_and_scenes_are_sent_once():
     arm, scenes = worlds.table_1_arm(), [Scene(()) for _ in range(REMEMBERED + 1)]
 
     def sent(*parts):
-        ours.send(parts)
+        ours.send(*parts)
         return theirs.receive()
 
     first, scene = sent(arm, scenes[0])
@@ -269,7 +278,7 @@ def test_an_error_that_cannot_be_sent_becomes_a_sentence():
 
     ours, theirs = map(Channel, Pipe())
     Thread(target=worker.serve, args=(theirs, {'fail': fail}), daemon=True).start()
-    ours.send((1, 'fail', ()))
+    ours.send(1, 'fail')
     _, raised = ours.receive()
     assert isinstance(raised.problem, RuntimeError)
     assert str(raised.problem) == 'LocalError: out of paper'
