@@ -5,12 +5,12 @@
 from collections.abc import Iterator, Sequence
 import functools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rrth_planner.collision.bar_pairs import BarPair
 from rrth_planner.collision.distance_library import DOUBT, library_of, THINNEST
-from rrth_planner.model.arm import ArmModel, bars_of, Capsule, forward_kinematics, mount_bars
+from rrth_planner.model.arm import ArmModel, Bar, bars_of, Capsule, forward_kinematics, mount_bars
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.rotation import turned_to
 from rrth_planner.model.scene import Scene
@@ -53,41 +53,59 @@ boxes_of = functools.lru_cache(maxsize=8)(Boxes)
 Placement = tuple[Array, Array]
 
 
-class PlacedBar:
+class CapsuleFrame(NamedTuple):
     """
-    One bar of an arm as a capsule, placed by each distance query.
+    Where a bar is, as a capsule.
 
-    `pose` (4, 4): of the capsule, in frame number `frame`: 0 is the mount's, i that of link i.
+    pose (4, 4): of the capsule, in frame number `frame`: 0 is the mount's, i that of link i;
+    offset: its length [m], signed where the joint `slide` changes it.
     """
+
+    bar: Bar
+    frame: int
+    pose: Array
+    offset: float
+    slide: int | None
+
+
+@functools.lru_cache(maxsize=256)
+def capsule_frame(arm: ArmModel, k: int, ray_length: float) -> CapsuleFrame:
+    """Return where bar k of an arm is, with a pointing ray of this length [m]."""
+    bar = (*bars_of(arm), *mount_bars(arm))[k]
+    # A capsule of the library lies along its own z, centred.
+    pose, slide = np.eye(4), None
+    if isinstance(bar.source, Capsule):
+        begin, end = bar.source.ends
+        frame = bar.source.link
+        offset = float(np.linalg.norm(end - begin))
+        pose[:3, 3] = 0.5 * (begin + end)
+        if offset > 0.0:
+            pose[:3, :3] = turned_to((end - begin) / offset)
+    else:
+        row, kind = bar.source
+        is_a, is_ray = kind == 'a', kind == 'd' and row == arm.dof
+        # `a` leads along x of the frame before; `d` ends at its frame's origin, but the ray
+        # begins there.
+        frame = row if is_a else row + 1
+        offset = ray_length if is_ray else float(arm.dh[row, 1 if is_a else 3])
+        if is_a:
+            pose[:3, :3] = np.eye(3)[:, [1, 2, 0]]
+            pose[0, 3] = 0.5 * offset
+        else:
+            pose[2, 3] = 0.5 * offset if is_ray else -0.5 * offset
+        if kind == 'd' and not is_ray and arm.is_prismatic[row]:
+            slide = row
+    pose.setflags(write=False)
+    return CapsuleFrame(bar, frame, pose, offset, slide)
+
+
+class PlacedBar:
+    """One bar of an arm as a capsule, placed by each distance query."""
 
     def __init__(self, arm: ArmModel, k: int, ray_length: float, library: str) -> None:
         self._library = library_of(library)
-        bar = (*bars_of(arm), *mount_bars(arm))[k]
+        bar, self.frame, self.pose, self._offset, self._slide = capsule_frame(arm, k, ray_length)
         self.k, self.name, self.radius = k, bar.name, bar.radius
-        self._slide: int | None = None
-        # A capsule of the library lies along its own z, centred.
-        self.pose = np.eye(4)
-        if isinstance(bar.source, Capsule):
-            begin, end = bar.source.ends
-            self.frame = bar.source.link
-            self._offset = float(np.linalg.norm(end - begin))
-            self.pose[:3, 3] = 0.5 * (begin + end)
-            if self._offset > 0.0:
-                self.pose[:3, :3] = turned_to((end - begin) / self._offset)
-        else:
-            row, kind = bar.source
-            is_a, is_ray = kind == 'a', kind == 'd' and row == arm.dof
-            # `a` leads along x of the frame before; `d` ends at its frame's origin, but the ray
-            # begins there.
-            self.frame = row if is_a else row + 1
-            self._offset = ray_length if is_ray else float(arm.dh[row, 1 if is_a else 3])
-            if is_a:
-                self.pose[:3, :3] = np.eye(3)[:, [1, 2, 0]]
-                self.pose[0, 3] = 0.5 * self._offset
-            else:
-                self.pose[2, 3] = 0.5 * self._offset if is_ray else -0.5 * self._offset
-            if kind == 'd' and not is_ray and arm.is_prismatic[row]:
-                self._slide = row
         self._capsule = self._library.capsule(abs(self._offset))
 
     def __del__(self) -> None:

@@ -5,6 +5,7 @@
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import replace
+import functools
 from itertools import islice, pairwise
 import math
 from typing import NamedTuple
@@ -66,12 +67,7 @@ def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_lengt
     further than the difference. (n_bars + n_pairs, n), bars as in `arm.bars_of`, then pairs as in
     `bar_pairs.pairs_of`, whose bars move no further to each other [m].
     """
-    # Both ends of a bar bound the speed of all its points.
-    every = reach_table(arm, ray_length).max(axis=1)
-    reaches = every[: len(bars_of(arm))]
-    for pair in pairs_of(arm):
-        between = (every[pair.inner] + every[pair.outer]) * (np.arange(arm.dof) >= pair.body)
-        reaches = np.vstack([reaches, between])
+    reaches = _reaches(arm, ray_length)
     if len(trajectory.times) == 1:
         return np.zeros((len(reaches), len(times)))
     c = piece_coefficients(trajectory)
@@ -84,6 +80,17 @@ def displacements(arm: ArmModel, trajectory: Trajectory, times: Array, ray_lengt
     bounds = np.zeros((len(reaches), len(grid)))
     np.cumsum(steps.T, axis=1, out=bounds[:, 1:])
     return np.array([np.interp(times, grid, bound) for bound in bounds])
+
+
+@functools.lru_cache(maxsize=16)
+def _reaches(arm: ArmModel, ray_length: float) -> Array:
+    """Return how far each joint moves a point of each bar, and two bars to each other, at most."""
+    # Both ends of a bar bound the speed of all its points.
+    every = reach_table(arm, ray_length).max(axis=1)
+    rows = [*every[: len(bars_of(arm))]]
+    for pair in pairs_of(arm):
+        rows.append((every[pair.inner] + every[pair.outer]) * (np.arange(arm.dof) >= pair.body))
+    return np.array(rows)
 
 
 class _Sample(NamedTuple):

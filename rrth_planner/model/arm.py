@@ -7,7 +7,6 @@ import functools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from rrth_planner.kernels.layout import MAX_BARS, MAX_DOF, NO_BAR
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import ModelError, printable
@@ -280,36 +279,43 @@ def forward_kinematics(arm: ArmModel, q: Array) -> Array:
 def link_poses(arm: ArmModel, q: Array) -> Array:
     """Return the pose of each link frame in the one before, as `forward_kinematics` [m]."""
     q = np.asarray(q, dtype=np.float64)
-    constant, slides, parts = _link_parts(arm)
-    values = np.zeros((*q.shape[:-1], arm.dof + 1))
-    values[..., :-1] = q
-    theta = constant[0] + np.where(slides, 0.0, values)
-    terms = np.ones((*theta.shape, 1, 4))
+    offset, slides, parts, tool = _link_parts(arm)
+    theta, terms = q + offset, np.ones((*q.shape, 1, 3))
     np.cos(theta, out=terms[..., 0, 1])
     np.sin(theta, out=terms[..., 0, 2])
-    terms[..., 0, 3] = constant[1] + np.where(slides, values, 0.0)
-    poses: Array = (terms @ parts).reshape(*theta.shape, 4, 4)
-    return poses
+    if slides:
+        terms[..., slides, 0, 1] = q[..., slides]
+    poses = np.empty((*q.shape[:-1], arm.dof + 1, 16))
+    np.matmul(terms, parts, out=poses[..., :-1, None, :])
+    poses[..., -1, :] = tool
+    return poses.reshape(*poses.shape[:-1], 4, 4)
 
 
 @functools.lru_cache(maxsize=16)
-def _link_parts(arm: ArmModel) -> tuple[Array, NDArray[np.bool_], Array]:
+def _link_parts(arm: ArmModel) -> tuple[Array, list[int], Array, Array]:
     """
-    Return offsets and lengths (2, dof + 1), which joints slide, and the parts of the link poses.
+    Return what `link_poses` are made of: offsets (dof,), and which joints slide.
 
     The pose of link frame i in frame i - 1 (Craig 2005, eq. 3.6) is the sum of its parts, of shape
-    (dof + 1, 4, 16), times 1, cos(theta), sin(theta) and d.
+    (dof, 3, 16), times 1, cos(theta) and sin(theta), or times 1, q and 0 of a joint that slides.
+    Last that of the tool, (16,), which is constant.
     """
     alpha, a, offset, d = arm.dh.T
     ca, sa = np.cos(alpha), np.sin(alpha)
-    parts = np.zeros((arm.dof + 1, 4, 4, 4))
-    parts[:, 0, 0, 3], parts[:, 0, 3, 3] = a, 1.0
-    parts[:, 0, 1, 2], parts[:, 0, 2, 2] = -sa, ca
-    parts[:, 1, 0, 0], parts[:, 1, 1, 1], parts[:, 1, 2, 1] = 1.0, ca, sa
-    parts[:, 2, 0, 1], parts[:, 2, 1, 0], parts[:, 2, 2, 0] = -1.0, ca, sa
-    parts[:, 3, 1, 3], parts[:, 3, 2, 3] = -sa, ca
-    slides = np.array([*arm.is_prismatic, False])
-    return np.stack([offset, d]), slides, parts.reshape(-1, 4, 16)
+    fixed, cosine, sine, along = np.zeros((4, arm.dof + 1, 4, 4))
+    fixed[:, 0, 3], fixed[:, 3, 3] = a, 1.0
+    fixed[:, 1, 2], fixed[:, 2, 2] = -sa, ca
+    cosine[:, 0, 0], cosine[:, 1, 1], cosine[:, 2, 1] = 1.0, ca, sa
+    sine[:, 0, 1], sine[:, 1, 0], sine[:, 2, 0] = -1.0, ca, sa
+    along[:, 1, 3], along[:, 2, 3] = -sa, ca
+    fixed += d[:, None, None] * along
+    turned = np.cos(offset)[:, None, None] * cosine + np.sin(offset)[:, None, None] * sine
+    slides = [i for i, is_prismatic in enumerate(arm.is_prismatic) if is_prismatic]
+    rows = [*slides, arm.dof]
+    fixed[rows] += turned[rows]
+    cosine[rows], sine[rows] = along[rows], 0.0
+    parts = np.stack([fixed, cosine, sine], axis=1).reshape(-1, 3, 16)
+    return offset[:-1].copy(), slides, parts[:-1].copy(), parts[-1, 0].copy()
 
 
 def tool_in_last_link(arm: ArmModel, points: Array) -> Array:

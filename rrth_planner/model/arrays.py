@@ -53,10 +53,11 @@ def frozen_array(
         is_fit = is_fit and wanted in (None, n)
     if not is_fit:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
-    # A sum of squares is finite where all elements are, unless it overflows.
-    if not math.isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+    # No element is greater than the root of this, which is finite unless it overflows.
+    square = float(np.vdot(array, array))
+    if not math.isfinite(square) and not np.isfinite(array).all():
         raise error(f'{name}: {shown(array.tolist())}, expected finite numbers [{unit}]')
-    if largest < math.inf and np.abs(array).max(initial=0.0) > largest:
+    if square > largest * largest and np.abs(array).max() > largest:
         raise error(
             f'{name}: {shown(array.tolist())}, expected numbers of at most {largest:g} [{unit}]'
         )

@@ -83,7 +83,7 @@ def find_path(
         assert goals is not None
         return goal_rejection(world, goals)
     if result.status is PlanStatus.SOLVED:
-        return replace(result, is_reproducible=result.is_reproducible and not is_clocked)
+        return replace(result, is_reproducible=False) if is_clocked else result
     elapsed = time.perf_counter() - begin
     sentence = {
         PlanStatus.TIMEOUT: f'no path within the time limit of {options.time_limit:g} s',

@@ -46,7 +46,10 @@ CANCELLED = Rejection(PlanStatus.CANCELLED, 'the plan was cancelled')
 
 def within_limits(arm: ArmModel, q: Array) -> Array:
     """Return a configuration, (dof,), with joints that are past a limit by rounding at it."""
-    near: Array = np.clip(q, *arm.bounds)
+    low, high = arm.bounds
+    if ((low <= q) & (q <= high)).all():
+        return q
+    near: Array = np.clip(q, low, high)
     return near if float(np.abs(near - q).max()) <= ROUNDING else q
 
 
@@ -62,6 +65,8 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
         [rad].
 
     """
+    if world.is_valid(q_start):
+        return None
     for k, name in enumerate(arm.joint_names):
         low, high = arm.bounds[:, k]
         if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
@@ -70,8 +75,6 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
                 PlanStatus.START_OUT_OF_BOUNDS,
                 f'{name} is at {q_start[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}',
             )
-    if world.is_valid(q_start):
-        return None
     colliding = world.colliding_bars(q_start)
     if colliding is not None:
         return Rejection(

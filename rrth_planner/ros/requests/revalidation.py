@@ -64,7 +64,7 @@ class Revalidation:
         rejected, or the motion is no longer valid for the moved wearer.
         """
         present = self.inputs.at(self.clock(), self.parameters, self.snapshot.goal)
-        if _is_same(present.scene, self.snapshot.scene):
+        if np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):
             return None
         scene = self.require_fit()
         parameters = self.parameters
@@ -96,7 +96,7 @@ class Revalidation:
         now = self.clock()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
-        if not _is_same(present.scene, self.snapshot.scene):
+        if not np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):
             self._require_proof(present.scene)
         self._require_room()
         return present.scene
@@ -172,15 +172,3 @@ class Revalidation:
     def _target_distance(self) -> float:
         target = self.snapshot.goal.target
         return reach_to(self.parameters.arm, target, self._motion.positions[-1])
-
-
-def _is_same(one: Scene, other: Scene) -> bool:
-    return len(one.boxes) == len(other.boxes) and all(
-        a is b
-        or (
-            np.array_equal(a.center, b.center)
-            and np.array_equal(a.size, b.size)
-            and np.array_equal(a.rotation, b.rotation)
-        )
-        for a, b in zip(one.boxes, other.boxes, strict=True)
-    )
