@@ -20,6 +20,7 @@ SHARES = (
         'kinematics.pan_tilt_ik',
         'search.elastic_band',
         'collision.arm_clearance',
+        'collision.trajectory_check',
     ),
     (
         'trajectory.quintics',
@@ -30,7 +31,6 @@ SHARES = (
         'search.rrt',
         'search.rrt_h',
         'kinematics.goal_selection',
-        'collision.trajectory_check',
     ),
 )
 
