@@ -55,10 +55,11 @@ Placement = tuple[Array, Array]
 
 class CapsuleFrame(NamedTuple):
     """
-    Where a bar is, as a capsule.
+    A bar of an arm, and where it is as a capsule.
 
     pose (4, 4): of the capsule, in frame number `frame`: 0 is the mount's, i that of link i;
-    offset: its length [m], signed where the joint `slide` changes it.
+    offset: its length, with the sign that the arm gives it [m]; slide: the joint that adds to it,
+    if any.
     """
 
     bar: Bar

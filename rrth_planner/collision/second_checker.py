@@ -90,7 +90,9 @@ def _reaches(arm: ArmModel, ray_length: float) -> Array:
     rows = [*every[: len(bars_of(arm))]]
     for pair in pairs_of(arm):
         rows.append((every[pair.inner] + every[pair.outer]) * (np.arange(arm.dof) >= pair.body))
-    return np.array(rows)
+    reaches = np.array(rows)
+    reaches.setflags(write=False)
+    return reaches
 
 
 class _Sample(NamedTuple):

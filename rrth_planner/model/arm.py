@@ -294,11 +294,11 @@ def link_poses(arm: ArmModel, q: Array) -> Array:
 @functools.lru_cache(maxsize=16)
 def _link_parts(arm: ArmModel) -> tuple[Array, list[int], Array, Array]:
     """
-    Return what `link_poses` are made of: offsets (dof,), and which joints slide.
+    Return what `link_poses` adds up: offsets (dof,), which joints slide, parts, the tool's pose.
 
     The pose of link frame i in frame i - 1 (Craig 2005, eq. 3.6) is the sum of its parts, of shape
     (dof, 3, 16), times 1, cos(theta) and sin(theta), or times 1, q and 0 of a joint that slides.
-    Last that of the tool, (16,), which is constant.
+    That of the tool, (16,), is constant.
     """
     alpha, a, offset, d = arm.dh.T
     ca, sa = np.cos(alpha), np.sin(alpha)
@@ -315,7 +315,8 @@ def _link_parts(arm: ArmModel) -> tuple[Array, list[int], Array, Array]:
     fixed[rows] += turned[rows]
     cosine[rows], sine[rows] = along[rows], 0.0
     parts = np.stack([fixed, cosine, sine], axis=1).reshape(-1, 3, 16)
-    return offset[:-1].copy(), slides, parts[:-1].copy(), parts[-1, 0].copy()
+    parts.setflags(write=False)
+    return arm.dh[:-1, 2], slides, parts[:-1], parts[-1, 0]
 
 
 def tool_in_last_link(arm: ArmModel, points: Array) -> Array:

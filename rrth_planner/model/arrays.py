@@ -53,11 +53,11 @@ def frozen_array(
         is_fit = is_fit and wanted in (None, n)
     if not is_fit:
         raise error(f'{name}: shape {array.shape}, expected {_wanted(shape)} [{unit}]')
-    # No element is greater than the root of this, which is finite unless it overflows.
+    # No element is greater than its root; it is finite where all are, unless it overflows.
     square = float(np.vdot(array, array))
     if not math.isfinite(square) and not np.isfinite(array).all():
         raise error(f'{name}: {shown(array.tolist())}, expected finite numbers [{unit}]')
-    if square > largest * largest and np.abs(array).max() > largest:
+    if math.sqrt(square) > largest and np.abs(array).max() > largest:
         raise error(
             f'{name}: {shown(array.tolist())}, expected numbers of at most {largest:g} [{unit}]'
         )

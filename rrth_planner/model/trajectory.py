@@ -98,7 +98,7 @@ class Trajectory:
             object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Be sent as one array, in half of the time that four take."""
+        """Be sent as the bytes of all arrays, in half of the time that four arrays take."""
         arrays = self.times, *self.states
         return _of_bytes, (len(self.times), b''.join(array.tobytes() for array in arrays))
 

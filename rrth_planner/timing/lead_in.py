@@ -93,7 +93,5 @@ def stop_first(moving: StartState, limits: MotionLimits) -> LeadIn | None:
     if moving.running is None:
         return None
     stop = brake(moving.running, moving.time, limits)
-    allowed = limits
-    if len(stop.times) > 1:
-        allowed = MotionLimits(*map(np.maximum, peaks(stop), limits.rows))
+    allowed = MotionLimits(*np.maximum(peaks(stop), limits.rows))
     return LeadIn(trajectory=stop, speed=0.0, q_stop=stop.positions[-1], allowed=allowed)

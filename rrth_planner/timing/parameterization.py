@@ -60,8 +60,9 @@ def parameterize(
     """
     q = path.waypoints
     check_dof(q, len(limits.velocity), 'path')
-    if len(blends) != max(0, len(q) - 2):
-        raise RrthError(f'blends: {len(blends)}, expected one for each of {len(q) - 2} corners')
+    n_corners = max(0, len(q) - 2)
+    if len(blends) != n_corners:
+        raise RrthError(f'blends: {len(blends)}, expected one for each of {n_corners} corners')
     if path.length < STILL:
         still = np.zeros((2, q.shape[1]))
         return Trajectory(np.array([0.0, HOLD]), q[[0, 0]], still, still)
@@ -102,7 +103,11 @@ def _within_limits(trajectory: Trajectory, limits: MotionLimits) -> Trajectory:
 
 
 def peaks(trajectory: Trajectory) -> Array:
-    """Return bounds of the velocity, acceleration and jerk of each joint, (3, dof)."""
+    """
+    Return bounds of the velocity, acceleration and jerk of each joint, (3, dof).
+
+    Of a single point: 0.
+    """
     most = np.empty((3, trajectory.positions.shape[1]))
     quintics.peaks(piece_coefficients(trajectory), trajectory.times, INSTANTS, most)
     return most

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Timed paths: at rest at both ends, on the path, within limits, in whole nanoseconds."""
 
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -300,5 +301,39 @@ def test_blends_and_limits_of_another_path_are_rejected():
     bounds = random_limits(np.random.default_rng(0), 2)
     with pytest.raises(RrthError, match='blends: 0, expected one for each of 1 corners'):
         parameterize(path, (), bounds)
+    with pytest.raises(RrthError, match='blends: 1, expected one for each of 0 corners'):
+        parameterize(Path(np.zeros((1, 2))), blends_of(path), bounds)
     with pytest.raises(RrthError, match=r'path: shape \(3, 2\), expected a value for each of 4'):
         parameterize(path, blends_of(path), limits())
+
+
+@examples(100)
+@given(seed=SEEDS)
+def test_a_waypoint_that_is_given_twice_changes_nothing(seed):
+    rng = np.random.default_rng(seed)
+    q = random_path(rng).waypoints
+    bounds, times = random_limits(rng, q.shape[1]), rng.integers(1, 4, len(q))
+    once, twice = Path(q), Path(np.repeat(q, times, axis=0))
+    wanted = parameterize(once, blends_of(once), bounds)
+    blend = Blend(q[0], q[0], q[0], half_length=0.0)
+    found = parameterize(twice, (blend,) * max(0, len(twice.waypoints) - 2), bounds)
+    np.testing.assert_array_equal(found.times, wanted.times)
+    for row, other in zip(found.states, wanted.states, strict=True):
+        np.testing.assert_array_equal(row, other)
+
+
+@examples(100)
+@given(seed=SEEDS)
+def test_rounding_makes_no_turn_of_a_corner_that_goes_straight_on(seed):
+    rng = np.random.default_rng(seed)
+    lengths = rng.uniform(0.2, 0.4, 2)
+    bounds, durations = random_limits(rng, 2), []
+    for _ in range(6):
+        # Along one joint, and hardly another way each time.
+        q = np.zeros((3, 2))
+        q[1:, 0] = np.cumsum(lengths * (1.0 + rng.uniform(-1e-12, 1e-12, 2)))
+        # The greatest speed is within the blend.
+        (blend,) = blends_of(Path(q))
+        blend = replace(blend, half_length=0.45 * float(lengths.min()))
+        durations.append(parameterize(Path(q), (blend,), bounds).duration)
+    assert np.ptp(durations) < 1e-7

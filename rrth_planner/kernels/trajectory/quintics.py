@@ -68,7 +68,7 @@ def bound(curves, quartic, cubic, speeds, curvatures):
             curvatures[i, k] = curvature * (1 + SHARE) + LEAST
 
 
-@kernel(void(CUBE, VEC, int64, OUT_MAT), is_short=True)
+@kernel(void(CUBE, VEC, int64, OUT_MAT))
 def peaks(curves, times, n_instants, most):
     """
     Write bounds of the velocity, acceleration and jerk of each joint, (3, dof).

@@ -24,6 +24,8 @@ WORTH = 1.01
 # Messages carry whole nanoseconds; two points closer than this are merged: in shorter pieces the
 # rounding of positions and times amounts to a considerable jerk [s].
 TICK, CLOSEST = 1e-9, 5e-5
+# Directions that differ by no more go straight on: more points would only cost time.
+STRAIGHT = 1e-12
 
 
 def most_points(n: int) -> int:
@@ -34,7 +36,7 @@ def most_points(n: int) -> int:
 @kernel(int64(MAT, VEC, OUT_CUBE, OUT_VEC), is_inner=True)
 def segments(waypoints, half_lengths, parts, widths):
     """
-    Write straight parts and blends in turn, without blends of length 0; return their number.
+    Write straight parts and blends in turn, without those of length 0; return their number.
 
     parts (3, m, dof): where each begins, its direction u, and the change of direction to its end;
     widths (m,): their lengths [rad]. At the path parameter s a segment is at
@@ -47,12 +49,19 @@ def segments(waypoints, half_lengths, parts, widths):
         for k in range(dof):
             length += (waypoints[i + 1, k] - waypoints[i, k]) ** 2
         length = math.sqrt(length)
+        if length == 0.0:
+            continue
+        is_turned = False
         for k in range(dof):
             u = (waypoints[i + 1, k] - waypoints[i, k]) / length
             parts[0, m, k] = waypoints[i, k] + half_lengths[i] * u
             parts[1, m, k], parts[2, m, k] = u, 0.0
             if half_lengths[i] > 0.0:
                 parts[2, m - 1, k] = u - parts[1, m - 1, k]
+                is_turned |= not abs(parts[2, m - 1, k]) <= STRAIGHT
+        if half_lengths[i] > 0.0 and not is_turned:
+            for k in range(dof):
+                parts[2, m - 1, k] = 0.0
         widths[m] = length - half_lengths[i] - half_lengths[i + 1]
         m += 1
         if half_lengths[i + 1] > 0.0:
@@ -136,10 +145,10 @@ def timed_points(waypoints, half_lengths, limits, v_start, times, states):
     """
     Write the points of the motion along a path; return their number, 0 where there is none.
 
-    waypoints (n, dof) [rad]; half_lengths (n,): of the blend at each one, 0 at both ends [rad];
-    limits (3, dof): velocity, acceleration, jerk; v_start: speed along the first edge at the start
-    [rad/s], from which there may be no room to slow down. times (most,) [s] and states
-    (3, most, dof), as for `merge`, have room for `most_points`.
+    waypoints (n, dof), n > 1, not all the same [rad]; half_lengths (n,): of the blend at each one,
+    0 at both ends [rad]; limits (3, dof): velocity, acceleration, jerk; v_start: speed along the
+    first edge at the start [rad/s], from which there may be no room to slow down. times (most,)
+    [s] and states (3, most, dof), as for `merge`, have room for `most_points`.
     """
     dof, most = waypoints.shape[1], 2 * waypoints.shape[0]
     parts, widths = np.empty((3, most, dof)), np.empty(most)
