@@ -38,6 +38,9 @@ MAX_DEVIATION = 0.1
 LONGEST_LEAD = 0.25
 # Spacing of the samples of a motion that an arm is located by [s].
 SPACING = 5e-3
+# An arm follows what is commanded where no joint is further from it than this [rad], at some time
+# within its lag. One that is later than stated, by up to LONGEST_LAG [s], still executes it.
+FOLLOWS, LONGEST_LAG = 0.02, 0.1
 # Greatest deviation of an arm that is on time [rad].
 ON_TIME = 5e-4
 # Until this time a motion has hardly left its start [s].
@@ -106,6 +109,16 @@ class ExecutingMotion:
         if not at > BEGINNING:
             return False
         return bool(np.abs(positions_at(self.trajectory, [at])[0] - q).max() <= SAME_POSITION)
+
+    def follows(self, q: Array, taken: float, lag: float) -> bool:
+        """Return whether an arm at q, (dof,), at a time follows it at most `lag` late [s]."""
+        return self.deviation(q, taken, lag) <= FOLLOWS
+
+    def deviation(self, q: Array, taken: float, lag: float) -> float:
+        """Return how far an arm was from what was commanded until a time, within a lag [rad]."""
+        ago = np.linspace(lag, 0.0, 2 + int(lag / SPACING))
+        places = positions_at(self.trajectory, taken - self.start_time - ago)
+        return float(np.abs(places - q).max(axis=1).min())
 
     def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
         """Return whether an arm had positions and velocities of the motion at a time [s]."""

@@ -28,7 +28,7 @@ BODY_SPEEDS = (
     ('', 2.0),
 )
 # Of bodies 120 times a second the next one, or the one after it, is there by then [s].
-SHORTEST_STRETCH = 0.024
+SHORTEST_STRETCH = 0.018
 # Faster than any part of a body [m/s].
 FASTEST = 100.0
 

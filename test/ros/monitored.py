@@ -3,6 +3,7 @@
 """A monitor of a motion on a clock of its own, for tests of what it does."""
 
 from dataclasses import replace
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -79,10 +80,13 @@ class Monitored:
         """Let a motion begin."""
         running = ExecutingMotion(trajectory=self.motion, start_time=100.0)
         self.command(running)
+        # Tests are about what is published after that.
+        self.published.clear()
 
-    def command(self, running, publish=lambda: None):
-        """Command a motion."""
-        self.monitor.begin(running, PointingGoal(np.ones(3)), self.reporter.parameters, publish)
+    def command(self, running, publish=lambda: None, joins=math.inf):
+        """Command a motion; joins: when it begins within the one before [s], inf: at rest."""
+        goal = PointingGoal(np.ones(3))
+        self.monitor.begin(running, goal, self.reporter.parameters, publish, joins)
 
     def on_time(self, phase):
         """Return positions and velocities of an arm that follows."""

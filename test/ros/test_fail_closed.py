@@ -154,7 +154,7 @@ def test_a_fault_at_any_call_of_the_monitor_stops_the_arm(monitored, kind, which
 
 def places():
     """Return what the monitor calls, as (owner, name)."""
-    names = 'scene_of is_remaining_free escapes_by_continuing fast_stop arm_world'
+    names = 'scene_of is_remaining_free escapes_by_continuing stop_along arm_world'
     found = [(execution_monitor, name) for name in names.split()]
     found += [
         (execution_tracker, name)

@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
 from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
-from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LATE  # noqa: E402
+from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LONGEST_LAG  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402
 from worlds import examples, limits  # noqa: E402
@@ -100,12 +100,12 @@ def test_an_arm_that_misses_its_stop_is_detected(seed, rate):
     for time in np.arange(TICK, left, TICK):
         q, v = ignores(time)
         ahead = np.abs(way[: min(at_rest, 1 + int(n * time / left))] - q).max(axis=1).min()
-        if time > LATE + 1e-9 and ahead > ASIDE and np.linalg.norm(v) > 0.05:
+        if time > LONGEST_LAG + 1e-9 and ahead > ASIDE and np.linalg.norm(v) > 0.05:
             due.add(float(time))
     found = _missed_at(before, stop, ignores, left)
     # The samples are some milliseconds apart.
     assert due <= set(found)
-    assert all(time > LATE for time in found)
+    assert all(time > LONGEST_LAG for time in found)
 
 
 @examples(60)

@@ -11,6 +11,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from rrth_planner.execution.executing_motion import (
     ExecutingMotion,
+    LONGEST_LAG,
     predict_start_state,
     sharp_phase_of,
 )
@@ -124,10 +125,21 @@ class InputSnapshot:
                 arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved
             )
 
-    def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
+    def is_commanded(self, running: ExecutingMotion | None, delay: float) -> bool:
+        """Return whether the arm executes a motion, at most so much later than stated [s]."""
+        joints = self.joints
+        return running is not None and running.follows(
+            joints.positions, joints.taken, delay + LONGEST_LAG
+        )
+
+    def is_about_to_move(
+        self, running: ExecutingMotion | None, now: float, span: float, delay: float = 0.0
+    ) -> bool:
         """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
         if running is None or self.is_moving(now):
             return False
+        if self.is_commanded(running, delay):
+            return running.will_move(now, span)
         located = self._localize(running)
         if located is None:
             return False
@@ -136,15 +148,23 @@ class InputSnapshot:
         return running.will_move(then, rate * span)
 
     def start_state_at(
-        self, running: ExecutingMotion | None, time: float, arm: ArmModel
+        self, running: ExecutingMotion | None, time: float, arm: ArmModel, delay: float = 0.0
     ) -> StartState:
-        """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
+        """
+        Return the state of a moving arm at a time [s], or raise RequestError.
+
+        It is the commanded one where the arm executes its motion, else predicted by its reading.
+        """
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
             raise self._rejection(arm, 'a velocity for every joint')
         known = None
-        if running is not None and joints.taken < running.start_time <= time:
-            # The arm was not on it yet: a stop, say, may just have been published.
+        if (
+            running is not None
+            and running.start_time <= time
+            and (joints.taken < running.start_time or self.is_commanded(running, delay))
+        ):
+            # The arm may lag, or was not on it yet: a stop, say, may just have been published.
             known = joints.taken - running.start_time, 1.0
         elif running is not None and not self.is_moving(joints.taken):
             known = self._localize(running)

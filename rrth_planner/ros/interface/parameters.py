@@ -123,6 +123,8 @@ class PlannerParameters(PlanSettings):
         Of fail-safe stops.
     separation : Separation or None
         What commitments are proven with; None: motions are published as they are planned.
+    controller_delay : float
+        The arm executes a motion at most so late [s].
     resume : str
         `AUTO` or `MANUAL`.
     body_timeout, joint_timeout : float
@@ -140,6 +142,7 @@ class PlannerParameters(PlanSettings):
     base_frame: str
     stop_limits: MotionLimits
     separation: Separation | None
+    controller_delay: float
     resume: str
     body_timeout: float
     joint_timeout: float
@@ -190,6 +193,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         )
         if values['separation']
         else None,
+        controller_delay=rules.controller_delay,
         **timeouts,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
         **{name: values[name] for name in own},

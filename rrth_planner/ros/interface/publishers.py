@@ -44,7 +44,7 @@ class PlanPublishers:
     def publish_motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
-        """Publish a motion for the arm to begin at a time [s]; 0: on reception."""
+        """Publish a motion for the arm to begin at a time [s]."""
         self._trajectory.publish(self.motion(trajectory, parameters, begin))
 
     def motion(
@@ -55,9 +55,10 @@ class PlanPublishers:
             trajectory, parameters.arm.joint_names, parameters.base_frame, begin
         )
 
-    def publish(self, msg: JointTrajectory) -> None:
-        """Publish the message of a planned motion: to the arm, or with separation to be seen."""
-        (self._planned or self._trajectory).publish(msg)
+    def publish_planned(self, msg: JointTrajectory) -> None:
+        """Publish the message of a planned motion to be seen, with separation."""
+        if self._planned is not None:
+            self._planned.publish(msg)
 
     def assert_liveliness(self) -> None:
         """Assert that the running motion is monitored."""

@@ -5,7 +5,7 @@
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 import time
 
 import numpy as np
@@ -17,6 +17,7 @@ from rrth_planner.execution.body_motion import (
     places_of,
     seen_again,
 )
+from rrth_planner.execution.command import ahead, begin_of, continues, lead_in, led
 from rrth_planner.execution.commitment import (
     Commitment,
     extended,
@@ -44,26 +45,46 @@ FULL_RATE = 0.995
 RESUME_AFTER = 0.2
 # What comes less often is no stream of bodies [s]; how fast a long pause between two is forgotten.
 LONGEST_PERIOD, FADING = 0.25, 0.98
-# A commitment lasts until the next one is there: the period of the bodies times so much, what that
-# takes to find, and so long until the controller has it [s].
-PERIODS, PROCESSING = 1.3, 0.012
-# So many commitments are remembered. An arm that is further from the present one than this [rad]
-# executes another one where the distance to that is less than this share.
-REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
+# A commitment lasts until the next one begins: the period of the bodies times so much, and by how
+# much later that may be found [s].
+PERIODS, PROCESSING = 1.3, 0.006
+# So many commitments are remembered, of which some have not begun yet. An arm that is further from
+# the present one than this [rad] executes another one where the distance to that is less than this
+# share.
+REMEMBERED, ASIDE, NEARER = 32, 0.01, 0.3
 # At rest an arm does not lag behind: these count there.
 ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
-# An arm may lag behind what is commanded by so much, in steps of that [s].
+# An arm may lag behind what is commanded by so much beyond the stated delay, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # An arm that has rested for so long [s], while it was commanded further than this [rad], ignores
 # its motion: its controller rejects what it is given. It has moved where it went so far [rad].
 IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
-# A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
-# long the controller has one that is published [s].
-LATEST, ARRIVAL = 0.02, 0.005
+# A commitment is found within so much times what it took lately, and at least so long; one that
+# takes longer than that, or than LATEST, is not published: the arm has gone on meanwhile [s].
+TAKES, FOUND_WITHIN, LATEST = 1.5, 0.002, 0.02
 # Why a stop takes place that nothing made necessary.
 LATE_BODY = 'the next body arrived too late: the motion resumes from rest'
 # The end of a motion counts as reached so near to it [s].
 ARRIVED = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sent:
+    """
+    A commitment as the controller has it.
+
+    Parameters
+    ----------
+    motion : ExecutingMotion
+        The message: its lead-in, then the commitment.
+    lead : float
+        How long the lead-in is [s].
+
+    """
+
+    commitment: Commitment
+    motion: ExecutingMotion
+    lead: float
 
 
 class Commitments:
@@ -79,9 +100,9 @@ class Commitments:
         self.planned: ExecutingMotion | None = None
         # The motion that it replaced.
         self._replaced: ExecutingMotion | None = None
-        self.present: Commitment | None = None
+        self._sent: Sent | None = None
         # The last ones, in their order: a controller may have rejected one.
-        self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
+        self._recent: deque[Sent] = deque(maxlen=REMEMBERED)
         # Since when the arm rests [s], what was commanded then, and where it was.
         self._rest: tuple[float, Array, Array] | None = None
         self._parameters: PlannerParameters | None = None
@@ -100,6 +121,11 @@ class Commitments:
         self._took = 0.0
         # Until then the present commitment is not extended: a handover was planned from it [s].
         self._held_until = -np.inf
+
+    @property
+    def present(self) -> Commitment | None:
+        """The newest commitment; it may begin a little later than now."""
+        return None if self._sent is None else self._sent.commitment
 
     @property
     def is_active(self) -> bool:
@@ -135,16 +161,19 @@ class Commitments:
         with suppress(Exception):
             self._reporter.body_observed(self._body)
 
-    def begin(self, planned: ExecutingMotion, parameters: PlannerParameters) -> ExecutingMotion:
+    def begin(
+        self, planned: ExecutingMotion, parameters: PlannerParameters, lead: Trajectory
+    ) -> ExecutingMotion:
         """
-        Return the first commitment of a motion, to be published; the motion itself without any.
+        Return the first commitment of a motion, to be published; without separation all of it.
 
-        Raise RequestError where it cannot begin.
+        lead: what is commanded before that. Raise RequestError where it cannot begin.
         """
         separation = parameters.separation
         if separation is None:
+            commanded = led(lead, planned)
             self.end()
-            return planned
+            return commanded
         if self.fault:
             raise RequestError(
                 ErrorCode.FAILURE,
@@ -163,21 +192,22 @@ class Commitments:
                 f'the motion cannot begin: if {found.box} moves, {found.bar} is not proven '
                 f'separate from it {found.time:.2f} s after the start',
             )
+        sent = _sent(found, planned, lead)
         self._held_until = self._blocked = -np.inf
         self._is_reset = self._is_news = False
         # The controller may reject what replaces a running motion.
-        replaced = [] if self.present is None else [self.present]
-        self._recent = deque([*replaced, found], maxlen=REMEMBERED)
+        replaced = [] if self._sent is None else [self._sent]
+        self._recent = deque([*replaced, sent], maxlen=REMEMBERED)
         self._rest = None
         self._replaced = self.planned
-        self.planned, self.present, self._parameters = planned, found, parameters
+        self.planned, self._sent, self._parameters = planned, sent, parameters
         with suppress(Exception):
             self._report(None, float(path_state(found, found.start_time)[1]), False)
-        return _executing(found, planned)
+        return sent.motion
 
     def end(self) -> None:
         """Forget the running motion."""
-        self.planned = self.present = self._replaced = None
+        self.planned = self._sent = self._replaced = None
 
     def hold(self, until: float) -> None:
         """Let the present commitment be the last one until a time [s]."""
@@ -185,8 +215,15 @@ class Commitments:
 
     def phase(self, now: float) -> float:
         """Return the time within the planned motion at a time [s]."""
-        assert self.present is not None
-        return float(path_state(self.present, now)[0])
+        return float(self._path_state(now)[0])
+
+    def _path_state(self, now: float) -> Array:
+        """Return where within the planned motion the arm is commanded to be, and how fast."""
+        assert self.planned is not None and self._sent is not None
+        motion = self.planned.trajectory
+        own = [s.commitment for s in self._recent if s.commitment.motion is motion]
+        begun = (c for c in reversed(own) if c.start_time <= now)
+        return path_state(next(begun, own[0]), now)
 
     def is_arrived(self, now: float) -> bool:
         """Return whether the present commitment leads to the end of the planned motion."""
@@ -229,8 +266,8 @@ class Commitments:
         """Return whether the whole rest was given and is not proven any more, by a part's news."""
         if not self._is_news or self.present is None or not self.present.is_whole:
             return False
-        assert self.planned is not None
-        self._is_news = not self.is_separate(_executing(self.present, self.planned), now)
+        assert self._sent is not None
+        self._is_news = not self.is_separate(self._sent.motion, now)
         return self._is_news
 
     def waits_for_reset(self, now: float) -> bool:
@@ -253,74 +290,82 @@ class Commitments:
         it executes.
         """
         is_other = self._find_present(reading)
-        present, planned, parameters = self.present, self.planned, self._parameters
-        assert present is not None and planned is not None and parameters is not None
-        found = None if self.fault else self._extended(now, begin, present, parameters, is_clear)
+        sent, planned, parameters = self._sent, self.planned, self._parameters
+        assert sent is not None and planned is not None and parameters is not None
+        found = None if self.fault else self._extended(now, begin, sent, parameters, is_clear)
         if found is None:
-            return _executing(present, planned) if is_other else None
-        return _executing(found, planned)
+            return sent.motion if is_other else None
+        return found.motion
 
     def _extended(
         self,
         now: float,
         begin: float,
-        present: Commitment,
+        sent: Sent,
         parameters: PlannerParameters,
         is_clear: Callable[[Trajectory], bool],
-    ) -> Commitment | None:
+    ) -> Sent | None:
         """Return the commitment that was published in place of the present one; None: none was."""
-        separation = parameters.separation
-        if now < max(present.start_time, self._held_until) or self._body is None:
+        separation, planned, present = parameters.separation, self.planned, sent.commitment
+        assert separation is not None and planned is not None
+        # By then the controller has it, however late it is.
+        delay = parameters.controller_delay
+        within = min(max(TAKES * self._took, FOUND_WITHIN), LATEST)
+        start = now + within + ahead(delay)
+        if now < self._held_until or start < present.start_time or self._body is None:
             return None
-        assert separation is not None
-        is_at_rest = now > present.end_time
+        is_at_rest = start > present.end_time
         if is_at_rest and not present.is_whole and not self._may_resume(now, parameters):
             if parameters.resume == MANUAL:
                 waits = SeparationStatus(SeparationState.PROTECTIVE_STOP, 'waits for ~/reset', 0.0)
                 self._reporter.separation_status(waits)
             return None
-        if is_in_sharp_stop(present, now, separation):
+        if is_in_sharp_stop(present, start, separation):
             blocked = self._blocked_by if self._blocked >= present.start_time else None
-            self._report(blocked, float(path_state(present, now)[1]), True)
+            self._report(blocked, float(self._path_state(now)[1]), True)
             return None
-        elapsed = now - present.start_time
+        elapsed = start - present.start_time
         if present.is_whole and (
             self.has_lost_proof(now)
             or not is_clear(part_of(present.trajectory, elapsed, present.trajectory.duration))
         ):
             # From here on the motion is given in stretches.
             present = replace(present, stretch=elapsed)
-        seen = body_at(self._body, now, separation.rules)
-        found = extended(present, now, seen, self._stretched(separation), is_clear)
+        seen = body_at(self._body, start, separation.rules)
+        found = extended(present, start, seen, self._stretched(separation), is_clear)
         if found is None:
             return None
         if isinstance(found, Blocked):
             self._blocked, self._blocked_by = now, found
             is_stopping = now - present.start_time > present.stretch
-            self._report(found, float(path_state(present, now)[1]), is_stopping)
+            self._report(found, float(self._path_state(now)[1]), is_stopping)
             return None
+        joins = sent.lead + elapsed
+        lead = lead_in(sent.motion.trajectory, joins - (start - begin_of(now, delay)), joins)
         took = time.perf_counter() - begin
         self._took = max(min(took, LATEST), FADING * self._took)
-        if took > LATEST or is_in_sharp_stop(present, now + took + ARRIVAL, separation):
+        if took > within or not continues(lead, found.trajectory):
             # The arm is on its way to rest by then: from there the next one goes on.
             return None
-        self._publishers.publish_motion(found.trajectory, parameters, found.start_time)
+        sent = _sent(found, planned, lead)
+        message = sent.motion
+        self._publishers.publish_motion(message.trajectory, parameters, message.start_time)
         # A reset counts for the stop that it follows, and no later one.
-        self.present, self._is_news, self._is_reset = found, False, False
-        if len(self._recent) == REMEMBERED and self._recent[0].is_whole:
+        self._sent, self._is_news, self._is_reset = sent, False, False
+        if len(self._recent) == REMEMBERED and self._recent[0].commitment.is_whole:
             # A controller that has rejected all since would execute it to the end.
             del self._recent[1]
-        self._recent.append(found)
+        self._recent.append(sent)
         # An error in the report must not hide what was published.
         with suppress(Exception):
             self._reporter.commitment_published(time.perf_counter() - begin)
-            self._report(None, 1.0 if found.is_whole else float(path_state(found, now)[1]), False)
-        return found
+            rate = 1.0 if found.is_whole else float(path_state(found, start)[1])
+            self._report(None, rate, False)
+        return sent
 
     def _stretched(self, separation: Separation) -> Separation:
-        """Return the settings for commitments that last until the next body."""
-        # Where this process has to wait for a processor, so has the controller, as a rule.
-        stretch = max(separation.stretch, PERIODS * self._period + PROCESSING + self._took)
+        """Return the settings for commitments that last until the next one begins."""
+        stretch = max(separation.stretch, PERIODS * self._period + PROCESSING)
         return replace(separation, stretch=stretch)
 
     def _may_resume(self, now: float, parameters: PlannerParameters) -> bool:
@@ -353,34 +398,37 @@ class Commitments:
 
         Return whether it does. An arm that lags behind what is commanded executes it.
         """
-        begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
-        if reading is None or len(begun) < 2:
+        if reading is None or self._parameters is None:
             return False
-        is_at_rest = begun[-1].end_time < reading.taken and not reading.is_moving(reading.taken)
+        begun = [s for s in self._recent if s.commitment.start_time <= reading.taken]
+        if len(begun) < 2:
+            return False
+        last = begun[-1].commitment
+        is_at_rest = last.end_time < reading.taken and not reading.is_moving(reading.taken)
         aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
         gap = np.inf
         # What was commanded until then, by all of them in turn.
-        for time_ago in np.arange(0.0, LONGEST_LAG, LAG_STEP):
+        for time_ago in np.arange(0.0, LONGEST_LAG + self._parameters.controller_delay, LAG_STEP):
             then = reading.taken - time_ago
-            last = next((c for c in reversed(begun) if c.start_time <= then), begun[0])
-            gap = min(gap, _gap(last, reading, time_ago))
+            then_last = (s for s in reversed(begun) if s.commitment.start_time <= then)
+            gap = min(gap, _gap(next(then_last, begun[0]).commitment, reading, time_ago))
             if gap <= aside:
                 return False
-        gaps = [_gap(c, reading, 0.0) for c in begun[:-1]]
+        gaps = [_gap(s.commitment, reading, 0.0) for s in begun[:-1]]
         k = int(np.argmin(gaps))
         if gaps[k] >= nearer * gap:
             return False
         # What has come since it was proven, and since later ones were, counts again.
-        self.present, self._is_news = begun[k], True
+        self._sent, self._is_news = begun[k], True
         self._recent = deque([begun[k]], maxlen=REMEMBERED)
-        if self.planned is not None and begun[k].motion is not self.planned.trajectory:
+        if self.planned is not None and begun[k].commitment.motion is not self.planned.trajectory:
             # It is of the motion before that.
             self.planned, self._replaced = self._replaced, None
         return True
 
     def _commanded(self, time: float) -> Array:
         """Return the positions that were commanded for a time [s], (dof,) [rad]."""
-        recent = self._recent
+        recent = [sent.commitment for sent in self._recent]
         commitment = next((c for c in reversed(recent) if c.start_time <= time), recent[0])
         elapsed = min(max(time - commitment.start_time, 0.0), commitment.trajectory.duration)
         place: Array = positions_at(commitment.trajectory, [elapsed])[0]
@@ -432,11 +480,12 @@ def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> floa
     return float(np.abs(positions_at(curve, [time])[0] - reading.positions).max())
 
 
-def _executing(commitment: Commitment, planned: ExecutingMotion) -> ExecutingMotion:
-    """Return a commitment as the motion that the arm executes."""
-    return replace(
+def _sent(commitment: Commitment, planned: ExecutingMotion, lead: Trajectory) -> Sent:
+    """Return a commitment as it is sent, with what is commanded before it."""
+    motion = replace(
         planned,
         trajectory=commitment.trajectory,
         start_time=commitment.start_time,
         escape_time=0.0,
     )
+    return Sent(commitment, led(lead, motion), lead.duration)

@@ -13,6 +13,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
+import math
 from threading import RLock
 import time
 import traceback
@@ -21,13 +22,14 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
+from rrth_planner.execution.command import begin_of, lead_in, rest_at, stop_along
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
+    is_place_free,
     is_ray_clear,
     is_remaining_free,
-    with_lead_in,
 )
 from rrth_planner.model.errors import one_line
 from rrth_planner.model.goal import PointingGoal
@@ -41,7 +43,6 @@ from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.monitor.commitments import Commitments
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
-from rrth_planner.timing.fast_stop import fast_stop
 
 # Period of the checks of the inputs and of the commanded motion [s].
 PERIOD = 0.02
@@ -54,6 +55,8 @@ OFF_TRAJECTORY = (
 IN_THE_WAY = 'the remaining motion is not proven free of the wearer'
 SOON_IN_THE_WAY = 'the wearer is about to move into the path of the arm'
 NOT_SEPARATE = 'the remaining motion is no longer proven separate from the wearer'
+# An arm off its motion may come nearer to the wearer than the margin, but not than this share.
+MARGIN_LEFT = 0.5
 # With separation it goes on for so long while the wearer is in the way further on [s].
 PATIENCE = 0.3
 # Why a motion is given up.
@@ -155,10 +158,11 @@ class ExecutionMonitor:
 
     def begin(
         self,
-        running: ExecutingMotion,
+        planned: ExecutingMotion,
         goal: PointingGoal,
         parameters: PlannerParameters,
-        publish: Callable[[], None],
+        publish: Callable[[], None] = lambda: None,
+        joins: float | None = math.inf,
     ) -> None:
         """
         Publish a motion, and monitor it with the parameters of its plan.
@@ -166,6 +170,15 @@ class ExecutionMonitor:
         It is checked with the next body: called in the node's own thread right after revalidation.
         With separation the controller is given the first commitment of it; raise RequestError
         where it cannot begin.
+
+        Parameters
+        ----------
+        publish : callable
+            Publishes the planned motion for those who want to see it.
+        joins : float or None
+            The time within what is commanded at which the motion begins [s]; inf: at rest. None:
+            what is commanded until then is not known.
+
         """
         with self._lock:
             if self._is_closed:
@@ -173,20 +186,16 @@ class ExecutionMonitor:
             before = copy(self._tracker), self._parameters, self._goal, self._state
             commitments = copy(self._commitments)
             try:
-                commanded = self._commitments.begin(running, parameters)
-                present, now = self._tracker.motion, self._now()
-                if commanded is not running and present is not None and now < running.start_time:
-                    # Left to itself until a handover, the controller would not move as is proven.
-                    phase = now - present.start_time
-                    commanded = with_lead_in(present, phase, commanded, now)
-                self._tracker.begin(commanded, now)
+                now, delay = self._now(), parameters.controller_delay
+                lead = self._lead_in(planned, joins, now, delay)
+                commanded = self._commitments.begin(planned, parameters, lead)
+                self._tracker.begin(commanded, now, delay)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._in_the_way_since = MonitorState.MONITORING, None
                 publish()
-                if commanded is not running:
-                    self._publishers.publish_motion(
-                        commanded.trajectory, parameters, commanded.start_time
-                    )
+                self._publishers.publish_motion(
+                    commanded.trajectory, parameters, commanded.start_time
+                )
             except Exception:
                 self._tracker, self._parameters, self._goal, self._state = before
                 self._commitments = commitments
@@ -195,6 +204,23 @@ class ExecutionMonitor:
             self._withheld_stop = None
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
+
+    def _lead_in(
+        self, planned: ExecutingMotion, joins: float | None, now: float, delay: float
+    ) -> Trajectory:
+        """Return what is commanded from a little before now until a motion begins."""
+        command, left = self._tracker.command, planned.start_time - begin_of(now, delay)
+        if joins is None or planned.start_time <= now:
+            return rest_at(planned.trajectory, 0.0)
+        if math.isinf(joins):
+            return rest_at(planned.trajectory, left)
+        if command is None:
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'what the arm is commanded is not known any more, expected the motion that it '
+                'was planned from',
+            )
+        return lead_in(command.trajectory, joins - left, joins)
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
@@ -209,15 +235,16 @@ class ExecutionMonitor:
             self._state = MonitorState.IDLE
 
     def _stop_of(self, running: ExecutingMotion, phase: float, now: float) -> ExecutingMotion:
-        """Return the fail-safe stop from where the arm is."""
-        if self._commitments.is_active:
-            # A commitment that has just begun is ahead of the last joint state: what is commanded
-            # counts, as when it is extended.
+        """
+        Return the fail-safe stop of a motion.
+
+        What is commanded counts, not where an arm that lags behind is; unless it executes the
+        motion more slowly than commanded: then it stops from its phase [s].
+        """
+        if self._commitments.is_active or self._tracker.commands(running):
             phase = now - running.start_time
-        # Before a handover the stop begins with the new motion.
-        start = running.start_time if phase < 0.0 else now
-        stop = fast_stop(running.trajectory, phase, self._parameters.stop_limits)
-        return ExecutingMotion(trajectory=stop, start_time=start)
+        parameters = self._parameters
+        return stop_along(running, phase, now, parameters.stop_limits, parameters.controller_delay)
 
     def on_body(self, body: WearerBody, arrived: int, is_newest: bool = True) -> None:
         """
@@ -236,13 +263,14 @@ class ExecutionMonitor:
 
     def hold(self, until: float) -> ExecutingMotion | None:
         """
-        Return the running motion, which is not extended until a time [s].
+        Return what the arm is commanded, which does not change until a time [s].
 
-        A handover is planned from it. Without separation it is the whole motion anyway.
+        A handover is planned from it; also the last motion after its end, since the controller
+        holds that. Without separation it is the whole motion anyway. None: it is not known.
         """
         with self._lock:
             self._commitments.hold(until)
-            return self.running
+            return self._tracker.command
 
     @property
     def goal(self) -> PointingGoal | None:
@@ -332,7 +360,9 @@ class ExecutionMonitor:
         self._reporter.body_used(self._inputs.body.age(now))
         scene, expected = scene_of(body.at(now)), self._inputs.expected_scene()
         planned, planned_phase = self._remaining(phase, now)
-        is_free = self._holds(is_remaining_free, planned, planned_phase, scene)
+        is_free = self._holds(is_remaining_free, planned, planned_phase, scene) and (
+            planned_phase < planned.escape_time or self._is_arm_free(scene)
+        )
         # An escape leaves where he is.
         is_soon_free = planned_phase < planned.escape_time or self._holds(
             is_expected_free, self.running, phase, expected
@@ -381,6 +411,17 @@ class ExecutionMonitor:
             and now - since < PATIENCE
             and planned_phase >= planned.escape_time
             and self._holds(is_remaining_free, running, phase, scene)
+        )
+
+    def _is_arm_free(self, scene: Scene) -> bool:
+        """Return whether the arm is clear of the wearer where it is, maybe off its motion."""
+        reading, parameters = self._inputs.joints.value, self._parameters
+        return reading is None or is_place_free(
+            reading.positions,
+            parameters.arm,
+            scene,
+            MARGIN_LEFT * parameters.margin,
+            parameters.ray_guard_length,
         )
 
     def _is_clear(self, scene: Scene, expected: Scene, curve: Trajectory) -> bool:
@@ -443,6 +484,7 @@ class ExecutionMonitor:
         self._run_fail_safe(self._check_periodically)
 
     def _check_periodically(self) -> None:
+        self._tracker.check_command(self._now())
         if self._state is not MonitorState.IDLE:
             self._check_inputs()
         if self.pending_stop:
@@ -491,11 +533,11 @@ class ExecutionMonitor:
         if found is None:
             return
         before, phase = found
-        stop = replace(self._stop_of(before, phase, now), start_time=now)
+        stop = self._stop_of(before, phase, now)
         if self._is_withheld(stop, before, now):
             return
-        self._tracker.motion = stop
-        self._publishers.publish_motion(stop.trajectory, self._parameters, now)
+        self._tracker.repeat_stop(stop)
+        self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
         self._node.get_logger().error(
             'arm did not follow the commanded stop: stop published again'
         )
@@ -525,6 +567,7 @@ class ExecutionMonitor:
                 self._tracker.stop(stop)
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
+            self._tracker.forget_command()
 
     def _phase(self, now: float) -> float | None:
         """Return the time within the running motion; None where it is over or unknown [s]."""
@@ -564,7 +607,7 @@ class ExecutionMonitor:
         took = self._elapsed(arrived)
         warning = '' if is_safe else self._clearance_warning(stopped.trajectory, scene)
         self._reporter.stop_published(took)
-        self._report_stop(stopped.trajectory, warning, f'; published after {1e3 * took:.2f} ms')
+        self._report_stop(stopped, warning, f'; published after {1e3 * took:.2f} ms')
         self._record_stop(stopped.trajectory, None if warning else scene)
         self._commitments.fail(why, is_fault=False)
 
@@ -595,7 +638,7 @@ class ExecutionMonitor:
         # An error in the report must not undo the stop.
         with suppress(Exception):
             self._reporter.stop_published(took)
-            self._report_stop(stopped.trajectory)
+            self._report_stop(stopped)
             self._record_stop(stopped.trajectory, None, self._is_replanned)
 
     def _record_stop(
@@ -700,9 +743,10 @@ class ExecutionMonitor:
         elif self._state is not MonitorState.HOLDING:
             self._set_state(MonitorState.IDLE, '')
 
-    def _report_stop(self, stop: Trajectory, warning: str = '', note: str = '') -> None:
+    def _report_stop(self, stop: ExecutingMotion, warning: str = '', note: str = '') -> None:
         """Report in log and diagnostics why the arm stops."""
-        sentence = f'{self.stop_reason}: fail-safe stop, at rest in {stop.duration:.2f} s{warning}'
+        left = max(0.0, stop.start_time + stop.trajectory.duration - self._now())
+        sentence = f'{self.stop_reason}: fail-safe stop, at rest in {left:.2f} s{warning}'
         self._set_state(MonitorState.STOPPING, sentence)
         # Two calls: rclpy raises where one line of code logs at changing severities.
         if warning:

@@ -5,8 +5,7 @@
 import functools
 
 import numpy as np
-from rrth_planner.execution.executing_motion import ExecutingMotion, phase_of
-from rrth_planner.execution.remaining_motion import with_lead_in
+from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.ros.interface.inputs import Input
@@ -20,8 +19,9 @@ STILL = 0.1
 # An arm that is further from its motion than this [rad] executes another one where the distance to
 # that is less than this share.
 ASIDE, NEARER = 0.02, 0.25
-# Greatest lag of an arm [s].
-LATE = 0.1
+# An arm at rest is off what it is commanded where it is further from that than this [rad]. After
+# so long its controller holds it, or was started anew: what it commands is where the arm is [s].
+OFF_COMMAND, OFF_AFTER = 0.01, 0.3
 # Spacing of the samples of a stop [s].
 SPACING = 2e-3
 
@@ -45,16 +45,18 @@ class MotionDetector:
         return is_fast or abs(now - self._then) < STILL
 
 
-def has_missed_stop(reading: JointReading, before: ExecutingMotion, stop: ExecutingMotion) -> bool:
+def has_missed_stop(
+    reading: JointReading, before: ExecutingMotion, stop: ExecutingMotion, delay: float = 0.0
+) -> bool:
     """
     Return whether an arm continues a motion in spite of a commanded stop.
 
     One that executes the stop, however late, is where the stop was at some time until now, even
     where the motion slows down by itself; or not there yet: an arm may lag, or have stopped
-    before.
+    before. delay: the greatest of the controller [s].
     """
     elapsed = reading.taken - stop.start_time
-    if elapsed <= LATE:
+    if elapsed <= LONGEST_LAG + 2.0 * delay:
         return False
     end = min(elapsed, stop.trajectory.duration)
     passed = sample(stop.trajectory, np.linspace(0.0, end, 2 + int(end / SPACING)))[0]
@@ -92,6 +94,11 @@ class ExecutionTracker:
     def __init__(self, joints: Input[JointReading | None]) -> None:
         """Begin with no motion."""
         self.motion: ExecutingMotion | None = None
+        # What the controller was given last, also after its end; None: that is not known. Since
+        # when the arm rests off it [s], and how late the controller may be [s].
+        self.command: ExecutingMotion | None = None
+        self._off_since: float | None = None
+        self._delay = 0.0
         # Whether that is the last commanded one.
         self.is_latest = True
         self._joints, self._detector = joints, MotionDetector()
@@ -101,26 +108,64 @@ class ExecutionTracker:
         # When the arm was last found on its motion [s].
         self._last_on_motion = 0.0
 
-    def begin(self, motion: ExecutingMotion, now: float) -> None:
-        """Track a motion from its beginning on, and the present one, if any, until then."""
+    def begin(self, motion: ExecutingMotion, now: float, delay: float = 0.0) -> None:
+        """Track a motion of a controller that is at most `delay` late, from its beginning [s]."""
         phase = None if self.is_over(now) else self.phase(now)
         self._previous = None if phase is None else self.motion
-        if self.motion is not None and phase is not None and now < motion.start_time:
-            motion = with_lead_in(self.motion, phase, motion, now)
-        self.motion, self._stopped = motion, None
+        self._command(motion)
+        self._stopped, self._delay = None, delay
         self.is_latest, self._last_on_motion = True, now
 
     def replace(self, motion: ExecutingMotion) -> None:
         """Track a motion that continues the present one."""
-        self.motion, self._previous, self._stopped = motion, None, None
+        self._command(motion)
+        self._previous = self._stopped = None
 
     def stop(self, stop: ExecutingMotion) -> None:
         """Track a stop along the path of the present motion."""
-        self.motion, self._stopped = stop, self.motion
+        self._stopped = self.motion
+        self._command(stop)
+
+    def repeat_stop(self, stop: ExecutingMotion) -> None:
+        """Track a stop that is published again, since the arm continues its motion."""
+        self._command(stop)
 
     def forget(self) -> None:
-        """Track nothing any more."""
+        """Track nothing any more; the controller holds the end of what it was given last."""
         self.motion = self._stopped = self._previous = None
+
+    def forget_command(self) -> None:
+        """Take it that the controller holds the arm where that is."""
+        self.command = self._off_since = None
+
+    def check_command(self, now: float) -> None:
+        """Forget the command where the arm has rested off it for a while, by its readings."""
+        command, reading = self.command, self._joints.value
+        if command is None or reading is None:
+            return
+        lag = LONGEST_LAG + self._delay
+        is_off = command.deviation(reading.positions, reading.taken, lag) > OFF_COMMAND
+        if not is_off or reading.is_moving(now):
+            self._off_since = None
+        elif self._off_since is None:
+            self._off_since = now
+        elif abs(now - self._off_since) > OFF_AFTER:
+            self.forget_command()
+
+    def commands(self, motion: ExecutingMotion) -> bool:
+        """
+        Return whether the controller follows a motion by its time, as far as is known.
+
+        Not where the arm is elsewhere: it executes the motion more slowly, or not at all.
+        """
+        reading = self._joints.value
+        return reading is None or motion.follows(
+            reading.positions, reading.taken, LONGEST_LAG + self._delay
+        )
+
+    def _command(self, motion: ExecutingMotion) -> None:
+        self.motion = self.command = motion
+        self._off_since = None
 
     def is_over(self, now: float) -> bool:
         """Return whether the motion, if there is one, has ended and the arm is at rest."""
@@ -153,13 +198,15 @@ class ExecutionTracker:
         motion, before, reading = self.motion, self._previous, self._joints.value
         if motion is None or before is None or reading is None:
             return False
-        if reading.taken - motion.start_time <= LATE or not is_on_other(reading, motion, before):
+        late = LONGEST_LAG + 2.0 * self._delay
+        if reading.taken - motion.start_time <= late or not is_on_other(reading, motion, before):
             return False
         # A stop may pass near the previous motion: then the direction must match, too.
         q, v = reading.positions, reading.velocities
         if self._stopped is not None and phase_of(q, v, before.trajectory) is None:
             return False
-        self.motion, self._previous, self._stopped = before, motion, None
+        self._command(before)
+        self._previous, self._stopped = motion, None
         self.is_latest = not self.is_latest
         return True
 
@@ -168,7 +215,7 @@ class ExecutionTracker:
         stop, before, reading = self.motion, self._stopped, self._joints.value
         if stop is None or before is None or reading is None:
             return None
-        if not has_missed_stop(reading, before, stop):
+        if not has_missed_stop(reading, before, stop, self._delay):
             return None
         phase = before.phase(reading.positions, reading.taken, now)
         if phase is None or phase >= before.trajectory.duration:

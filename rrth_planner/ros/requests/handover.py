@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 import time
 
+from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LEAD
 from rrth_planner.model.trajectory import StartState
 
-# How far ahead a handover is planned for; the second value, where the first was too short [s].
+# How far ahead a handover is planned for, beyond the delay of the controller; the second value,
+# where the first was too short [s].
 LEADS = (0.05, LONGEST_LEAD)
-# The motion is published this share of the lead before it begins, so that the controller has it in
-# time; not where the present motion is unknown: then the arm is checked as late as possible.
+# The motion is published this share of the lead before the controller has to have it; not where
+# the present motion is unknown: then the arm is checked as late as possible.
 EARLY = 0.5
 # A motion may be published so late where the present motion is unknown [s].
 LATE = 0.02
@@ -35,6 +37,10 @@ class Handover:
         The state of the arm then.
     running : ExecutingMotion or None
         The last commanded motion.
+    delay : float
+        Greatest delay of the controller [s].
+    is_commanded : bool
+        Whether the arm executes that as it is commanded, and the new motion continues it.
 
     """
 
@@ -42,16 +48,27 @@ class Handover:
     lead: float
     start_state: StartState
     running: ExecutingMotion | None
+    delay: float
+    is_commanded: bool
 
     @property
     def publish_ahead(self) -> float:
         """How long before it begins the motion is published [s]."""
-        return 0.0 if self.start_state.running is None else EARLY * self.lead
+        if self.start_state.running is None:
+            return 0.0
+        return EARLY * self.lead + ahead(self.delay)
 
     @property
     def deadline(self) -> float:
         """Until when the motion may be published [s]."""
+        if self.is_commanded:
+            return self.time - ahead(self.delay)
         return self.time + (LATE if self.start_state.running is None else 0.0)
+
+    @property
+    def joins(self) -> float | None:
+        """The time within the commanded motion at which it begins [s]; None: not by its time."""
+        return self.start_state.time if self.is_commanded else None
 
     def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
         """Return when the motion is to be published, or as soon as it is cancelled."""

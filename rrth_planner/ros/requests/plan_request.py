@@ -8,9 +8,10 @@ import math
 import secrets
 
 import numpy as np
+from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.incident import disagreement_incident, Incident
-from rrth_planner.model.arrays import FARTHEST
+from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
@@ -109,7 +110,8 @@ def plan_request(
     goal : PointingGoal, optional
         Of the request; without, the last target.
     hold : callable, optional
-        Returns the last commanded motion, which does not change until a time [s].
+        Returns what the arm is commanded, which does not change until a time [s]; None: that is
+        not known.
 
     Raises
     ------
@@ -120,19 +122,26 @@ def plan_request(
     question: PlanQuestion | None = None
     plan: MotionPlan | None = None
     try:
+        delay = parameters.controller_delay
         for lead in LEADS:
             question = plan = None
             require_not_cancelled(should_stop, 'the request was cancelled before its turn')
             now = clock()
-            running = hold(now + lead + LATE)
+            then = now + lead + ahead(delay)
+            running = hold(then + LATE)
             snapshot = inputs.at(now, parameters, goal)
-            handover = None
-            if snapshot.is_moving(now) or snapshot.is_about_to_move(running, now, lead):
-                ahead = snapshot.start_state_at(running, now + lead, parameters.arm)
-                handover = Handover(now + lead, lead, ahead, running)
+            handover, q_start = None, snapshot.q_start
+            if snapshot.is_moving(now) or snapshot.is_about_to_move(
+                running, now, then - now, delay
+            ):
+                handover = _handover(snapshot, running, then, lead, parameters)
+                q_start = handover.start_state.state.positions
             else:
                 hold(math.inf)
-            question = _question(snapshot, parameters, handover, inputs.body.age(now))
+                if running is not None:
+                    # The controller holds what it was given last, from which the arm may sag.
+                    q_start = running.trajectory.positions[-1]
+            question = _question(snapshot, parameters, handover, q_start, inputs.body.age(now))
             plan = planner.plan(question, should_stop)
             for _ in range(MOST_SLOWER):
                 if not is_too_short(plan, snapshot.goal):
@@ -196,17 +205,35 @@ def require_not_cancelled(
         raise RequestError(ErrorCode.PREEMPTED, sentence)
 
 
+def _handover(
+    snapshot: InputSnapshot,
+    running: ExecutingMotion | None,
+    time: float,
+    lead: float,
+    parameters: PlannerParameters,
+) -> Handover:
+    """Return the handover from a moving arm at about a time [s]."""
+    delay = parameters.controller_delay
+    start = snapshot.start_state_at(running, time, parameters.arm, delay)
+    is_commanded = snapshot.is_commanded(running, delay) and start.running is not None
+    if is_commanded and running is not None and start.time < running.trajectory.duration:
+        # At a point of the motion where there is one.
+        time = running.start_time + start.time
+    return Handover(time, lead, start, running, delay, is_commanded)
+
+
 def _question(
     snapshot: InputSnapshot,
     parameters: PlannerParameters,
     handover: Handover | None,
+    q_start: Array,
     body_age: float,
 ) -> PlanQuestion:
     separation = parameters.separation
     return PlanQuestion(
         arm=parameters.arm,
         scene=snapshot.scene,
-        q_start=snapshot.q_start if handover is None else handover.start_state.state.positions,
+        q_start=q_start,
         # Its pace is in the limits.
         goal=PointingGoal(snapshot.goal.target),
         limits=limits_of(parameters.limits, snapshot.goal),

@@ -15,6 +15,7 @@ import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
+from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
@@ -429,16 +430,18 @@ class PlanQueue:
         self._reporter.body_used(self._inputs.body.age(self._now()))
         # From here on the request cannot be cancelled.
         self._open.discard(ticket)
+        handover, start = outcome.handover, self._now() + ahead(parameters.controller_delay)
         monitor.begin(
             ExecutingMotion(
                 trajectory=trajectory,
-                start_time=self._now() if outcome.handover is None else outcome.handover.time,
+                start_time=start if handover is None else handover.time,
                 target_distance=plan.target_distance,
                 escape_time=plan.escape_time,
             ),
             snapshot.goal,
             parameters,
-            lambda: self._publishers.publish(msg),
+            lambda: self._publishers.publish_planned(msg),
+            math.inf if handover is None else handover.joins,
         )
         return True
 

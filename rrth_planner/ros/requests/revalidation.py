@@ -10,8 +10,10 @@ from rrth_planner.collision.penetration import escape_depths
 from rrth_planner.collision.trajectory_validation import is_proven_free
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import arm_world
-from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.command import ahead
+from rrth_planner.execution.executing_motion import ExecutingMotion, FOLLOWS
 from rrth_planner.execution.expected_wearer import is_expected_free
+from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.arm import reach_to
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
@@ -20,6 +22,8 @@ from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.inputs import ArmHasMoved, Inputs, InputSnapshot, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.ros.monitor.execution_monitor import MARGIN_LEFT
+from rrth_planner.ros.monitor.execution_tracker import OFF_COMMAND
 from rrth_planner.ros.requests.handover import Handover, LEADS
 
 # A motion that starts further from the arm than this would begin with a jump [rad].
@@ -96,6 +100,7 @@ class Revalidation:
         now = self.clock()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
+        self._require_clear(present)
         if not np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):
             self._require_proof(present.scene)
         self._require_room()
@@ -104,25 +109,55 @@ class Revalidation:
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
         """Raise ArmHasMoved where the arm is not at the start of the motion."""
         snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
-        expected = snapshot.q_start
+        delay, expected, what = self.parameters.controller_delay, snapshot.q_start, 'moved by'
         if handover is None:
             present.require_rest(now, arm)
-            if present.is_about_to_move(self.running, now, LEADS[0]):
+            if present.is_about_to_move(self.running, now, LEADS[0] + ahead(delay), delay):
                 raise ArmHasMoved(
                     ErrorCode.START_STATE_INVALID,
                     'the arm has begun its commanded motion, expected an arm at rest',
                 )
+            aside = float(np.abs(present.q_start - self._motion.positions[0]).max())
+            if not aside <= OFF_COMMAND:
+                raise ArmHasMoved(
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    f'the arm rests {aside:.4f} rad from what it is commanded, expected at most '
+                    f'{OFF_COMMAND:g} rad',
+                )
+        elif handover.is_commanded:
+            assert handover.running is not None
+            aside = handover.running.deviation(present.q_start, present.joints.taken, delay)
+            if not aside <= FOLLOWS:
+                raise ArmHasMoved(
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    f'the arm is {aside:.4f} rad from what it was commanded within the last '
+                    f'{delay:g} s (controller_delay), expected at most {FOLLOWS:g} rad',
+                )
+            return
         else:
+            what = 'deviates from its trajectory by'
             expected = snapshot.start_state_at(
-                handover.running, present.joints.taken, arm
+                handover.running, present.joints.taken, arm, delay
             ).state.positions
         moved = float(np.abs(present.q_start - expected).max())
         if not moved <= START_TOLERANCE:
-            what = 'moved by' if handover is None else 'deviates from its trajectory by'
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
                 f'{START_TOLERANCE:g} rad',
+            )
+
+    def _require_clear(self, present: InputSnapshot) -> None:
+        """Raise RequestError where the arm, beside what it is commanded, is near the wearer."""
+        parameters = self.parameters
+        left = MARGIN_LEFT * parameters.margin
+        if self.plan.escape_time == 0.0 and not is_place_free(
+            present.q_start, parameters.arm, present.scene, left, parameters.ray_guard_length
+        ):
+            raise RequestError(
+                ErrorCode.START_STATE_IN_COLLISION,
+                f'the arm is nearer than {left:g} m to the wearer where it is, beside what it is '
+                'commanded',
             )
 
     def _require_proof(self, scene: Scene) -> None:
