@@ -48,10 +48,9 @@ LONGEST_PERIOD, FADING = 0.25, 0.98
 # A commitment lasts until the next one begins: the period of the bodies times so much, and by how
 # much later that may be found [s].
 PERIODS, PROCESSING = 1.3, 0.006
-# So many commitments are remembered, of which some have not begun yet. An arm that is further from
-# the present one than this [rad] executes another one where the distance to that is less than this
-# share.
-REMEMBERED, ASIDE, NEARER = 32, 0.01, 0.3
+# So many commitments that have begun are remembered. An arm that is further from the present one
+# than this [rad] executes another one where the distance to that is less than this share.
+REMEMBERED, ASIDE, NEARER = 16, 0.01, 0.3
 # At rest an arm does not lag behind: these count there.
 ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much beyond the stated delay, in steps of that [s].
@@ -102,7 +101,7 @@ class Commitments:
         self._replaced: ExecutingMotion | None = None
         self._sent: Sent | None = None
         # The last ones, in their order: a controller may have rejected one.
-        self._recent: deque[Sent] = deque(maxlen=REMEMBERED)
+        self._recent: deque[Sent] = deque()
         # Since when the arm rests [s], what was commanded then, and where it was.
         self._rest: tuple[float, Array, Array] | None = None
         self._parameters: PlannerParameters | None = None
@@ -184,7 +183,8 @@ class Commitments:
                 ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA, 'no body yet, expected one for separation'
             )
         seen = body_at(self._body, planned.start_time, separation.rules)
-        settings = self._stretched(separation)
+        # The next one takes some time to find; those after it take it from the one before.
+        settings = self._stretched(separation, self._within)
         found = first_commitment(planned.trajectory, planned.start_time, seen, settings)
         if isinstance(found, Blocked):
             raise RequestError(
@@ -197,7 +197,7 @@ class Commitments:
         self._is_reset = self._is_news = False
         # The controller may reject what replaces a running motion.
         replaced = [] if self._sent is None else [self._sent]
-        self._recent = deque([*replaced, sent], maxlen=REMEMBERED)
+        self._recent = deque([*replaced, sent])
         self._rest = None
         self._replaced = self.planned
         self.planned, self._sent, self._parameters = planned, sent, parameters
@@ -310,7 +310,7 @@ class Commitments:
         assert separation is not None and planned is not None
         # By then the controller has it, however late it is.
         delay = parameters.controller_delay
-        within = min(max(TAKES * self._took, FOUND_WITHIN), LATEST)
+        within = self._within
         start = now + within + ahead(delay)
         if now < self._held_until or start < present.start_time or self._body is None:
             return None
@@ -352,9 +352,9 @@ class Commitments:
         self._publishers.publish_motion(message.trajectory, parameters, message.start_time)
         # A reset counts for the stop that it follows, and no later one.
         self._sent, self._is_news, self._is_reset = sent, False, False
-        if len(self._recent) == REMEMBERED and self._recent[0].commitment.is_whole:
-            # A controller that has rejected all since would execute it to the end.
-            del self._recent[1]
+        if sum(one.commitment.start_time <= now for one in self._recent) > REMEMBERED:
+            # A controller that has rejected all since would execute a whole rest to the end.
+            del self._recent[1 if self._recent[0].commitment.is_whole else 0]
         self._recent.append(sent)
         # An error in the report must not hide what was published.
         with suppress(Exception):
@@ -363,10 +363,15 @@ class Commitments:
             self._report(None, rate, False)
         return sent
 
-    def _stretched(self, separation: Separation) -> Separation:
+    @property
+    def _within(self) -> float:
+        """How long it may take to find a commitment [s]."""
+        return min(max(TAKES * self._took, FOUND_WITHIN), LATEST)
+
+    def _stretched(self, separation: Separation, longer: float = 0.0) -> Separation:
         """Return the settings for commitments that last until the next one begins."""
         stretch = max(separation.stretch, PERIODS * self._period + PROCESSING)
-        return replace(separation, stretch=stretch)
+        return replace(separation, stretch=stretch + longer)
 
     def _may_resume(self, now: float, parameters: PlannerParameters) -> bool:
         """Return whether a motion that came to rest on its way may go on, if that is proven."""
@@ -420,7 +425,7 @@ class Commitments:
             return False
         # What has come since it was proven, and since later ones were, counts again.
         self._sent, self._is_news = begun[k], True
-        self._recent = deque([begun[k]], maxlen=REMEMBERED)
+        self._recent = deque([begun[k]])
         if self.planned is not None and begun[k].commitment.motion is not self.planned.trajectory:
             # It is of the motion before that.
             self.planned, self._replaced = self._replaced, None
