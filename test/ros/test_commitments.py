@@ -706,8 +706,8 @@ def test_where_commitments_take_longer_to_find_they_begin_later(separated):
     arm, hand, ahead = separated(), near(0.3), []
     arm.see(hand)
     for took in (0.0, 0.012):
-        arm.begin()
         arm.monitor._commitments._took = took
+        arm.begin()
         found = []
         for _ in range(10):
             arm.frames(1, hand)
