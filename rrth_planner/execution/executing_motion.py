@@ -41,6 +41,9 @@ SPACING = 5e-3
 # An arm follows what is commanded where no joint is further from it than this [rad], at some time
 # within its lag. One that is later than stated, by up to LONGEST_LAG [s], still executes it.
 FOLLOWS, LONGEST_LAG = 0.02, 0.1
+# Where it is to be faster than this [rad/s], and has less than this share of the velocity, it
+# executes the motion more slowly than commanded.
+PACED, SLOWEST = 0.5, 0.6
 # Greatest deviation of an arm that is on time [rad].
 ON_TIME = 5e-4
 # Until this time a motion has hardly left its start [s].
@@ -110,15 +113,29 @@ class ExecutingMotion:
             return False
         return bool(np.abs(positions_at(self.trajectory, [at])[0] - q).max() <= SAME_POSITION)
 
-    def follows(self, q: Array, taken: float, lag: float) -> bool:
-        """Return whether an arm at q, (dof,), at a time follows it at most `lag` late [s]."""
-        return self.deviation(q, taken, lag) <= FOLLOWS
+    def follows(self, q: Array, v: Array, taken: float, lag: float) -> bool:
+        """
+        Return whether an arm follows it, at most `lag` late [s].
+
+        q, v, (dof,): of a reading that was taken at a time [rad, rad/s, s].
+        """
+        places, paces = self._commanded(taken, lag)
+        gaps = np.abs(places - q).max(axis=1)
+        k = int(gaps.argmin())
+        square = float(paces[k] @ paces[k])
+        # Not every driver has velocities.
+        is_slow = square > PACED**2 and float(v @ paces[k]) < SLOWEST * square
+        return bool(gaps[k] <= FOLLOWS) and not is_slow
 
     def deviation(self, q: Array, taken: float, lag: float) -> float:
         """Return how far an arm was from what was commanded until a time, within a lag [rad]."""
-        ago = np.linspace(lag, 0.0, 2 + int(lag / SPACING))
-        places = positions_at(self.trajectory, taken - self.start_time - ago)
+        places, _ = self._commanded(taken, lag)
         return float(np.abs(places - q).max(axis=1).min())
+
+    def _commanded(self, taken: float, lag: float) -> tuple[Array, Array]:
+        """Return positions and velocities that were commanded within a lag until a time [s]."""
+        ago = np.linspace(lag, 0.0, 2 + int(lag / SPACING))
+        return sample(self.trajectory, taken - self.start_time - ago)[:2]
 
     def is_on_time(self, q: Array, v: Array, taken: float) -> bool:
         """Return whether an arm had positions and velocities of the motion at a time [s]."""

@@ -129,7 +129,7 @@ class InputSnapshot:
         """Return whether the arm executes a motion, at most so much later than stated [s]."""
         joints = self.joints
         return running is not None and running.follows(
-            joints.positions, joints.taken, delay + LONGEST_LAG
+            joints.positions, joints.velocities, joints.taken, delay + LONGEST_LAG
         )
 
     def is_about_to_move(

@@ -160,7 +160,7 @@ class ExecutionTracker:
         """
         reading = self._joints.value
         return reading is None or motion.follows(
-            reading.positions, reading.taken, LONGEST_LAG + self._delay
+            reading.positions, reading.velocities, reading.taken, LONGEST_LAG + self._delay
         )
 
     def _command(self, motion: ExecutingMotion) -> None:
