@@ -10,7 +10,7 @@ from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import with_lead_in
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.path import Path
-from rrth_planner.model.trajectory import sample
+from rrth_planner.model.trajectory import part_of, sample
 from rrth_planner.simulation.lagging_arm import LaggingArm
 from rrth_planner.simulation.trajectory_controller import (
     ControllerRules,
@@ -26,6 +26,8 @@ LIMITS = worlds.limits()
 # All joints move, the first one at its greatest speed in between.
 RUNNING = parameterize(Path([[0.0] * 4, [2.5, -0.5, 0.3, 0.8]]), (), LIMITS)
 BEGIN, AHEAD = 100.0, 0.025
+# What is looked at: from a little before until so long after a handover; the greatest lag [s].
+LATER, SETTLING = 0.15, 0.0423
 V4_20, V4_42, V6_9, BLENDING = ControllerVersion
 
 
@@ -56,8 +58,6 @@ def handed_over(rate, share, rules, lag=0.0, *, ahead=AHEAD, has_lead_in=False, 
     the running motion up to that in front.
     """
     period = 1.0 / rate
-    arm = LaggingArm(RUNNING.positions[0], period, lag, rules, BEGIN - 0.1)
-    arm.receive(points_of(RUNNING), BEGIN)
     at = BEGIN + share * RUNNING.duration
     before = ExecutingMotion(trajectory=RUNNING, start_time=BEGIN)
     new = ExecutingMotion(
@@ -66,9 +66,16 @@ def handed_over(rate, share, rules, lag=0.0, *, ahead=AHEAD, has_lead_in=False, 
     published = at - ahead
     message = with_lead_in(before, published - BEGIN, new, published) if has_lead_in else new
     assert (message is new) != has_lead_in
+    # It joins the running motion a little before.
+    begin = published - SETTLING
+    rest = part_of(RUNNING, begin - BEGIN, RUNNING.duration)
+    arm = LaggingArm(rest.positions[0], period, lag, rules, begin)
+    arm.receive(points_of(rest), begin)
+    while arm.time < published - 2 * period:
+        arm.step()
     times, setpoints = [], []
     is_sent = False
-    while arm.time < at + new.trajectory.duration:
+    while arm.time < at + LATER:
         if arm.time >= published + transport and not is_sent:
             arm.receive(points_of(message.trajectory), message.start_time)
             is_sent = True
@@ -87,9 +94,9 @@ def handed_over(rate, share, rules, lag=0.0, *, ahead=AHEAD, has_lead_in=False, 
     )
 
 
-def worst(rate, rules, lag=0.0, *, n=12, **options):
+def worst(rate, rules, lag=0.0, *, n=8, **options):
     """Return the greatest figures of handovers at many places of the motion."""
-    shares = np.linspace(0.06, 0.8, n) + np.random.default_rng(1).uniform(0.0, 0.01, n)
+    shares = np.linspace(0.12, 0.8, n) + np.random.default_rng(1).uniform(0.0, 0.01, n)
     seen = [handed_over(rate, share, rules, lag, **options) for share in shares]
     return Seen(*(max(getattr(s, name) for s in seen) for name in Seen.__annotations__))
 
