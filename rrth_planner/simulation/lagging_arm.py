@@ -41,7 +41,7 @@ class LaggingArm:
         self._begin, self._n_steps = time, 0
         # Times [s], and positions and velocities that are due then, (2, dof).
         rest = np.array([q, np.zeros(len(q))])
-        n_kept = 3 + int(lag_time / period)
+        n_kept = 4 + int(lag_time / period)
         self._setpoints: deque[tuple[float, Array]] = deque([(time, rest)], maxlen=n_kept)
 
     def receive(self, points: TimedPoints, stamp: float) -> None:
@@ -58,9 +58,17 @@ class LaggingArm:
 
     @property
     def measured(self) -> MotionState:
-        """What encoders read now: the command of `lag_time` before; no accelerations (NaN)."""
-        then = self.time - self.lag_time
-        times = [time for time, _ in self._setpoints]
+        """What encoders read now."""
+        return self.measured_at(self.time)
+
+    def measured_at(self, time: float) -> MotionState:
+        """
+        Return what encoders read at a time between the last two cycles [s].
+
+        The command of `lag_time` before; no accelerations (NaN).
+        """
+        then = time - self.lag_time
+        times = [due for due, _ in self._setpoints]
         k = int(np.clip(np.searchsorted(times, then, side='right'), 1, len(times))) - 1
         q, v = self._setpoints[k][1]
         if k + 1 < len(times) and then > times[k]:
