@@ -22,7 +22,6 @@ import numpy as np
 from rclpy.node import Node
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.wearer_file import load_body
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import Separation, SeparationRules
