@@ -82,7 +82,7 @@ STOPS, OTHERS = 0.35, 0.3
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """
-    A controller, an arm and what the planner is told of them.
+    A controller and an arm, as the planner knows them.
 
     Parameters
     ----------
