@@ -7,7 +7,7 @@ from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.mechanics import usual_mechanics
 from rrth_planner.simulation.servo import servo_for_lag
 from rrth_planner.simulation.simulated_arm import SimulatedArm
-from rrth_planner.simulation.trajectory_controller import TimedPoints, Tolerances
+from rrth_planner.simulation.trajectory_controller import ControllerRules, TimedPoints
 from worlds import FOLDED
 
 TOP = np.full(4, 1.5)
@@ -30,17 +30,16 @@ def motion_between(q_from, q_to, duration):
     return Trajectory([0.0, duration], np.array([q_from, q_to]), still, still)
 
 
-def simulated(arm, q=FOLDED, lag=0.01, mechanics=None, tolerances=None, **options):
+def simulated(arm, q=FOLDED, lag=0.01, mechanics=None, rules=None, **options):
     """Return a simulated arm at rest whose tool lags by a distance [m]."""
     mechanics = mechanics or usual_mechanics(arm.dof)
     top = np.full(arm.dof, TOP[0])
     delay = options['imperfections'].command_delay if 'imperfections' in options else 0.0
-    none = np.zeros(arm.dof)
     return SimulatedArm(
         arm,
         mechanics,
         servo_for_lag(arm, mechanics, top, lag=lag, delay=delay),
-        tolerances or Tolerances(path=none, goal=none),
+        rules or ControllerRules(),
         q=q,
         **options,
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import mujoco
-import numpy as np
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.simulation.body_shapes import capsules_within
@@ -16,7 +15,7 @@ from rrth_planner.simulation.moving_body import MovingBody
 from rrth_planner.simulation.physics_model import Fill, OF_ARM, PhysicsModel
 from rrth_planner.simulation.servo import Servo, servo_for_lag
 from rrth_planner.simulation.simulated_arm import Imperfections, SimulatedArm
-from rrth_planner.simulation.trajectory_controller import TimedPoints, Tolerances
+from rrth_planner.simulation.trajectory_controller import TimedPoints
 
 from benchmarks.separation.setting import the_arm, the_settings
 
@@ -68,12 +67,10 @@ def arm_of(
     """Return an arm at rest at q, (dof,) [rad], beside a wearer."""
     arm = the_arm()
     usual = usual_mechanics(arm.dof)
-    anything = np.zeros(arm.dof)
     return SimulatedArm(
         arm,
         replace(usual, payload=setup.payload * usual.payload),
         servo_of(setup.lag),
-        Tolerances(path=anything, goal=anything),
         q=q,
         body=body,
         body_begin=body_begin,

@@ -3,8 +3,10 @@
 """The node `arm_playback`: a kinematic arm that executes motions exactly."""
 
 from array import array
+from collections import deque
 import gc
 from importlib import import_module
+import math
 import os
 import sys
 from threading import Thread
@@ -19,6 +21,7 @@ from rclpy.node import Node
 from rclpy.time import Time
 from rrth_planner.execution.playback import accept, Playback, standing, stop
 from rrth_planner.model.arm import tool_pose
+from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.ros.interface.playback_parameters import (
     declare_playback_parameters,
@@ -52,6 +55,9 @@ class PlaybackNode(Node):
         self._arm = declare_playback_parameters(self)
         self._base_frame: str = self.get_parameter('base_frame').value
         self._playback = standing(initial_positions(self, self._arm))
+        self._lag: float = self.get_parameter('lag').value
+        # What was executed lately, and since when [s]: the arm lags behind it.
+        self._lately = deque([(-math.inf, self._playback)])
         # A step of the system's time must not move the arm.
         is_simulated = self.get_parameter('use_sim_time').value
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -100,22 +106,33 @@ class PlaybackNode(Node):
         """Return `_now`; a simulated clock that was set back leaves the arm in place."""
         now, stamp = self._now()
         if now < self._latest:
-            self._follow(standing(self._playback.state_at(self._latest)[0]))
+            self._follow(standing(self._measured_at(self._latest)[0]))
+            self._lately = deque([(-math.inf, self._playback)])
         self._latest = now
         return now, stamp
 
     def _follow(self, playback: Playback) -> None:
         self._playback, self._rest_published = playback, float('inf')
+        self._lately.append((self._latest, playback))
+
+    def _measured_at(self, time: float) -> tuple[Array, Array]:
+        """Return positions and velocities of the arm [rad, rad/s]: the command of `lag` before."""
+        then = time - self._lag
+        while len(self._lately) > 1 and self._lately[1][0] <= then:
+            self._lately.popleft()
+        q, v, _ = self._lately[0][1].state_at(then)
+        return q, v
 
     def _publish(self) -> None:
         """Publish the state of the arm at the time of the stamps."""
         time, nanoseconds = self._advance()
         # While it stands still only the stamps change.
         if not time >= self._rest_published:
-            q, v, _ = self._playback.state_at(time)
+            q, v = self._measured_at(time)
             self._state.position, self._state.velocity = array('d', q), array('d', v)
             self._pose = pose_to_msg(tool_pose(self._arm, q), self._base_frame)
-            self._rest_published = time if time >= self._playback.end_time else float('inf')
+            is_at_rest = time - self._lag >= max(self._playback.end_time, self._lately[-1][0])
+            self._rest_published = time if is_at_rest else float('inf')
         stamp = Time(nanoseconds=nanoseconds).to_msg()
         self._state.header.stamp = self._pose.header.stamp = stamp
         self._joint_states.publish(self._state)

@@ -219,7 +219,7 @@ class SimulationNode(Node):
         with self._lock:
             start = 0.0 if stamp == 0.0 else now - self._left_out + stamp - ros_now
             self._simulation.execute(points, start)
-            left = self._simulation.command.end_time - self._simulation.time
+            left = (start or self._simulation.time) + points.times[-1] - self._simulation.time
         self.get_logger().info(
             f'executing a motion: {len(points.times)} points, at its end in {left:.2f} s',
             throttle_duration_sec=REPORT_PERIOD,

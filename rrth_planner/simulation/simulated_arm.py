@@ -19,12 +19,12 @@ from rrth_planner.simulation.moving_body import MovingBody, state_at
 from rrth_planner.simulation.physics_model import Fill, physics_model, RATE, stretch
 from rrth_planner.simulation.servo import Servo, servo_effort
 from rrth_planner.simulation.trajectory_controller import (
+    Command,
     commanded_state,
-    deviation,
-    hold,
-    replace_command,
+    ControllerRules,
+    DEFAULT_RULES,
     TimedPoints,
-    Tolerances,
+    TrajectoryController,
 )
 
 with suppress(ImportError):
@@ -86,7 +86,7 @@ class ArmReading:
     efforts : ndarray
         Of the motors [N m].
     wanted : MotionState
-        What the controller commands.
+        What the controller commands for this time.
     true_positions, true_velocities : ndarray
         Without noise.
 
@@ -112,13 +112,12 @@ class SimulatedArm:
         arm: ArmModel,
         mechanics: Mechanics,
         servo: Servo,
-        tolerances: Tolerances,
+        rules: ControllerRules = DEFAULT_RULES,
         *,
         q: Array,
         body: MovingBody | None = None,
         body_begin: float = 0.0,
         imperfections: Imperfections | None = None,
-        from_commanded: bool = True,
         time: float = 0.0,
         compensated: Mechanics | None = None,
         fill: Fill = capsules_within,
@@ -129,8 +128,7 @@ class SimulatedArm:
         compensated: what the servos take the arm to weigh; None: what it does.
         """
         self.arm, self.body = arm, body
-        self._servo, self._tolerances = servo, tolerances
-        self._is_from_commanded = from_commanded
+        self._servo = servo
         self.physics = physics_model(arm, mechanics, body, fill)
         self.data = mujoco.MjData(self.physics.model)
         self._dynamics = ArmDynamics(arm, compensated or mechanics)
@@ -139,7 +137,7 @@ class SimulatedArm:
         self._noise, self._rng = given.encoder_noise, np.random.default_rng(given.seed)
         self.time, self._body_begin = time, body_begin
         self.data.qpos[: arm.dof] = q
-        self.command = hold(np.array(q, dtype=np.float64))
+        self._controller = TrajectoryController(q, PERIOD, rules)
         self._wanted = commanded_state(self.command, time)
         # The newest command last; the servo acts by the first.
         n_late = round(given.command_delay * RATE)
@@ -164,15 +162,14 @@ class SimulatedArm:
             true_positions=self.data.qpos[: self.arm.dof].copy(),
         )
 
+    @property
+    def command(self) -> Command:
+        """What the controller executes."""
+        return self._controller.command
+
     def execute(self, points: TimedPoints, stamp: float) -> None:
-        """Execute a trajectory from now on that starts at a time [s]; 0: now."""
-        present = self._wanted
-        if not self._is_from_commanded:
-            unknown = np.full(self.arm.dof, np.nan)
-            present = MotionState(
-                positions=self._positions, velocities=self._velocities, accelerations=unknown
-            )
-        self.command = replace_command(points, stamp, self.time, present)
+        """Give the controller a trajectory that starts at a time [s]; 0: with the next step."""
+        self._controller.receive(points, stamp)
 
     def step(self) -> str | None:
         """Let `PERIOD` pass; return why a trajectory was given up, if one was."""
@@ -181,13 +178,15 @@ class SimulatedArm:
             self._place_body()
         self._n_steps += 1
         stretch(self.physics, data.qpos)
-        wanted = commanded_state(self.command, self.time)
-        given_up = self._check(wanted)
-        if given_up:
-            self.command = hold(self._positions.copy())
-            wanted = commanded_state(self.command, self.time)
-        self._wanted = wanted
-        self._late.append(wanted)
+        self._wanted = self._controller.update(
+            self.time,
+            MotionState(
+                positions=self._positions,
+                velocities=self._velocities,
+                accelerations=np.full(self.arm.dof, np.nan),
+            ),
+        )
+        self._late.append(self._wanted)
         acted = self._late[0]
         gravity = self.physics.model.opt.gravity
         weight = self._dynamics.weight(self._positions, gravity)
@@ -204,13 +203,8 @@ class SimulatedArm:
         self._follow_contacts(velocities)
         self.time += PERIOD
         self._measure()
-        return given_up
-
-    def _check(self, wanted: MotionState) -> str | None:
-        found = deviation(
-            self.command, self._tolerances, self.time, wanted.positions - self._positions
-        )
-        return None if found is None else f'{self.arm.joint_names[found[0]]}: {found[1]}'
+        given_up = self._controller.given_up
+        return given_up and f'{self.arm.joint_names[given_up[0]]}: {given_up[1]}'
 
     def _place_body(self) -> None:
         """Have every part of the wearer where he is now, with his velocity."""

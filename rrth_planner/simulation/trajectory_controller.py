@@ -1,21 +1,43 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What joint_trajectory_controller commands, by its rules in ROS 2 Jazzy.
+What joint_trajectory_controller commands, cycle by cycle, by the rules of its versions.
 
-A new trajectory replaces the present one at once. Until its first point is due the arm is led
-there from its present state by one more piece; one whose start is in the past is joined where it
-is by now. Between two points each joint follows the polynomial of the lowest degree that fits what
-both have: a line, a cubic or a quintic. After the last point that one holds.
+A cycle at a time commands the state one period later. Of the messages that came since the last
+cycle the newest counts. It replaces the present trajectory, as its version does: at once, with one
+more piece that leads the arm from the state before to the first point until that is due; or not
+before its stamp. One whose stamp has passed is joined where it is by now. Between two points each
+joint follows the polynomial of the lowest degree that fits what both have: a line, a cubic or a
+quintic. After the last point that one holds.
 """
 
 from dataclasses import dataclass
+from enum import Enum
 import functools
 
 import numpy as np
 from rrth_planner.model.arrays import Array, frozen_array
 from rrth_planner.model.errors import MessageError, OptionsError
 from rrth_planner.model.trajectory import MotionState, sample, Trajectory
+
+
+class ControllerVersion(Enum):
+    """
+    Releases of the controller that join a message to what they execute in different ways.
+
+    `V4_42` stands for Jazzy, and for what comes later with `allow_trajectory_replacement` false;
+    `BLENDING` for what comes after 6.9 with its default, true.
+    """
+
+    V4_20 = '4.20'
+    V4_42 = '4.42'
+    V6_9 = '6.9'
+    BLENDING = 'blending'
+
+    @property
+    def defers(self) -> bool:
+        """Whether a message with a stamp ahead waits until then."""
+        return self in (ControllerVersion.V6_9, ControllerVersion.BLENDING)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,7 +93,7 @@ class Command:
     start_time : float
         When its time is 0 [s].
     begin : float
-        Since when it is executed [s].
+        To which time the state before belongs, as the controller has it [s].
     before : MotionState or None
         The state from which the arm is led to the first point, where that is due later; NaN where
         unknown.
@@ -135,7 +157,11 @@ def hold(q: Array) -> Command:
 
 
 def replace_command(
-    points: TimedPoints, stamp: float, now: float, present: MotionState
+    points: TimedPoints,
+    stamp: float,
+    now: float,
+    before: MotionState,
+    begin: float | None = None,
 ) -> Command:
     """
     Return what is executed from now on [s], in place of anything else.
@@ -144,14 +170,37 @@ def replace_command(
     ----------
     stamp : float
         When the trajectory starts [s]; 0: now.
-    present : MotionState
-        Where it begins if its first point is due later: what is commanded at present, or what is
-        measured.
+    before : MotionState
+        From where the arm is led to the first point if that is due later: what was commanded, or
+        what is measured.
+    begin : float, optional
+        The time to which that state belongs, as the controller has it [s]; without, now.
 
     """
     return Command(
-        points=points, start_time=stamp if stamp != 0.0 else now, begin=now, before=present
+        points=points,
+        start_time=stamp if stamp != 0.0 else now,
+        begin=now if begin is None else begin,
+        before=before,
     )
+
+
+def ramp_to_rest(present: MotionState, deceleration: Array, now: float) -> Command:
+    """Return what takes each joint to rest at a constant deceleration, (dof,) [rad/s^2]."""
+    v = present.velocities
+    durations = np.abs(v) / deceleration
+    times = np.unique(np.concatenate([[0.0], durations]))
+    t = np.minimum(times[:, None], durations)
+    slowing = np.sign(v) * deceleration
+    velocities = np.where(times[:, None] < durations, v - slowing * t, 0.0)
+    points = TimedPoints(
+        times=times,
+        positions=present.positions + v * t - 0.5 * slowing * t**2,
+        velocities=velocities,
+        # The cubic through both ends is the parabola.
+        accelerations=np.full_like(velocities, np.nan),
+    )
+    return Command(points=points, start_time=now, is_holding=True)
 
 
 def commanded_state(command: Command, time: float) -> MotionState:
@@ -257,3 +306,102 @@ def piece_between(
         velocities=np.array([v, v_end]),
         accelerations=np.array([a, a_end]),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ControllerRules:
+    """
+    How a controller is set up.
+
+    Parameters
+    ----------
+    version : ControllerVersion
+    is_from_desired : bool
+        `interpolate_from_desired_state` (before 4.22 `open_loop_control`): whether the state
+        before a trajectory is what was commanded, or what is measured.
+    tolerances : Tolerances or None
+        None: none.
+    deceleration : ndarray, shape (dof,), or None
+        `decelerate_on_cancel`, since 4.39: of a trajectory that is given up [rad/s^2]; None: it
+        is held at once.
+
+    """
+
+    version: ControllerVersion = ControllerVersion.V4_42
+    is_from_desired: bool = True
+    tolerances: Tolerances | None = None
+    deceleration: Array | None = None
+
+
+DEFAULT_RULES = ControllerRules()
+
+
+class TrajectoryController:
+    """The controller of an arm: messages come at any time, `update` is called once a period."""
+
+    def __init__(self, q: Array, period: float, rules: ControllerRules = DEFAULT_RULES) -> None:
+        """
+        Activate it: it holds a position, (dof,) [rad or m], and is updated every `period` [s].
+
+        That is the last command where there was one, the default, or what is measured.
+        """
+        self.period, self.rules = period, rules
+        self.command = hold(np.array(q, dtype=np.float64))
+        # Why the last cycle gave its trajectory up, if it did: which joint, and a sentence.
+        self.given_up: tuple[int, str] | None = None
+        # The last setpoint, and the time of the cycle that found it [s].
+        self._last: tuple[MotionState, float] | None = None
+        # The newest message that is not executed yet: points and stamp [s].
+        self._message: tuple[TimedPoints, float] | None = None
+        # Whether a cycle has left it to wait for its stamp.
+        self._is_waiting = False
+
+    def receive(self, points: TimedPoints, stamp: float) -> None:
+        """Take a message that starts at a time [s], 0: at once; one that still waits is lost."""
+        self._message, self._is_waiting = (points, stamp), False
+
+    def update(self, now: float, measured: MotionState) -> MotionState:
+        """
+        Return what is commanded in the cycle at a time [s], which is the state a period later.
+
+        Where a tolerance is exceeded that is the measured position. Accelerations that are not
+        measured are NaN.
+        """
+        self._take_message(now, measured)
+        self.given_up = None
+        if self.rules.tolerances is not None:
+            error = commanded_state(self.command, now).positions - measured.positions
+            self.given_up = deviation(self.command, self.rules.tolerances, now, error)
+            if self.given_up is not None:
+                self.cancel(now, measured)
+        setpoint = commanded_state(self.command, now + self.period)
+        self._last = setpoint, now
+        return setpoint
+
+    def cancel(self, now: float, measured: MotionState) -> None:
+        """Give the trajectory up: hold the *measured* position, or slow down from there."""
+        deceleration = self.rules.deceleration
+        self.command = (
+            hold(measured.positions.copy())
+            if deceleration is None
+            else ramp_to_rest(measured, deceleration, now)
+        )
+
+    def _take_message(self, now: float, measured: MotionState) -> None:
+        if self._message is None:
+            return
+        (points, stamp), version = self._message, self.rules.version
+        if version.defers and stamp > now:
+            self._is_waiting = True
+            return
+        before, begin = measured, now
+        if self.rules.is_from_desired and self._last is not None:
+            before, begin = self._last
+            if version is ControllerVersion.V4_20:
+                # The state is due now; later versions leave it the time of the cycle that found
+                # it.
+                begin = now
+        if version is ControllerVersion.BLENDING and not self._is_waiting:
+            stamp = now
+        self._message = None
+        self.command = replace_command(points, stamp, now, before, begin)

@@ -23,10 +23,11 @@ from rrth_planner.io.resources import resource_path  # noqa: E402
 from rrth_planner.io.text_file import load_yaml
 from rrth_planner.model.arm import tool_pose  # noqa: E402
 from rrth_planner.model.rotation import rotation_matrix  # noqa: E402
-from rrth_planner.model.trajectory import Trajectory  # noqa: E402
+from rrth_planner.model.trajectory import MotionLimits, sample, Trajectory  # noqa: E402
 from rrth_planner.ros.interface.playback_parameters import SETTINGS  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg  # noqa: E402
 from rrth_planner.ros.playback_node import main, PlaybackNode  # noqa: E402
+from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory  # noqa: E402
@@ -309,6 +310,29 @@ def test_a_stop_is_on_the_path_and_the_next_motion_begins_there(playback, observ
     assert 'already' in answer.message
     observer.motions.publish(motion(stopped_at, FOLDED, 1.4))
     wait_until(lambda: observer.is_still_at(FOLDED))
+
+
+@pytest.mark.parametrize('lag', [0.0, 0.1])
+def test_joint_states_are_those_of_the_command_of_a_lag_before(playback, observer, lag):
+    playback(lag=lag)
+    there = FOLDED - [1.0, 0.5, 0.5, 0.5]
+    whole = Trajectory([0.0, 1.5], [FOLDED, there], np.zeros((2, 4)), np.zeros((2, 4)))
+    braking = fast_stop(whole, 0.6, MotionLimits(*np.outer([1.5, 4.0, 40.0], np.ones(4))))
+    begin = observer.get_clock().now().nanoseconds * 1e-9 + 0.3
+    # The second one is sent while the first one runs; the arm is behind both of them.
+    observer.motions.publish(joint_trajectory_to_msg(whole, ARM.joint_names, 'torso', begin))
+    wait_until(lambda: observer.v.any())
+    msg = joint_trajectory_to_msg(braking, ARM.joint_names, 'torso', begin + 0.6)
+    observer.motions.publish(msg)
+    wait_until(lambda: observer.is_still_at(braking.positions[-1]))
+    assert len(observer.states) > 30
+    for state in observer.states:
+        then = rclpy.time.Time.from_msg(state.header.stamp).nanoseconds * 1e-9 - lag - begin
+        curve, since = (whole, then) if then < 0.6 else (braking, then - 0.6)
+        q, v, _ = sample(curve, [since])
+        # The node's two clocks are read a little after one another.
+        np.testing.assert_allclose(state.position, q[0], atol=1e-3)
+        np.testing.assert_allclose(state.velocity, v[0], atol=4e-3)
 
 
 def test_a_latched_motion_of_the_past_is_not_replayed(playback, observer):

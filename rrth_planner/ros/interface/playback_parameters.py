@@ -53,6 +53,15 @@ SETTINGS = (
         1e-6,
         0.1,
     ),
+    Setting(
+        'lag',
+        0.0,
+        's',
+        'of the arm behind its command: joint states are those that it had so long before',
+        0.0,
+        1.0,
+        True,
+    ),
 )
 
 

@@ -25,13 +25,20 @@ from rrth_planner.simulation.mechanics import Mechanics
 from rrth_planner.simulation.moving_body import MovingBody, recorded_body, scene_at, standing_body
 from rrth_planner.simulation.servo import servo_for_lag
 from rrth_planner.simulation.simulated_arm import Imperfections, SimulatedArm
-from rrth_planner.simulation.trajectory_controller import Tolerances
+from rrth_planner.simulation.trajectory_controller import (
+    ControllerRules,
+    ControllerVersion,
+    DEFAULT_RULES,
+    Tolerances,
+)
 from rrth_planner.simulation.urdf_inertia import urdf_inertias
 from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.recorded_person import excerpt, posture_at, RecordedPerson
 from rrth_planner.wearer.skeleton import Skeleton
 
 NOBODY, STANDING, RECORDED = 'none', 'standing', 'recorded'
+*_FIRST, _LAST = (version.value for version in ControllerVersion)
+VERSIONS = f'{", ".join(_FIRST)} or {_LAST}'
 
 
 _fixed = partial(Setting, is_read_only=True)
@@ -56,6 +63,12 @@ SETTINGS = (
     _fixed('encoder_noise', 5e-6, 'rad', 'standard deviation of a measured position', 0.0, 0.1),
     _fixed('command_delay', 0.002, 's', 'from the controller to the servo', 0.0, 1.0),
     _fixed('seed', 0, '-', 'of the noise', 0, 2**31 - 1),
+    _fixed(
+        'controller_version',
+        DEFAULT_RULES.version.value,
+        '-',
+        f'how a motion replaces another one: {VERSIONS}',
+    ),
     _fixed(
         'interpolate_from_desired_state',
         True,
@@ -152,8 +165,14 @@ def simulated_arm(
         arm,
         mechanics,
         servo,
-        Tolerances(
-            path=each('path_tolerance'), goal=each('goal_tolerance'), goal_time=value['goal_time']
+        ControllerRules(
+            version=_version(value['controller_version']),
+            is_from_desired=value['interpolate_from_desired_state'],
+            tolerances=Tolerances(
+                path=each('path_tolerance'),
+                goal=each('goal_tolerance'),
+                goal_time=value['goal_time'],
+            ),
         ),
         q=np.array(initial_positions(node, arm)),
         body=None if wearer is None else wearer.body,
@@ -163,6 +182,13 @@ def simulated_arm(
             command_delay=value['command_delay'],
             seed=value['seed'],
         ),
-        from_commanded=value['interpolate_from_desired_state'],
         time=time,
     )
+
+
+def _version(name: str) -> ControllerVersion:
+    """Return a version of the controller by its name, or raise OptionsError."""
+    try:
+        return ControllerVersion(name)
+    except ValueError:
+        raise OptionsError(f'controller_version: "{name}", expected {VERSIONS}') from None
