@@ -14,12 +14,14 @@ from dataclasses import dataclass, replace
 from functools import cache
 import heapq
 import itertools
+import math
 import time
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 from rclpy.node import Node
+from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.goal import PointingGoal
@@ -121,7 +123,14 @@ def _parameters() -> PlannerParameters:
 def _parameters_of(case: Case) -> PlannerParameters:
     given, delay = _parameters(), case.lag + case.transport
     if not case.is_separated:
-        return replace(given, separation=None, body_timeout=0.0, joint_timeout=0.0, replan=False)
+        return replace(
+            given,
+            separation=None,
+            controller_delay=delay,
+            body_timeout=0.0,
+            joint_timeout=0.0,
+            replan=False,
+        )
     separation = Separation(
         arm=given.arm,
         rules=SeparationRules(controller_delay=delay),
@@ -132,6 +141,7 @@ def _parameters_of(case: Case) -> PlannerParameters:
     return replace(
         given,
         separation=separation,
+        controller_delay=delay,
         body_timeout=0.2,
         joint_timeout=0.2,
         replan=False,
@@ -382,22 +392,17 @@ class _Session:
         assert trajectory is not None and plan is not None and snapshot is not None
         handover, parameters = outcome.handover, revalidation.parameters
         self._kind = BEGIN if handover is None else HANDOVER
-        start = 0.0 if handover is None else handover.time
-
-        def publish() -> None:
-            if parameters.separation is None:
-                self._send(trajectory, parameters, start)
-
+        start = self._clock() + ahead(parameters.controller_delay)
         self._monitor.begin(
             ExecutingMotion(
                 trajectory=trajectory,
-                start_time=self._clock() if handover is None else handover.time,
+                start_time=start if handover is None else handover.time,
                 target_distance=plan.target_distance,
                 escape_time=plan.escape_time,
             ),
             snapshot.goal,
             parameters,
-            publish,
+            joins=math.inf if handover is None else handover.joins,
         )
         return True
 

@@ -102,7 +102,6 @@ def test_a_controller_that_plays_late_messages_from_their_beginning_is_found(is_
     assert not all(join.is_good for join in joins)
 
 
-@pytest.mark.xfail(strict=True, reason='what replaces a motion begins where the arm is')
 @pytest.mark.parametrize('is_separated', [False, True])
 def test_what_replaces_a_motion_continues_the_command(is_separated):
     for version in (V4_20, V4_42, V6_9):

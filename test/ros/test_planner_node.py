@@ -33,6 +33,7 @@ from rclpy.qos import (  # noqa: E402
 from rclpy.task import Future  # noqa: E402
 from rrth_planner.collision import reference_checker, trajectory_validation  # noqa: E402
 from rrth_planner.collision.violation import Violation  # noqa: E402
+from rrth_planner.execution.command import ahead, BEFORE  # noqa: E402
 from rrth_planner.io.arm_file import load_arm  # noqa: E402
 from rrth_planner.io.incident_file import read_incident  # noqa: E402
 from rrth_planner.model.arm import (  # noqa: E402
@@ -47,9 +48,11 @@ from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E
 from rrth_planner.pipeline.planning_process import PlanningProcessError  # noqa: E402
 from rrth_planner.ros import planner as planner_module  # noqa: E402
 from rrth_planner.ros.client import planner_client  # noqa: E402
+from rrth_planner.ros.interface.parameters import RULES  # noqa: E402
 from rrth_planner.ros.interface.reporter import PlanReport  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of  # noqa: E402
 from rrth_planner.ros.messages.error_codes import ErrorCode  # noqa: E402
+from rrth_planner.ros.messages.fields import seconds_of  # noqa: E402
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg  # noqa: E402
 from rrth_planner.ros.middleware import executor_barrier  # noqa: E402
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier  # noqa: E402
@@ -182,10 +185,13 @@ def test_a_plan_is_published_and_then_answered(start):
     for topic in ('joint_trajectory', 'rrth_planner/tool_path', 'rrth_planner/markers'):
         stranger.wait_until(lambda topic=topic: stranger.received[topic])
     (msg,) = stranger.received['joint_trajectory']
-    assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == (0, 0)
+    # It begins at rest shortly before its publication: any controller has it before it moves.
+    assert 0.0 < time.time() - seconds_of(msg.header.stamp) < 60.0
     assert msg.header.frame_id == 'torso'
     trajectory = joint_trajectory_from_msg(msg, JOINTS)
-    np.testing.assert_array_equal(trajectory.positions[0], FOLDED)
+    np.testing.assert_array_equal(trajectory.positions[:2], [FOLDED, FOLDED])
+    delay = RULES.controller_delay
+    assert trajectory.times[1] == pytest.approx(ahead(delay) + delay + BEFORE, abs=2e-3)
     for values in (trajectory.velocities, trajectory.accelerations):
         assert not values[[0, -1]].any()
     assert pointing_error(load_arm(), trajectory.positions[-1], np.array([1.5, 0.1, 0.3])) < 1e-6
@@ -360,7 +366,7 @@ def test_a_request_is_planned_again_while_the_wearer_moves(start, monkeypatch, w
     stranger.wait_until(lambda: stranger.received['joint_trajectory'])
     (msg,) = stranger.received['joint_trajectory']
     found = joint_trajectory_from_msg(msg, JOINTS)
-    np.testing.assert_array_equal(found.positions, plans[1].trajectory.positions)
+    np.testing.assert_array_equal(found.positions[1:], plans[1].trajectory.positions)
 
 
 def test_a_wearer_who_always_moves_into_the_motion_is_reported_after_the_time_limit(
@@ -796,21 +802,22 @@ def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch)
     planner, stranger = start()
     say_all(planner, stranger)
     inputs, publishers = inputs_of(planner), planner._queue._publishers
-    publish, known, planned = publishers.publish, [], []
+    publish, known, planned = publishers.publish_motion, [], []
 
-    def publish_slowly(msg):
-        body = inputs.body.value
-        stranger.publishers['body_boxes'].publish(fenced())
-        time.sleep(0.3)
-        known.append(inputs.body.value is body)
-        planned.append(msg)
-        publish(msg)
+    def publish_slowly(trajectory, parameters, begin):
+        if not planned:
+            body = inputs.body.value
+            stranger.publishers['body_boxes'].publish(fenced())
+            time.sleep(0.3)
+            known.append(inputs.body.value is body)
+        planned.append(publishers.motion(trajectory, parameters, begin))
+        publish(trajectory, parameters, begin)
 
-    monkeypatch.setattr(publishers, 'publish', publish_slowly)
+    monkeypatch.setattr(publishers, 'publish_motion', publish_slowly)
     assert stranger.answer().success
     assert known[0]
     # Then it is, and the monitor stops the arm. Of messages that quick only the last may arrive.
-    (motion,), received = planned, stranger.received['joint_trajectory']
+    motion, received = planned[0], stranger.received['joint_trajectory']
     stranger.wait_until(lambda: received and received[-1].points[-1] != motion.points[-1])
 
 
@@ -1302,10 +1309,17 @@ def test_the_same_seed_gives_the_same_trajectory(start):
     planner, stranger = start(seed=7, improve_time=0.0)
     say_all(planner, stranger)
     assert stranger.answer().success
+    # The arm does not execute it: then it is taken to be held where it rests.
+    stranger.wait_until(lambda: planner._monitor.hold(-np.inf) is None)
     assert stranger.answer().success
     stranger.wait_until(lambda: len(stranger.received['joint_trajectory']) == 2)
-    one, other = stranger.received['joint_trajectory']
-    assert one == other
+    one, other = (
+        joint_trajectory_from_msg(msg, JOINTS) for msg in stranger.received['joint_trajectory']
+    )
+    # How long each rests before it begins is up to the clock.
+    for values in zip(one.states, other.states, strict=True):
+        np.testing.assert_array_equal(*values)
+    np.testing.assert_allclose(one.times, other.times, atol=2e-3)
 
 
 @pytest.mark.parametrize('profile', [LATCHED, VOLATILE, BEST_EFFORT])

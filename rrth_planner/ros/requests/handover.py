@@ -68,7 +68,11 @@ class Handover:
     @property
     def joins(self) -> float | None:
         """The time within the commanded motion at which it begins [s]; None: not by its time."""
-        return self.start_state.time if self.is_commanded else None
+        if not self.is_commanded or self.running is None:
+            return None
+        # At rest after its end the state is that of the end.
+        at, duration = self.start_state.time, self.running.trajectory.duration
+        return at if at < duration else self.time - self.running.start_time
 
     def wait(self, clock: Callable[[], float], should_stop: Callable[[], bool]) -> None:
         """Return when the motion is to be published, or as soon as it is cancelled."""

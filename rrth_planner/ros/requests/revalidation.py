@@ -100,9 +100,9 @@ class Revalidation:
         now = self.clock()
         present = self.inputs.at(now, self.parameters, self.snapshot.goal)
         self._require_arm(present, now)
-        self._require_clear(present)
         if not np.array_equal(present.scene.numbers, self.snapshot.scene.numbers):
             self._require_proof(present.scene)
+        self._require_clear(present)
         self._require_room()
         return present.scene
 
@@ -116,13 +116,6 @@ class Revalidation:
                 raise ArmHasMoved(
                     ErrorCode.START_STATE_INVALID,
                     'the arm has begun its commanded motion, expected an arm at rest',
-                )
-            aside = float(np.abs(present.q_start - self._motion.positions[0]).max())
-            if not aside <= OFF_COMMAND:
-                raise ArmHasMoved(
-                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
-                    f'the arm rests {aside:.4f} rad from what it is commanded, expected at most '
-                    f'{OFF_COMMAND:g} rad',
                 )
         elif handover.is_commanded:
             assert handover.running is not None
@@ -145,6 +138,13 @@ class Revalidation:
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
                 f'{START_TOLERANCE:g} rad',
+            )
+        aside = float(np.abs(present.q_start - self._motion.positions[0]).max())
+        if handover is None and not aside <= OFF_COMMAND:
+            raise ArmHasMoved(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                f'the arm rests {aside:.4f} rad from what it is commanded, expected at most '
+                f'{OFF_COMMAND:g} rad',
             )
 
     def _require_clear(self, present: InputSnapshot) -> None:
