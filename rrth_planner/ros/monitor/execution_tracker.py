@@ -144,7 +144,9 @@ class ExecutionTracker:
         if command is None or reading is None:
             return
         lag = LONGEST_LAG + self._delay
-        is_off = command.deviation(reading.positions, reading.taken, lag) > OFF_COMMAND
+        # Joint states that do not come any more are those of an arm that stays.
+        taken = max(reading.taken, now - lag)
+        is_off = command.deviation(reading.positions, taken, lag) > OFF_COMMAND
         if not is_off or reading.is_moving(now):
             self._off_since = None
         elif self._off_since is None:
