@@ -115,9 +115,9 @@ INTERFACES = {
             'joint_trajectory',
             MOTION,
             'the next stretch of the motion and a stop, or the proven rest, with every body; '
-            'without `separation` the whole motion, latched, stamp 0; positions, velocities, '
-            'accelerations; first point = present state. Never published on failure. Where the '
-            'arm moves already, the stamp says when the first point is its state',
+            'without `separation` the whole motion, latched; positions, velocities, '
+            'accelerations. It begins shortly before its publication, with the rest or the motion '
+            'that is commanded then; the stamp says when. Never published on failure',
         ),
         _published(
             '~/planned_trajectory', MOTION, 'latched: the whole planned motion', separation=True
