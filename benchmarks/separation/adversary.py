@@ -427,8 +427,9 @@ class _Episode:
 def _path_state(planner: Planner, time: float) -> tuple[float, float, float]:
     """Return where within the motion the arm is, and at which rate."""
     index = max(0, planner.controller.index_at(time))
-    trajectory = planner.controller.trajectories[index]
-    one = next(c for c in reversed(planner.commitments) if c.trajectory is trajectory)
+    message = planner.controller.trajectories[index]
+    sent = zip(planner.commitments, planner.messages, strict=True)
+    one = next(c for c, m in reversed(list(sent)) if m is message)
     tau, rate, slope = path_state(one, time)
     return float(tau), float(rate), float(slope)
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from rrth_planner.execution.command import ahead, begin_of, continues, lead_in, led, rest_at
 from rrth_planner.execution.commitment import (
     Commitment,
     extended,
@@ -21,6 +22,7 @@ from rrth_planner.execution.commitment import (
     path_state,
     Separation,
 )
+from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import seen_body, SeenBody, SeparationRules
@@ -47,7 +49,7 @@ class Timing:
     age : float
         Of what a frame shows.
     thinking : float
-        From a frame to the instant that the new commitment is for.
+        From a frame to the publication of the new commitment.
     latency : (float, float)
         From then until the controller has it, at random between the two.
     lag : float
@@ -144,10 +146,12 @@ class Planner:
 
     Parameters
     ----------
-    commitments : list of Commitment
-        All that were issued.
+    commitments, messages : list of Commitment, list of Trajectory
+        All that were issued, and what the controller got of each: its lead-in, too.
     bodies : list of SeenBody
         As it knew the wearer for each of them.
+    message_begin : float
+        When the last message begins [s].
     blocked_since : float or None
         Since when the motion cannot begin [s].
 
@@ -160,8 +164,10 @@ class Planner:
     motion: Trajectory | None = None
     begun: float = 0.0
     commitments: list[Commitment] = field(default_factory=list)
+    messages: list[Trajectory] = field(default_factory=list)
     bodies: list[SeenBody] = field(default_factory=list)
     is_under_way: bool = False
+    message_begin: float = 0.0
     blocked_since: float | None = None
 
     def begin(self, motion: Trajectory, time: float) -> None:
@@ -172,20 +178,32 @@ class Planner:
     def frame(self, time: float, eyes: Eyes) -> None:
         """Extend the commitment for a frame that comes at a time [s]."""
         assert self.motion is not None
-        at = time + self.timing.thinking
-        body = eyes.body(at, self.settings.rules)
+        at, delay = time + self.timing.thinking, self.settings.rules.controller_delay
+        begin, start = begin_of(at, delay), at + ahead(delay)
+        body = eyes.body(start, self.settings.rules)
         if self.is_under_way:
-            found = extended(self.commitments[-1], at, body, self.settings)
+            found = extended(self.commitments[-1], start, body, self.settings)
         else:
-            found = first_commitment(self.motion, at, body, self.settings)
+            found = first_commitment(self.motion, start, body, self.settings)
             if not isinstance(found, Commitment) and self.blocked_since is None:
                 self.blocked_since = at
-        if isinstance(found, Commitment):
-            self.is_under_way = True
-            self.commitments.append(found)
-            self.bodies.append(body)
-            came = at + self.rng.uniform(*self.timing.latency)
-            self.controller.give(found.trajectory, at, came)
+        if not isinstance(found, Commitment):
+            return
+        if self.is_under_way:
+            joins = start - self.message_begin
+            lead = lead_in(self.messages[-1], joins - (start - begin), joins)
+        else:
+            lead = rest_at(found.trajectory, start - begin)
+        if not continues(lead, found.trajectory):
+            # Within a stop: from its end the next one goes on.
+            return
+        message = led(lead, ExecutingMotion(trajectory=found.trajectory, start_time=start))
+        self.is_under_way, self.message_begin = True, message.start_time
+        self.commitments.append(found)
+        self.messages.append(message.trajectory)
+        self.bodies.append(body)
+        came = at + self.rng.uniform(*self.timing.latency)
+        self.controller.give(message.trajectory, message.start_time, came)
 
     def is_at_rest(self, time: float) -> bool:
         """Return whether the arm is at rest from a time on if nothing more comes [s]."""
