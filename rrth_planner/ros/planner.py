@@ -111,11 +111,11 @@ class PlannerNode(Node):
         self._inputs = inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        publishers = PlanPublishers(self, parameters.separation is not None)
+        self._motions = publishers = PlanPublishers(self, parameters.separates)
         self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(
-            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
+            self, parameters, inputs, self._on_change, self._monitor.on_body, self.fail
         )
         self._queue = PlanQueue(
             self,
@@ -153,6 +153,12 @@ class PlannerNode(Node):
     def fail(self, what: str) -> None:
         """Stop an arm in motion after an unexpected error."""
         self._monitor.fail(what, is_replanned=False)
+
+    def _on_change(self) -> None:
+        """Take note of what comes in for the first time, or otherwise than before."""
+        if self._inputs.source.is_stream and self._reporter.parameters.separation is not None:
+            self._motions.separate()
+        self._reporter.publish()
 
     def _compile(self) -> None:
         """Compile all kernels, in processes of their own where there is a cache."""

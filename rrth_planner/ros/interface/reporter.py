@@ -15,9 +15,11 @@ from rrth_planner.execution.body_motion import BodyMotion, RAISED, SHARE
 from rrth_planner.model.errors import one_line
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.separation_status import (
+    NO_PROMISE,
     separation_to_msg,
+    SeparationState,
     SeparationStatus,
 )
 from rrth_planner.ros.messages.body import WearerBody
@@ -76,7 +78,7 @@ class Reporter:
 
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
         """Advertise `/diagnostics`; the owner keeps `self.parameters` up to date."""
-        self.parameters = parameters
+        self._given = parameters
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -102,8 +104,17 @@ class Reporter:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
             node.create_timer(PERIOD, self._publish, clock=steady),
-            node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
+            node.create_timer(SHORTEST_PERIOD, self._on_timer, clock=steady),
         ]
+
+    @property
+    def parameters(self) -> PlannerParameters:
+        """Of what begins now; without separation beside a body that stands still (`auto`)."""
+        return in_effect(self._given, self._inputs.source)
+
+    @parameters.setter
+    def parameters(self, given: PlannerParameters) -> None:
+        self._given = given
 
     def remaining_motion_checked(self, elapsed: float) -> None:
         """Count a check of the remaining motion against a new body, and its time [s]."""
@@ -139,7 +150,19 @@ class Reporter:
 
     def separation_status(self, status: SeparationStatus) -> None:
         """Publish how the running motion is executed, where that has changed."""
-        self._separation, before = status, self._published_state
+        self._separation = status
+        self._publish_changed_state()
+
+    @property
+    def _shown_state(self) -> SeparationStatus:
+        """What `~/state` says; the first body of a stream is not yet taken for one that stands."""
+        is_known = self._inputs.source.time_until_known(time.monotonic()) <= 0.0
+        if self.parameters.stands_still and is_known:
+            return SeparationStatus(SeparationState.UNSEPARATED, NO_PROMISE)
+        return self._separation
+
+    def _publish_changed_state(self) -> None:
+        status, before = self._shown_state, self._published_state
         if (status.state, status.cause) != (before.state, before.cause):
             self.publish_soon()
         elif abs(status.rate - before.rate) < RATE_STEP:
@@ -147,10 +170,11 @@ class Reporter:
         self._publish_state()
 
     def _publish_state(self) -> None:
+        status = self._shown_state
         if self._state is not None:
             name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
-            self._state.publish(separation_to_msg(name, self._separation))
-        self._published_state = self._separation
+            self._state.publish(separation_to_msg(name, status))
+        self._published_state = status
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -165,6 +189,10 @@ class Reporter:
     def publish(self) -> None:
         """Publish the diagnostics now, or, where the last ones are too recent, soon."""
         self._is_changed = True
+        self._publish_change()
+
+    def _on_timer(self) -> None:
+        self._publish_changed_state()
         self._publish_change()
 
     def _publish_change(self) -> None:
@@ -221,7 +249,7 @@ class Reporter:
 
     def _separation_values(self) -> dict[str, object]:
         """Return what is known of separation."""
-        status, body = self._separation, self._body
+        status, body = self._published_state, self._body
         n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
         return {
             'separation': status.state.name,
@@ -310,4 +338,6 @@ def summary(
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
     if report.code not in (None, ErrorCode.SUCCESS):
         return DiagnosticStatus.WARN, answer(report.code, report.sentence)
+    if parameters.stands_still:
+        return DiagnosticStatus.WARN, NO_PROMISE
     return DiagnosticStatus.OK, report.sentence or 'ready'

@@ -13,8 +13,15 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.body_source import (
+    after_body,
+    as_stream,
+    BodySource,
+    has_body,
+    TRACKER,
+)
 from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import FrameIsLateError, Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -31,6 +38,8 @@ WARNING_PERIOD = 5.0
 LONGEST_WAIT, WAIT_PERIOD = 0.2, 0.005
 # So many bodies wait at most.
 MOST_WAITING = 100
+# Period of the search for a node that makes bodies of what a tracker measures [s].
+SEARCH_PERIOD = 0.2
 
 
 class SceneMonitor:
@@ -42,7 +51,8 @@ class SceneMonitor:
     parameters : PlannerParameters
         For the constant ones: the arm, the base frame and `body_latency`.
     on_change : callable, optional
-        Called on the first message of a topic, on a rejection, and on the next good message.
+        Called on the first message of a topic, on a rejection, and on the next good message; and
+        when bodies are found to come as a stream.
     on_body : callable, optional
         Called after each body, with the wearer since then, its time of arrival [ns], and whether
         it is the newest of those that came.
@@ -76,6 +86,9 @@ class SceneMonitor:
         if self._frames.is_available:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
+        if parameters.separates == AUTO:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._search = node.create_timer(SEARCH_PERIOD, self._search_tracker, clock=steady)
         # The node may be busy for a while: what came meanwhile must not get old in a queue.
         all_at_once: dict[str, Any] = {'takes_all': True}
         # The monitor waits for bodies.
@@ -109,10 +122,24 @@ class SceneMonitor:
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
     def _on_body(self, msg: MarkerArray, arrival: Arrival) -> None:
+        if has_body(msg):
+            came = time.monotonic() - 1e-9 * max(0, time.time_ns() - arrival.received)
+            self._take_source(after_body(msg, arrival.sent, came, self._inputs.source))
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(self._inputs.body)
         self._waiting.append((msg, arrival, time.monotonic()))
         self._read_waiting()
+
+    def _search_tracker(self) -> None:
+        if TRACKER in self._node.get_node_names():
+            self._take_source(as_stream(self._inputs.source))
+        if self._inputs.source.is_stream:
+            self._search.cancel()
+
+    def _take_source(self, source: BodySource) -> None:
+        was_stream, self._inputs.source = self._inputs.source.is_stream, source
+        if source.is_stream and not was_stream:
+            self._on_change()
 
     def _read_waiting(self) -> None:
         """Read the bodies in their order, until one has to wait for its frame."""

@@ -115,26 +115,30 @@ INTERFACES = {
             'joint_trajectory',
             MOTION,
             'the next stretch of the motion and a stop, or the proven rest, with every body; '
-            'without `separation` the whole motion, latched, stamp 0; positions, velocities, '
-            'accelerations; first point = present state. Never published on failure. Where the '
-            'arm moves already, the stamp says when the first point is its state',
+            'without `separation`, or beside a body that stands still, the whole motion, latched, '
+            'stamp 0; positions, velocities, accelerations; first point = present state. Never '
+            'published on failure. Where the arm moves already, the stamp says when the first '
+            'point is its state',
         ),
         _published(
-            '~/planned_trajectory', MOTION, 'latched: the whole planned motion', separation=True
+            '~/planned_trajectory',
+            MOTION,
+            'latched: the whole planned motion',
+            separation=('auto', True),
         ),
         _published(
             '~/state',
             'diagnostic_msgs/msg/DiagnosticStatus',
             'latched: NORMAL, SLOWED, PROTECTIVE_STOP or FAULT, with cause, rate, part of the arm '
-            'and box',
-            separation=True,
+            'and box; UNSEPARATED beside a body that stands still',
+            separation=('auto', True),
         ),
         _published(
             '~/ray_clear',
             'std_msgs/msg/Bool',
             '50 Hz, deadline 0.1 s, liveliness: whether the pointing ray is known to meet nobody, '
-            'for tools whose beam matters',
-            separation=True,
+            'for tools whose beam matters; never beside a body that stands still',
+            separation=('auto', True),
         ),
         _published('~/tool_path', 'nav_msgs/msg/Path', 'latched: the path of the tool'),
         _published(
