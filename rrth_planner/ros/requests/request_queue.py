@@ -355,7 +355,7 @@ class PlanQueue:
             left = self._inputs.source.time_until_known(time.monotonic())
             if not self._reporter.parameters.stands_still or left <= 0.0:
                 break
-            time.sleep(min(left, RESUME_PERIOD))
+            time.sleep(min(left, AGAIN))
         return self._reporter.parameters
 
     def _require_same_source(self, parameters: PlannerParameters) -> None:
