@@ -798,13 +798,13 @@ def test_no_message_is_processed_while_a_motion_is_published(start, monkeypatch)
     inputs, publishers = inputs_of(planner), planner._queue._publishers
     publish, known, planned = publishers.publish, [], []
 
-    def publish_slowly(msg):
+    def publish_slowly(msg, parameters):
         body = inputs.body.value
         stranger.publishers['body_boxes'].publish(fenced())
         time.sleep(0.3)
         known.append(inputs.body.value is body)
         planned.append(msg)
-        publish(msg)
+        publish(msg, parameters)
 
     monkeypatch.setattr(publishers, 'publish', publish_slowly)
     assert stranger.answer().success

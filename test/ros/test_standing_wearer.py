@@ -241,7 +241,7 @@ def test_a_stream_brings_separation_for_good(start, send, ask, wait_until, track
     wait_until(lambda: time.monotonic() > begin + APART)
     answer = ask(client.plan)
     assert answer.message.startswith('SENSOR_INFO_STALE (-24): '), answer.message
-    assert 'as a stream' in answer.message
+    assert 'a stream of bodies' in answer.message
     assert not any(msg.message.startswith('UNSEPARATED') for msg in client.said)
 
 

@@ -37,7 +37,7 @@ MOVED, LATELY, REMEMBERED = 0.01, 0.25, 64
 STEADY = 0.08
 
 # Why a body that was sent once is not taken as that of a wearer who stands still.
-STREAM_ENDED = ', since bodies come, or came, as a stream (separation: auto)'
+STREAM_ENDED = ', since a stream of bodies, or one with a stamp, has come (separation: auto)'
 
 
 class RequestError(RrthError):
