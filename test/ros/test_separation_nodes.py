@@ -64,7 +64,7 @@ class Client(Node):
 
     def _publish(self):
         markers = [
-            samples.box(b.name, center=b.center.tolist(), size=b.size.tolist())
+            samples.box(b.name, center=b.center.tolist(), size=b.size.tolist(), text=b.name)
             for b in worlds.wearer().boxes
         ]
         while not self.is_over.is_set():

@@ -10,11 +10,11 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.io.wearer_file import LONGEST_TEXT
+from rrth_planner.io.wearer_file import marker_name
 from rrth_planner.kernels.collision.boxes import first_bad, place, POSED
 from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
-from rrth_planner.model.errors import MessageError, one_line, SceneError
+from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.scene import Box
 from rrth_planner.ros.messages.fields import (
     NANOSECONDS,
@@ -124,12 +124,6 @@ def read_edits(
     )
 
 
-def marker_name(marker: Any) -> str:
-    """Return the name of a marker: its text, or `ns/id` where it has none."""
-    name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
-    return one_line(name, LONGEST_TEXT)
-
-
 class _Reading:
     """The boxes of the markers that have been read, before they are placed."""
 
@@ -191,7 +185,8 @@ def _read(
             f'header.stamp: {measured - now:.3f} s in the future, expected at most {MOST_AHEAD:g} '
             '(by the same clock as the planner: see use_sim_time)'
         )
-    frame, name = reading.frame(marker.header.frame_id, stamp), marker_name(marker)
+    frame = reading.frame(marker.header.frame_id, stamp)
+    name = marker_name(marker.text, marker.ns, marker.id)
     if marker.type == Marker.CUBE:
         reading.add(name, (*row, 0.0, 0.0, 0.0), frame)
     else:
@@ -205,7 +200,7 @@ def _read(
 
 
 def _label(index: int, marker: Any) -> str:
-    return f'marker {index} ("{marker_name(marker)}")'
+    return f'marker {index} ("{marker_name(marker.text, marker.ns, marker.id)}")'
 
 
 def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:
