@@ -248,8 +248,8 @@ class Reporter:
             self._named.update(key for key, _ in new)
             names = WearerBody(lost=tuple(new)).lost_names()
             self._node.get_logger().warning(
-                f'{self._inputs.body.topic}: lifetime of {names} expired: no new motion until '
-                'published again or deleted'
+                f'{self._inputs.body.topic}: lifetime of {names} expired, or a body left it out: '
+                'no new motion until published again or deleted'
             )
 
     def _warn_of_publishers(self) -> None:

@@ -15,6 +15,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.body_publishers import BodyPublishers
 from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import FrameIsLateError, Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -48,6 +49,8 @@ class SceneMonitor:
         it is the newest of those that came.
     on_error : callable, optional
         Called after an unexpected error, with its name and message.
+    keep_removed : callable, optional
+        Returns how long a part that is removed now stays where it was [s].
 
     """
 
@@ -59,6 +62,7 @@ class SceneMonitor:
         on_change: Callable[[], None] = lambda: None,
         on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
         on_error: Callable[[str], None] = lambda what: None,
+        keep_removed: Callable[[], float] = lambda: 0.0,
     ) -> None:
         """Subscribe."""
         self._node = node
@@ -68,7 +72,8 @@ class SceneMonitor:
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
-        self._order = MarkerOrder()
+        self._order, self._publishers = MarkerOrder(), BodyPublishers()
+        self._keep_removed = keep_removed
         # Bodies in frames whose poses are not known yet, and since when they wait [s].
         self._waiting: deque[tuple[MarkerArray, Arrival, float]] = deque()
         # When the last message came that was no body at all [s].
@@ -143,8 +148,20 @@ class SceneMonitor:
         # What measures no part says nothing about those that are known.
         is_news &= body.measured is None or any(edit.part is not None for edit in edits)
 
+        # By the steady clock, however long it waited.
+        came = time.monotonic() - 1e-9 * max(0, time.time_ns() - arrival.received)
+        is_description = self._publishers.is_description(edits, arrival.sent, came)
+
         def read() -> WearerBody:
-            return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
+            return self._order.apply(
+                body.value,
+                edits,
+                arrival.sent,
+                now,
+                arrival.is_newer,
+                is_description=is_description,
+                keep_removed=self._keep_removed(),
+            )
 
         measured = measured_at(edits, now - self._latency)
         self._take(body, read, measured, is_news)

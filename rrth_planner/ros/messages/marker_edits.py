@@ -49,21 +49,36 @@ class BodyPart:
         When they are lost [s, the clock of `now`]; inf: never.
     measured : float
         When they were measured [s].
+    is_stamped : bool
+        Whether the publisher says when that was.
+    ends : float
+        When they are gone, once they were removed while a motion runs [s]; inf: they were not.
 
     """
 
     boxes: tuple[Box, ...]
     expires: float = math.inf
     measured: float = -math.inf
+    is_stamped: bool = False
+    ends: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds."""
+    """
+    The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds.
+
+    Parameters
+    ----------
+    spared : frozenset of (str, int)
+        What a late DELETEALL does nothing to: newer arrays have edited these.
+
+    """
 
     action: int
     key: Key
     part: BodyPart | None = None
+    spared: frozenset[Key] = frozenset()
 
 
 def measured_at(edits: Sequence[Edit], default: float) -> float:
@@ -153,8 +168,12 @@ class _Reading:
 
 def _read(
     marker: Any, now: float, latency: float, reading: _Reading
-) -> tuple[float, float] | None:
-    """Read the boxes of a marker; return when they expire and were measured [s]; None: no box."""
+) -> tuple[float, float, bool] | None:
+    """
+    Read the boxes of a marker; return when they expire and were measured [s]; None: no box.
+
+    The third value: whether the time of the measurement is the marker's own stamp.
+    """
     if len(marker.ns) > LONGEST_NAMESPACE:
         raise MessageError(
             f'ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
@@ -196,7 +215,7 @@ def _read(
             )
         for k, point in enumerate(marker.points):
             reading.add(f'{name}[{k}]', row + triple_of(point, f'points[{k}]'), frame)
-    return now + lifetime if lifetime > 0.0 else math.inf, measured
+    return now + lifetime if lifetime > 0.0 else math.inf, measured, stamp != 0
 
 
 def _label(index: int, marker: Any) -> str:

@@ -1,0 +1,55 @@
+# Copyright 2026 The rrth_planner authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which arrays describe the wearer once and for all, and which belong to a stream of them."""
+
+from collections import deque
+from collections.abc import Sequence
+
+from rrth_planner.ros.messages.fields import Stamp
+from rrth_planner.ros.messages.marker_edits import Edit
+
+# What comes later than this after its publisher's last array continues no stream [s].
+LONGEST_PAUSE = 1.0
+# So many arrays are remembered.
+REMEMBERED = 1024
+# The number of each message where the middleware does not count them.
+UNNUMBERED = 2**64 - 1
+
+
+class BodyPublishers:
+    """
+    Knows when each publisher of bodies published last.
+
+    A message does not say who published it, but each publisher counts its own from 1: one with a
+    smaller number may be of the same publisher, and is taken to be.
+    """
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        # Number and time of arrival [s] of each array.
+        self._last: deque[tuple[int, float]] = deque(maxlen=REMEMBERED)
+
+    def is_description(self, edits: Sequence[Edit], sent: Stamp, came: float) -> bool:
+        """
+        Return whether an array describes the wearer anew, and remember when it came.
+
+        It does where no box of it has a stamp, so that nobody knows when it was measured, and
+        where it is the first array of its publisher, or comes more than `LONGEST_PAUSE` after the
+        last one. All others belong to a stream, in which what is missing was not seen.
+
+        Parameters
+        ----------
+        sent : (int, int)
+            Source timestamp [ns] and number of the message.
+        came : float
+            When it came, by a clock that is never set [s].
+
+        """
+        number = sent[1]
+        continues = any(
+            came - then <= LONGEST_PAUSE and (before < number or number == UNNUMBERED)
+            for before, then in reversed(self._last)
+        )
+        self._last.append((number, came))
+        is_stamped = any(edit.part is not None and edit.part.is_stamped for edit in edits)
+        return not continues and not is_stamped
