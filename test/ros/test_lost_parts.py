@@ -177,6 +177,13 @@ def test_a_body_that_follows_within_a_second_is_a_stream_whoever_may_have_sent_i
     assert bodies.is_description(plain, (0, UNNUMBERED), 4.0)
 
 
+def test_a_body_that_was_rejected_continues_a_stream_as_well():
+    bodies = BodyPublishers()
+    for k in range(1, 5):
+        assert bodies.heard((0, k), 0.8 * k) == (k > 1)
+    assert not bodies.is_description(edits(TORSO), (0, 5), 4.0)
+
+
 def test_a_body_with_a_stamp_is_no_description():
     bodies = BodyPublishers()
     assert not bodies.is_description(edits(stamped(TORSO, 1.0), now=1.0), (0, 1), 1.0)

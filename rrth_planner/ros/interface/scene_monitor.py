@@ -133,6 +133,7 @@ class SceneMonitor:
                 if isinstance(problem, FrameIsLateError) and may_wait:
                     self._waiting.appendleft((msg, arrival, since))
                     return
+                self._publishers.heard(arrival.sent, _steady_time(arrival))
                 self._reject(self._inputs.body, problem)
             else:
                 # The wait for its frame is no delay of this node.
@@ -148,9 +149,9 @@ class SceneMonitor:
         # What measures no part says nothing about those that are known.
         is_news &= body.measured is None or any(edit.part is not None for edit in edits)
 
-        # By the steady clock, however long it waited.
-        came = time.monotonic() - 1e-9 * max(0, time.time_ns() - arrival.received)
-        is_description = self._publishers.is_description(edits, arrival.sent, came)
+        is_description = self._publishers.is_description(
+            edits, arrival.sent, _steady_time(arrival)
+        )
 
         def read() -> WearerBody:
             return self._order.apply(
@@ -209,3 +210,8 @@ class SceneMonitor:
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9
+
+
+def _steady_time(arrival: Arrival) -> float:
+    """Return when a message came, by the steady clock [s]."""
+    return time.monotonic() - 1e-9 * max(0, time.time_ns() - arrival.received)

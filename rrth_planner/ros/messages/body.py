@@ -119,7 +119,7 @@ class WearerBody:
                         is_removed = is_description and not part.is_stamped
                         stays.setdefault(key, now + keep_removed if is_removed else math.inf)
         for key, ends in stays.items():
-            part = parts.pop(key, None) or lost.pop(key, None)
+            part = parts.pop(key) if key in parts else lost.pop(key, None)
             if part is not None and min(ends, part.ends) > now:
                 until = min(ends, part.ends)
                 lost[key] = replace(part, expires=min(part.expires, now), ends=until)
@@ -132,7 +132,7 @@ class WearerBody:
 def _last(lost: Mapping[Key, BodyPart]) -> tuple[tuple[Key, BodyPart], ...]:
     """Return the last of the lost parts, of at most `MOST_BOXES` boxes in all."""
     kept, n = deque[tuple[Key, BodyPart]](), 0
-    for key, part in reversed(lost.items()):
+    for key, part in reversed(tuple(lost.items())):
         n += len(part.boxes)
         if n > MOST_BOXES:
             break

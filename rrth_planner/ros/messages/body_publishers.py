@@ -45,11 +45,15 @@ class BodyPublishers:
             When it came, by a clock that is never set [s].
 
         """
+        is_stamped = any(edit.part is not None and edit.part.is_stamped for edit in edits)
+        return not self.heard(sent, came) and not is_stamped
+
+    def heard(self, sent: Stamp, came: float) -> bool:
+        """Remember an array, a rejected one, too; return whether it continues a stream."""
         number = sent[1]
         continues = any(
             came - then <= LONGEST_PAUSE and (before < number or number == UNNUMBERED)
             for before, then in reversed(self._last)
         )
         self._last.append((number, came))
-        is_stamped = any(edit.part is not None and edit.part.is_stamped for edit in edits)
-        return not continues and not is_stamped
+        return continues
