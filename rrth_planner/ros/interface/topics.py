@@ -78,8 +78,8 @@ INTERFACES = {
             'measurement, and give it a lifetime: a part whose lifetime runs out, or that an '
             'array with DELETEALL leaves out, is lost; it stays where it was for `keep_lost`, '
             'then the arm stops, and it is reported by name. DELETE removes a part, while a '
-            'motion runs after `keep_lost`. An array without stamps, 1 s after the last one of its publisher, '
-            'is another description: what it leaves out is removed, too',
+            'motion runs after `keep_lost`. An array without stamps, more than 1 s after the last '
+            'one of its publisher, is another description: what it leaves out is removed, too',
         ),
         _subscribed(
             'target',
