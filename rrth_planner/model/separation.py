@@ -137,8 +137,9 @@ def governing_speed(rules: SeparationRules, name: str) -> tuple[str, float]:
     faster, never slower. Of all that count the greatest is taken. Nothing fits a name with a
     slash, as `torso/0` of a marker without a text, nor one that was cut short.
     """
-    given = _words(_INDEX.sub('', name))
-    whole = [] if '/' in name or name.endswith(CUT) else given
+    text = _INDEX.sub('', name)
+    given = _words(text)
+    whole = [] if '/' in text or text.endswith(CUT) else given
     counted, does_fit = [], False
     for words, speed in rules.body_speeds:
         entry = _words(words)
