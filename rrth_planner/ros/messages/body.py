@@ -119,10 +119,10 @@ class WearerBody:
                         is_removed = is_description and not part.is_stamped
                         stays.setdefault(key, now + keep_removed if is_removed else math.inf)
         for key, ends in stays.items():
-            part = parts.pop(key) if key in parts else lost.pop(key, None)
-            if part is not None and min(ends, part.ends) > now:
-                until = min(ends, part.ends)
-                lost[key] = replace(part, expires=min(part.expires, now), ends=until)
+            left = parts.pop(key, None) or lost.pop(key, None)
+            if left is not None and min(ends, left.ends) > now:
+                until = min(ends, left.ends)
+                lost[key] = replace(left, expires=min(left.expires, now), ends=until)
         body = WearerBody(tuple(parts.items()), _last(lost))
         if body.n_boxes > MOST_BOXES:
             raise MessageError(f'{body.n_boxes} boxes, expected at most {MOST_BOXES} in all')
