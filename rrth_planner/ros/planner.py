@@ -115,7 +115,13 @@ class PlannerNode(Node):
         self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(
-            self, parameters, inputs, self._on_change, self._monitor.on_body, self.fail
+            self,
+            parameters,
+            inputs,
+            self._on_change,
+            self._monitor.on_body,
+            self.fail,
+            self._keep_removed,
         )
         self._queue = PlanQueue(
             self,
@@ -149,6 +155,10 @@ class PlannerNode(Node):
         if self._point_head is not None:
             self._point_head.close()
         self._queue.close()
+
+    def _keep_removed(self) -> float:
+        """Return how long a part of the wearer that is removed now stays where it was [s]."""
+        return 0.0 if self._monitor.running is None else self._reporter.parameters.keep_lost
 
     def fail(self, what: str) -> None:
         """Stop an arm in motion after an unexpected error."""

@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether bodies describe a wearer who stands still, by stamps, times and numbers of messages."""
+"""Whether bodies describe a wearer who stands still, or come as a stream."""
 
 import pytest
 
@@ -11,25 +11,10 @@ from rrth_planner.ros.messages.body_source import (  # noqa: E402
     as_stream,
     BodySource,
     has_body,
-    is_description,
+    is_stamped,
 )
 import samples  # noqa: E402
 from visualization_msgs.msg import Marker  # noqa: E402
-
-
-def stamped():
-    """Return a body whose head alone has a stamp."""
-    msg = samples.wearer()
-    msg.markers[-1].header.stamp.nanosec = 1
-    return msg
-
-
-def after(*bodies):
-    """Return the source after bodies, each (message, number, time of arrival)."""
-    source = BodySource()
-    for msg, number, came in bodies:
-        source = after_body(msg, (int(1e9 * came), number), came, source)
-    return source
 
 
 def test_before_a_body_nothing_is_known():
@@ -40,43 +25,27 @@ def test_before_a_body_nothing_is_known():
 
 
 def test_after_a_body_it_takes_half_a_second_until_it_is_known():
-    source = after((samples.wearer(), 1, 10.0))
+    source = after_body(True, 10.0, BodySource())
     assert source.stands_still
     assert source.time_until_known(10.2) == pytest.approx(0.3)
     assert source.time_until_known(10.5) == 0.0
 
 
-@pytest.mark.parametrize(
-    ('number', 'came', 'is_still'),
-    [
-        (2, 11.01, True),
-        (2, 11.0, False),
-        (2, 10.03, False),
-        # Another publisher's first one.
-        (1, 10.03, True),
-        # Not every middleware numbers messages.
-        (None, 10.03, False),
-        (None, 11.01, True),
-        # One that came late.
-        (7, 9.9, False),
-    ],
-)
-def test_another_body_is_a_description_or_one_of_a_stream(number, came, is_still):
-    source = after((samples.wearer(), 1, 10.0), (samples.wearer(), number, came))
-    assert source.stands_still == is_still
-    assert source.is_stream != is_still
-    assert source.came == max(came, 10.0)
-
-
 def test_a_stream_is_one_for_good():
-    source = after((samples.wearer(), 1, 10.0), (samples.wearer(), 2, 10.03))
-    later = after_body(samples.wearer(), (0, 1), 100.0, source)
-    assert later.is_stream
-    assert is_description(samples.wearer(), (0, 1), 100.0, source)
+    source = after_body(False, 10.0, after_body(True, 9.0, BodySource()))
+    assert source.is_stream
+    assert after_body(True, 100.0, source) == BodySource(100.0, True)
+
+
+def test_a_body_that_came_late_does_not_change_when_the_last_one_came():
+    assert after_body(True, 9.0, BodySource(10.0)).came == 10.0
 
 
 def test_a_stamp_of_any_part_is_a_measurement():
-    assert after((stamped(), 1, 10.0)).is_stream
+    msg = samples.wearer()
+    assert not is_stamped(msg)
+    msg.markers[-1].header.stamp.nanosec = 1
+    assert is_stamped(msg)
 
 
 def test_what_deletes_only_is_no_body():

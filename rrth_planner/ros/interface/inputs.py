@@ -269,7 +269,8 @@ class Inputs:
             raise RequestError(
                 code,
                 f'the body on {source.topic} has lost parts: {lost}; expected each of them to be '
-                'published again or deleted (DELETE)',
+                'published again or deleted by name (DELETE; while a motion runs it takes effect '
+                'after keep_lost)',
             )
         if body.n_boxes == 0 and not body.lost:
             raise RequestError(

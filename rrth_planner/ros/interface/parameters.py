@@ -63,8 +63,8 @@ def declared(dof: int) -> tuple[Setting, ...]:
     )
     meeting = 'greatest speed of a part of the arm that may meet the wearer'
     moving = (
-        'greatest speeds of parts of the body by words of their names; the greatest of those that '
-        'fit'
+        'greatest speeds of parts of the body by whole words of their texts, 0 by the whole text; '
+        'the greatest of those that fit'
     )
     late = 'greatest delay with which the controller executes a motion'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'

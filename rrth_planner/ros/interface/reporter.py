@@ -11,8 +11,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rrth_planner.execution.body_motion import BodyMotion, RAISED, SHARE
+from rrth_planner.execution.body_motion import body_at, BodyMotion, RAISED, SHARE
 from rrth_planner.model.errors import one_line
+from rrth_planner.model.separation import governing_speed, SeparationRules
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
@@ -33,6 +34,8 @@ PERIOD = 1.0
 WARNING_PERIOD = 5.0
 # A rate is published again once it has changed by so much [-].
 RATE_STEP = 0.05
+# The diagnostics name the speeds of so many boxes.
+MOST_SPEEDS = 100
 # Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
@@ -237,7 +240,7 @@ class Reporter:
             'last incident': self._last_incident,
         }
         if self._state is not None:
-            values |= self._separation_values()
+            values |= self._separation_values(now)
         for name, topic in self._inputs.all.items():
             values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
             values[f'good messages, {name}'] = topic.n_good
@@ -247,15 +250,18 @@ class Reporter:
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
         return status_to_msg(name, level, message, values)
 
-    def _separation_values(self) -> dict[str, object]:
-        """Return what is known of separation."""
-        status, body = self._published_state, self._body
+    def _separation_values(self, now: float) -> dict[str, object]:
+        """Return what is known of separation at a time [s]."""
+        status, body, separation = self._published_state, self._body, self.parameters.separation
         n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
         return {
             'separation': status.state.name,
             'cause': status.cause,
             'rate [-]': f'{status.rate:.3f}',
             'commitments': self._commitments,
+            'greatest speeds': ''
+            if body is None or separation is None
+            else speeds_shown(body, now, separation.rules),
             'sights of parts': n_seen,
             'faster than assumed': f'{n_faster} ({n_faster / max(n_seen, 1):.2%})',
         }
@@ -270,8 +276,8 @@ class Reporter:
             self._named.update(key for key, _ in new)
             names = WearerBody(lost=tuple(new)).lost_names()
             self._node.get_logger().warning(
-                f'{self._inputs.body.topic}: lifetime of {names} expired: no new motion until '
-                'published again or deleted'
+                f'{self._inputs.body.topic}: lifetime of {names} expired, or a body left it out: '
+                'no new motion until published again or deleted'
             )
 
     def _warn_of_publishers(self) -> None:
@@ -318,6 +324,17 @@ class Reporter:
             logger.warning(text)
         self.publish()
         return text
+
+
+def speeds_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
+    """Return how fast each box is assumed to be at a time [s], and by which words of the rules."""
+    shown, boxes = [], body.scene.boxes
+    for box, speed in zip(boxes[:MOST_SPEEDS], body_at(body, now, rules).speeds, strict=False):
+        words, stated = governing_speed(rules, box.name)
+        why = words if speed <= stated else f'{words}, was faster'
+        shown.append(f'"{box.name}" {speed:g} m/s ({why})')
+    rest = len(boxes) - len(shown)
+    return ', '.join(shown + ([f'{rest} more'] if rest else []))
 
 
 def summary(

@@ -71,12 +71,15 @@ INTERFACES = {
         _subscribed(
             'body_boxes',
             MARKERS,
-            'the wearer: CUBE or CUBE_LIST markers, `scale` = full size; identity, ADD, DELETE, '
-            'DELETEALL, lifetime as in RViz. An array with one bad marker is rejected whole: the '
-            'last good body stays, a running motion stops, and nothing is planned until a good '
-            'one comes. Stamp each box with the time of its measurement, and give it a lifetime: '
-            'a part whose lifetime runs out is lost; it stays where it was for `keep_lost`, then '
-            'the arm stops, and it is reported by name',
+            'the wearer: CUBE or CUBE_LIST markers, `scale` = full size, `text` = which part; '
+            'identity, ADD, DELETE, DELETEALL, lifetime nearly as in RViz. An array with one bad '
+            'marker is rejected whole: the last good body stays, a running motion stops, and '
+            'nothing is planned until a good one comes. Stamp each box with the time of its '
+            'measurement, and give it a lifetime: a part whose lifetime runs out, or that an '
+            'array with DELETEALL leaves out, is lost; it stays where it was for `keep_lost`, '
+            'then the arm stops, and it is reported by name. DELETE removes a part, while a '
+            'motion runs after `keep_lost`. An array without stamps, more than 1 s after the last '
+            'one of its publisher, is another description: what it leaves out is removed, too',
         ),
         _subscribed(
             'target',

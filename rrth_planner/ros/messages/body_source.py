@@ -6,17 +6,13 @@ from dataclasses import dataclass, replace
 import math
 from typing import Any
 
-from rrth_planner.ros.messages.fields import nanoseconds_of, Stamp
+from rrth_planner.ros.messages.fields import nanoseconds_of
 from visualization_msgs.msg import Marker
 
 # The name of the node that makes bodies of what a tracker measures.
 TRACKER = 'body_boxes_node'
-# A body that comes within so long of its publisher's last one is one of a stream [s].
-LONGEST_PERIOD = 1.0
 # For so long after a body that stands still another one may show it to be a stream's first [s].
 UNDECIDED = 0.5
-# The number of a publisher's first message.
-FIRST = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,33 +48,19 @@ def has_body(array: Any) -> bool:
     return any(marker.action == Marker.ADD for marker in array.markers)
 
 
-def is_description(array: Any, sent: Stamp, came: float, source: BodySource) -> bool:
+def is_stamped(array: Any) -> bool:
+    """Return whether a MarkerArray says of a part of the wearer when it was measured."""
+    markers = (m for m in array.markers if m.action == Marker.ADD)
+    return any(nanoseconds_of(marker.header.stamp) for marker in markers)
+
+
+def after_body(is_description: bool, came: float, source: BodySource) -> BodySource:
     """
-    Return whether a body describes a wearer who stands still.
+    Return the source after another body.
 
-    It has no stamp, and is its publisher's first, or comes more than `LONGEST_PERIOD` after his
-    last one. rclpy does not say who published a message, only its number, and not with every
-    middleware; so beside a first one the last one of anybody counts.
-
-    Parameters
-    ----------
-    array : MarkerArray
-        With a part of the body.
-    came : float
-        By the monotonic clock [s].
-    source : BodySource
-        Of the bodies before.
-
+    is_description: as `BodyPublishers.is_description`; came: by the monotonic clock [s].
     """
-    if any(m.action == Marker.ADD and nanoseconds_of(m.header.stamp) for m in array.markers):
-        return False
-    return sent[1] == FIRST or came - source.came > LONGEST_PERIOD
-
-
-def after_body(array: Any, sent: Stamp, came: float, source: BodySource) -> BodySource:
-    """Return the source after another body; parameters as those of `is_description`."""
-    is_stream = source.is_stream or not is_description(array, sent, came, source)
-    return BodySource(max(came, source.came), is_stream)
+    return BodySource(max(came, source.came), source.is_stream or not is_description)
 
 
 def as_stream(source: BodySource) -> BodySource:
