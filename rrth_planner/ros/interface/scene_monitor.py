@@ -84,8 +84,8 @@ class SceneMonitor:
         self._inputs = inputs
         self._order, self._publishers = MarkerOrder(), BodyPublishers()
         self._keep_removed = keep_removed
-        # Bodies in frames whose poses are not known yet, since when they wait [s], and whether they
-        # are descriptions.
+        # Bodies in frames whose poses are not known yet, since when they wait [s], and which
+        # of them are descriptions.
         self._waiting: deque[tuple[MarkerArray, Arrival, float, bool]] = deque()
         # When the last message came that was no body at all [s].
         self._undecoded = -float('inf')
