@@ -1,6 +1,6 @@
 # Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who tells of the wearer: a tracker that measures him, or somebody who describes him once."""
+"""Where bodies come from: a tracker that measures the wearer, or who describes him once."""
 
 from dataclasses import dataclass, replace
 import math
@@ -48,7 +48,7 @@ class BodySource:
 
 
 def has_body(array: Any) -> bool:
-    """Return whether a MarkerArray tells where a part of the wearer is."""
+    """Return whether a MarkerArray has a part of the wearer."""
     return any(marker.action == Marker.ADD for marker in array.markers)
 
 
