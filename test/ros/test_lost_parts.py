@@ -53,7 +53,7 @@ class Tracker:
             sent,
             now,
             newer and (lambda other: other[0] in newer),
-            is_description=self.publishers.is_description(found, sent, now),
+            is_description=self.publishers.is_description(array(*markers), sent, now),
             keep_removed=keep_removed,
         )
         return self.at(now)

@@ -163,7 +163,7 @@ class RecordingReader:
                 sent,
                 now,
                 lambda other: other[0] > recorded.sent,
-                is_description=publishers.is_description(edits, sent, now),
+                is_description=publishers.is_description(recorded.msg, sent, now),
             )
             return self._when(recorded), scene_of(body)
 

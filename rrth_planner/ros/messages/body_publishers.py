@@ -10,6 +10,8 @@ from rrth_planner.ros.messages.fields import Stamp
 
 # What comes later than this after its publisher's last array continues no stream [s].
 LONGEST_PAUSE = 1.0
+# The number of a message that nobody has counted.
+UNNUMBERED = 2**64 - 1
 # So many arrays are remembered.
 REMEMBERED = 1024
 
@@ -25,7 +27,7 @@ class BodyPublishers:
     def __init__(self) -> None:
         """Begin without any."""
         # Number and time of arrival [s] of each array.
-        self._last: deque[tuple[int | None, float]] = deque(maxlen=REMEMBERED)
+        self._last: deque[tuple[int, float]] = deque(maxlen=REMEMBERED)
 
     def is_description(self, array: Any, sent: Stamp, came: float) -> bool:
         """
@@ -43,10 +45,10 @@ class BodyPublishers:
             When it came, by a clock that is never set [s].
 
         """
-        # Not every middleware counts messages.
-        number: int | None = sent[1]
+        # Not every middleware counts messages; rclpy then has None.
+        number = UNNUMBERED if sent[1] is None else sent[1]
         continues = any(
-            came - then <= LONGEST_PAUSE and (before is None or number is None or before < number)
+            came - then <= LONGEST_PAUSE and (before < number or before == UNNUMBERED)
             for before, then in reversed(self._last)
         )
         if has_body(array):
