@@ -58,7 +58,7 @@ class Client(Node):
         """Publish a wearer."""
         markers = [Marker(action=Marker.DELETEALL)]
         for box in scene.boxes:
-            marker = Marker(ns=box.name, type=Marker.CUBE, action=Marker.ADD)
+            marker = Marker(ns=box.name, text=box.name, type=Marker.CUBE, action=Marker.ADD)
             position, orientation = marker.pose.position, marker.pose.orientation
             position.x, position.y, position.z = box.center.tolist()
             x, y, z, w = quaternion_xyzw(box.rotation).tolist()

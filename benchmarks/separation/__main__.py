@@ -3,8 +3,8 @@
 """
 Measure separation from a wearer who moves in lock-step, without ROS, and print tables.
 
-Latencies are true, and time is no more than a number: the machine may be as slow as it likes. Only
-the last section, `nodes`, needs ROS and an idle machine.
+Latencies are true, and time is no more than a number: the machine may be as slow as it likes. The
+sections `markers` and `nodes` need ROS, and only the last one, `nodes`, an idle machine.
 """
 
 import argparse
@@ -29,7 +29,8 @@ class Extent:
     motions : int
         Whose commitments are judged.
     hands, faulty : int
-        Parts of the wearer that leave, each trial, in `adversary` and in `perception`.
+        Parts of the wearer that leave, each trial, in `adversary`, and in `perception` and
+        `markers`.
     timed : int
         Motions of each case in `durations` and `costs`.
     reaches, ended : int
@@ -135,6 +136,15 @@ def print_perception(options: argparse.Namespace, extent: Extent) -> None:
     print_trials(title, perception.trials(), extent.faulty, options)
 
 
+def print_markers(options: argparse.Namespace, extent: Extent) -> None:
+    """Print what becomes of the adversary where the wearer is seen by way of messages."""
+    # Needs the messages of ROS.
+    from benchmarks.separation import markers
+
+    title = 'markers: the adversary, seen by way of the messages of a tracker'
+    print_trials(title, markers.trials(), extent.faulty, options)
+
+
 def print_costs(options: argparse.Namespace, extent: Extent) -> None:
     """Print how long commitments take."""
     print_head('costs: time of a commitment, one thread', costs.HEADER)
@@ -161,6 +171,7 @@ SECTIONS: dict[str, Callable[[argparse.Namespace, Extent], None]] = {
     'durations': print_durations,
     'people': print_people,
     'perception': print_perception,
+    'markers': print_markers,
     'costs': print_costs,
     'nodes': print_nodes,
 }
@@ -198,7 +209,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, kind, text in (
         ('motions', _count, 'whose commitments the reference checker judges'),
         ('hands', _count, 'parts of the wearer that leave, each trial'),
-        ('faulty', _count, 'the same in `perception`'),
+        ('faulty', _count, 'the same in `perception` and `markers`'),
         ('timed', _count, 'motions of each case in `durations` and `costs`'),
         ('reaches', _count, 'hands that reach for the arm of real nodes, each trial'),
         ('ended', _count, 'planners that are killed, or stand still, in mid-motion'),

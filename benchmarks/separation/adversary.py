@@ -7,7 +7,7 @@ What is seen, lost and wrong in between is the perception's, which section `perc
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +70,8 @@ HAND, EDGE, NEAR, FAR, TRIES = 'hand', 0.1, 0.05, 0.6, 30
 SHARES = (0.55, 0.25, 0.1)
 # Share of the parts that leave right after a frame was taken.
 RIGHT_AFTER = 1.0 / 3.0
+# A part that is not seen leaves at most so long after it was seen last [s].
+UNSEEN = 0.5
 # A part moves for so long [s]. One leaves so late at the latest, however slow the arm is [s].
 REACHES, LATEST = 1.0, 10.0
 # Hands of a chain of motions, the first of which begins folded.
@@ -86,7 +88,7 @@ class Faults:
     lost : float
         Share of the frames that are lost.
     gone : float
-        How long the part that leaves is not seen, about then [s].
+        How long the part that leaves is not seen, about then [s]; inf: never again.
     noise : float
         Greatest error of the place of a box [m].
     understated : float
@@ -98,6 +100,12 @@ class Faults:
     gone: float = 0.0
     noise: float = 0.0
     understated: float = 0.0
+
+
+def seen_at_once(names: tuple[str, ...], rows: Array, _: np.random.Generator) -> Eyes:
+    """Return eyes that are shown the boxes themselves; they know the wearer at rest."""
+    # Whoever knew him at rest knows him as long as he pleases.
+    return Eyes(names, rows, np.zeros(len(rows)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,6 +122,10 @@ class Trial:
     is_separate : bool
         Whether motions are given as commitments; else they are monitored as a whole.
     faults : Faults
+    shares : (float, float, float)
+        As `SHARES`.
+    eyes : callable
+        Makes those of the planner, of the names and rows of a wearer at rest and a generator.
 
     """
 
@@ -122,6 +134,8 @@ class Trial:
     speed: float = 1.0
     is_separate: bool = True
     faults: Faults = Faults()
+    shares: tuple[float, float, float] = SHARES
+    eyes: Callable[[tuple[str, ...], Array, np.random.Generator], Eyes] = seen_at_once
 
     @property
     def is_honest(self) -> bool:
@@ -175,7 +189,7 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
     rng = np.random.default_rng(seed)
     q, hands, n_blocked = FOLDED, [], 0
     while len(hands) < n:
-        scene, part, is_turning = _draw_part(rng)
+        scene, part, is_turning = _draw_part(rng, trial.shares)
         plan = next(random_plans(rng, scene, q, trial.case if trial.is_separate else None), None)
         if plan is None:
             q = FOLDED
@@ -206,15 +220,17 @@ def chain_of_hands(trial: Trial, n: int, seed: int) -> Chain:
     return Chain(tuple(hands), n_blocked)
 
 
-def _draw_part(rng: np.random.Generator) -> tuple[Scene, int | None, bool]:
+def _draw_part(
+    rng: np.random.Generator, shares: tuple[float, float, float]
+) -> tuple[Scene, int | None, bool]:
     """Return the wearer, which part is going to leave, None: a further hand, and if it turns."""
     scene, draw = load_body(), rng.random()
     names = [box.name for box in scene.boxes]
-    if draw < SHARES[0]:
+    if draw < shares[0]:
         return scene, None, False
-    if draw < sum(SHARES[:2]):
+    if draw < sum(shares[:2]):
         return scene, names.index(rng.choice(['left forearm', 'right forearm'])), False
-    return scene, names.index('head'), bool(draw >= sum(SHARES))
+    return scene, names.index('head'), bool(draw >= sum(shares))
 
 
 def _hand_beside(rng: np.random.Generator, motion: Trajectory) -> Box | None:
@@ -254,9 +270,7 @@ class _Episode:
         self.settings = separation_of(trial.case)
         self.controller = Controller(q)
         self.planner = Planner(self.settings, trial.timing, rng, self.controller)
-        rows = wearer.scene.numbers
-        # Whoever knew him at rest knows him as long as he pleases.
-        self.eyes = Eyes(wearer.names, rows, np.zeros(len(rows)))
+        self.eyes = trial.eyes(wearer.names, wearer.scene.numbers, rng)
         self.share = rng.uniform(0.0, 0.95)
         self.is_right_after = bool(rng.random() < RIGHT_AFTER)
         self.aim = str(rng.choice([EARLIEST, FASTEST]))
@@ -291,7 +305,9 @@ class _Episode:
             return
         if self.gone_from == np.inf and self.trial.faults.gone > 0.0:
             self.gone_from = time + self.rng.uniform(0.0, 0.1)
-            self.leaves = self.gone_from + self.rng.uniform(0.0, self.trial.faults.gone)
+            self.leaves = self.gone_from + self.rng.uniform(
+                0.0, min(self.trial.faults.gone, UNSEEN)
+            )
             return
         if self.is_right_after:
             # Some frame shows him as he was at this time minus a multiple of the period.

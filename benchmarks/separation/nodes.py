@@ -141,7 +141,7 @@ class Wearer:
         self.lock = Lock()
         self._is_over = Event()
         self._thread = Thread(target=self._run, daemon=True)
-        self._n_hands = 0
+        self._n_hands, self._gone = 0, ''
 
     def __enter__(self) -> 'Wearer':
         """Begin to publish."""
@@ -163,6 +163,8 @@ class Wearer:
 
     def remove_hand(self) -> None:
         """Let the hand be gone."""
+        if self.reaching is not None:
+            self._gone = self.reaching.scene.boxes[-1].name
         self.reaching = None
 
     def _run(self) -> None:
@@ -180,8 +182,9 @@ class Wearer:
             boxes = reaching.scene.boxes
             with self.lock:
                 rows = reaching.rows(np.array([now.nanoseconds * 1e-9]))[0]
-        # Whole bodies: a planner that stands still may miss that a hand is gone.
-        markers = [Marker(action=Marker.DELETEALL)]
+        # What a whole body leaves out is lost. A planner that stands still may miss that the last
+        # hand is gone.
+        markers = [Marker(action=Marker.DELETEALL), Marker(action=Marker.DELETE, ns=self._gone)]
         for box, row in zip(boxes, rows, strict=True):
             marker = Marker(ns=box.name, text=box.name, type=Marker.CUBE, action=Marker.ADD)
             p, o = marker.pose.position, marker.pose.orientation

@@ -32,6 +32,8 @@ from benchmarks.soak.judge import RAY
 PLANNER, PLAYBACK = (f'rrth_planner.ros.{name}_node' for name in ('planner', 'playback'))
 # The monitor is what is judged: with separation the arm mostly does not come near enough.
 ARGUMENTS = ['--ros-args', '-p', 'seed:=7', '-p', 'separation:=false']
+# A hand that is deleted is really gone.
+FORGETFUL = [*ARGUMENTS, '-p', 'keep_lost:=0.0']
 # When within a motion the hand comes, how far ahead of the arm [s], and its size [m].
 SHARE, LEAD, SIDE = (0.05, 0.7), (0.05, 1.5), (0.05, 0.15)
 # A place that the arm moves so far to is in the way [m]; places that are tried.
@@ -102,7 +104,7 @@ def soak_monitor(
 
     with (
         ros_client(lambda: SoakClient(folder)) as client,
-        ChildProcess(PLANNER, ARGUMENTS, listen) as one,
+        ChildProcess(PLANNER, FORGETFUL, listen) as one,
         ChildProcess(PLAYBACK, [], listen) as other,
     ):
         client.listen_to_states()

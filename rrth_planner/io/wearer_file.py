@@ -28,6 +28,12 @@ ADD, DELETE, DELETEALL = 0, 2, 3
 LONGEST_TEXT = 100
 
 
+def marker_name(given: str, ns: str, index: int) -> str:
+    """Return the name of a marker: its text, or `ns/id` where it has none."""
+    # As it is shown in RViz, a text may have lines.
+    return one_line(given or (f'{ns}/{index}' if ns else f'{index}'), LONGEST_TEXT)
+
+
 def load_body(path: str | Path | None = None) -> Scene:
     """
     Return the wearer of a YAML file: laid out as `config/body.yaml`, the default, or a message.
@@ -79,9 +85,8 @@ def _boxes_after(markers: Any) -> list[dict[str, Any]]:
 
 def _boxes(label: str, marker: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the box of a CUBE, or those of a CUBE_LIST, laid out as in `config/body.yaml`."""
-    name = text(marker.get('text', ''), f'{label}: text', SceneError) or marker.get('ns', '')
-    # As it is shown in RViz, a text may have lines.
-    name = one_line(name, LONGEST_TEXT)
+    given = text(marker.get('text', ''), f'{label}: text', SceneError)
+    name = marker_name(given, marker.get('ns', ''), marker.get('id', 0))
     label = f'{label} ("{name}")'
     kind = whole(marker.get('type'), f'{label}: type', SceneError)
     if kind not in (CUBE, CUBE_LIST):

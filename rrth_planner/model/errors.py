@@ -8,13 +8,16 @@ from typing import Any
 # Longest name in messages and pictures [characters].
 LONGEST_NAME = 256
 
+# The end of a text that was cut short.
+CUT = ' ...'
+
 # Longest sentence of an error, however long the input is [characters].
 LONGEST_SENTENCE = 1000
 
 
 def one_line(text: str, longest: int = LONGEST_SENTENCE) -> str:
     """Return a text as one printable line, cut short where it is too long."""
-    cut = text if len(text) <= longest else f'{text[: longest - 4]} ...'
+    cut = text if len(text) <= longest else f'{text[: longest - len(CUT)]}{CUT}'
     if cut.isprintable():
         return cut
     return ''.join(c if c.isprintable() else ' ' if c.isspace() else '?' for c in cut)

@@ -4,15 +4,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+import functools
+import re
 
 import numpy as np
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import OptionsError, SceneError
+from rrth_planner.model.errors import CUT, OptionsError, SceneError
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits
 
-# Greatest speeds of parts of the body by words of their names [m/s], in the frame of the torso.
+# Greatest speeds of parts of the body by words of their names [m/s], in the frame of the torso: 0
+# for what wears the arm.
 BODY_SPEEDS = (
     ('torso', 0.0),
     ('chest', 0.0),
@@ -43,9 +46,8 @@ class SeparationRules:
     contact_speed : float
         No faster point of the arm may meet the wearer; 0: none that moves at all [m/s].
     body_speeds : sequence of (str, float)
-        Greatest speed [m/s] of the parts of the body whose names have some words; of several that
-        fit the greatest counts, no words fit where no others do. Underscores and hyphens count as
-        spaces, capitals as small letters.
+        Greatest speed [m/s] of the parts of the body whose names have some words, as `speed_bound`
+        reads them; no words: of any other part.
     body_error : float
         Greatest error of a box [m].
     controller_delay : float
@@ -109,15 +111,54 @@ class Separation:
     stretch: float = SHORTEST_STRETCH
 
 
+# What a part is called that no words fit, in sentences.
+ANY_OTHER = 'any other part'
+# The number of a box of a CUBE_LIST, which is no part of its name.
+_INDEX = re.compile(r'\[\d+\]$')
+# A name of several words, as LeftUpperArm, and digits, which are words of their own.
+_BORDERS = re.compile(r'(?<=[a-z])(?=[A-Z])|(?<=\d)(?=\D)|(?<=\D)(?=\d)|[\s_-]')
+
+
 def speed_bound(rules: SeparationRules, name: str) -> float:
     """Return the greatest speed that is assumed of a part of the body, by its name [m/s]."""
-    given = _plain(name)
-    found = [speed for words, speed in rules.body_speeds if words and _plain(words) in given]
-    return max(found or [speed for words, speed in rules.body_speeds if not words])
+    return governing_speed(rules, name)[1]
 
 
-def _plain(name: str) -> str:
-    return name.lower().replace('_', ' ').replace('-', ' ')
+# The same names come with each body.
+@functools.lru_cache(maxsize=4096)
+def governing_speed(rules: SeparationRules, name: str) -> tuple[str, float]:
+    """
+    Return the words of the rules that say how fast a part of the body is, and that speed [m/s].
+
+    A name is read for the worse. Words fit it where they are whole words of it, one after the
+    other: spaces, underscores, hyphens, digits and the capitals of LeftUpperArm separate words,
+    capitals count as small letters. A speed of 0 fits only a name that has no other word. Where
+    no words fit, the speed of any other part counts; words that merely occur in a name make it
+    faster, never slower. Of all that count the greatest is taken. Nothing fits a name with a
+    slash, as `torso/0` of a marker without a text, nor one that was cut short.
+    """
+    text = _INDEX.sub('', name)
+    given = _words(text)
+    whole = [] if '/' in text or text.endswith(CUT) else given
+    counted, does_fit = [], False
+    for words, speed in rules.body_speeds:
+        entry = _words(words)
+        if entry and ''.join(entry) in ''.join(given):
+            counted.append((words, speed))
+            does_fit |= whole == entry or (speed > 0.0 and _is_within(entry, whole))
+    if not does_fit:
+        counted += [(ANY_OTHER, speed) for words, speed in rules.body_speeds if not words]
+    return max(counted, key=lambda item: item[1])
+
+
+def _is_within(entry: list[str], name: list[str]) -> bool:
+    """Return whether words stand one after the other in a name."""
+    return f' {" ".join(entry)} ' in f' {" ".join(name)} '
+
+
+def _words(name: str) -> list[str]:
+    """Return the words of a name in small letters."""
+    return _BORDERS.sub(' ', name).lower().split()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

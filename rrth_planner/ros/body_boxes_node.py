@@ -13,6 +13,7 @@ from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.ros.interface.posture_inputs import create_input
 from rrth_planner.ros.interface.tracker_parameters import declare_tracker_parameters
 from rrth_planner.ros.interface.tracker_reporter import TrackerReporter
+from rrth_planner.ros.messages.body_source import TRACKER
 from rrth_planner.ros.messages.fields import NANOSECONDS
 from rrth_planner.ros.messages.part_markers import PartMarkers
 from rrth_planner.ros.messages.posture import TrackedPosture
@@ -22,7 +23,7 @@ from rrth_planner.wearer.body_boxes import body_boxes
 from rrth_planner.wearer.jump_filter import FilteredPosture, without_jumps
 from visualization_msgs.msg import MarkerArray
 
-NAME = 'body_boxes_node'
+NAME = TRACKER
 # Stamps have seconds of 32 bits [ns].
 MOST_STAMP = 2**31 * NANOSECONDS
 

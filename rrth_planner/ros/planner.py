@@ -111,11 +111,17 @@ class PlannerNode(Node):
         self._inputs = inputs = Inputs(
             *(self.resolve_topic_name(name) for name in ('body_boxes', 'target', 'joint_states'))
         )
-        publishers = PlanPublishers(self, parameters.separation is not None)
+        self._motions = publishers = PlanPublishers(self, parameters.separates)
         self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(
-            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
+            self,
+            parameters,
+            inputs,
+            self._on_change,
+            self._monitor.on_body,
+            self.fail,
+            self._keep_removed,
         )
         self._queue = PlanQueue(
             self,
@@ -150,9 +156,19 @@ class PlannerNode(Node):
             self._point_head.close()
         self._queue.close()
 
+    def _keep_removed(self) -> float:
+        """Return how long a part of the wearer that is removed now stays where it was [s]."""
+        return 0.0 if self._monitor.running is None else self._reporter.parameters.keep_lost
+
     def fail(self, what: str) -> None:
         """Stop an arm in motion after an unexpected error."""
         self._monitor.fail(what, is_replanned=False)
+
+    def _on_change(self) -> None:
+        """Take note of what comes in for the first time, or otherwise than before."""
+        if self._inputs.source.is_stream and self._reporter.parameters.separation is not None:
+            self._motions.separate()
+        self._reporter.publish()
 
     def _compile(self) -> None:
         """Compile all kernels, in processes of their own where there is a cache."""

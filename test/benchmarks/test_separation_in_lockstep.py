@@ -38,6 +38,19 @@ def test_a_part_that_keeps_its_speed_meets_no_faster_place_of_the_arm(trial, n):
     assert not [hand for hand in hands if hand.word == FAST or hand.is_near]
 
 
+@pytest.mark.parametrize(('k', 'seed'), [(0, 3), (1, 1), (2, 1)])
+def test_a_part_with_any_name_that_is_seen_or_missing_meets_no_faster_place_of_the_arm(k, seed):
+    pytest.importorskip('rclpy')
+    from benchmarks.separation import markers
+
+    trial = list(markers.trials().values())[k]
+    hands = chain_of_hands(trial, 4, seed).hands
+    assert len(hands) == 4
+    assert any(hand.was_moving for hand in hands)
+    assert any(hand.word for hand in hands)
+    assert not [hand for hand in hands if hand.word == FAST or hand.is_near]
+
+
 @pytest.mark.parametrize('what', [name for name in trials() if name.startswith('power')][::3])
 def test_the_test_finds_contacts_where_the_wearer_is_faster_or_separation_is_off(what):
     # Mostly the first hand is enough.

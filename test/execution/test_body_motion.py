@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from hypothesis import given, strategies as st
 import numpy as np
 import pytest
 from rrth_planner.execution.body_motion import (
@@ -14,10 +15,20 @@ from rrth_planner.execution.body_motion import (
     SHARE,
     WINDOW,
 )
+from rrth_planner.io.resources import resource_path
+from rrth_planner.io.skeleton_file import load_skeleton
+from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.errors import OptionsError, SceneError
 from rrth_planner.model.rotation import rotation_matrix
 from rrth_planner.model.scene import Box, Scene
-from rrth_planner.model.separation import growth_at, seen_body, SeparationRules, speed_bound
+from rrth_planner.model.separation import (
+    ANY_OTHER,
+    governing_speed,
+    growth_at,
+    seen_body,
+    SeparationRules,
+    speed_bound,
+)
 import worlds
 
 RULES = SeparationRules(body_error=0.01)
@@ -43,12 +54,76 @@ def at(scene, time):
         ('right upper arm', 1.6),
         ('LEFT_UPPER_ARM', 1.6),
         ('skeleton/left-forearm', 2.0),
+        ('LeftUpperArm', 1.6),
+        ('lThigh', 1.0),
+        ('upper arm 2', 1.6),
+        ('left upper-arm[12]', 1.6),
         ('head', 1.0),
+        ('torso and head', 1.0),
+        ('Torso', 0.0),
+        ('chest', 0.0),
+        # The second box of a CUBE_LIST whose text is no more than that.
+        ('torso[1]', 0.0),
         ('rucksack', 2.0),
+        ('left hand on torso', 2.0),
     ],
 )
-def test_a_speed_belongs_to_words_of_a_name(name, speed):
+def test_a_speed_belongs_to_whole_words_of_a_name(name, speed):
     assert speed_bound(RULES, name) == speed
+
+
+@pytest.mark.parametrize(
+    'name',
+    [
+        'torso/0',
+        'head/0',
+        'chest_camera/3',
+        'rucksack on torso',
+        'torso_strap',
+        'ChestCamera',
+        'torso 2',
+        'chest-torso',
+        'forehead',
+        'handset on chest',
+        'head ' + 'x' * 91 + ' ...',
+        '7',
+        '',
+    ],
+)
+def test_what_is_not_known_exactly_is_fast(name):
+    assert governing_speed(RULES, name)[1] == 2.0
+
+
+@given(st.text(st.sampled_from('headtorsn _-/[1]AHT'), max_size=30), st.randoms())
+def test_no_name_is_read_for_the_better_than_by_the_letters_that_occur_in_it(name, random):
+    entries = ['head', 'torso', 'arm', 'hand', 'to', 'so torso', '']
+    speeds = [(words, random.choice([0.0, 0.5, 1.0, 3.0])) for words in entries]
+    found = speed_bound(SeparationRules(body_speeds=tuple(speeds)), name)
+    plain = name.lower().replace('_', ' ').replace('-', ' ')
+    occurring = [speed for words, speed in speeds if words and words in plain]
+    assert found >= max(occurring, default=0.0)
+    # Nothing but a whole name is taken to stand still.
+    at_rest = {words for words, speed in speeds if speed == 0.0}
+    whole = ' '.join(plain.split()).partition('[')[0]
+    assert found > 0.0 or speeds[-1][1] == 0.0 or whole in at_rest
+
+
+def test_the_packaged_bodies_are_known_by_their_names():
+    speeds = {'torso': 0.0, 'head': 1.0, 'neck': 1.0, 'pelvis': 1.0, 'thigh': 1.0, 'arm': 1.6}
+    bodies = ('config/body.yaml', 'msg_examples/body.yaml', 'msg_examples/body_arm_raised.yaml')
+    names = [box.name for file in bodies for box in load_body(resource_path(file)).boxes]
+    names += [part.name for part in load_skeleton('azure_kinect').parts]
+    assert len(names) == 3 * 8 + 16
+    for name in names:
+        assert speed_bound(RULES, name) == speeds.get(name.split()[-1], 2.0), name
+
+
+def test_words_that_occur_in_a_name_make_it_faster_and_never_slower():
+    rules = SeparationRules(body_speeds=(('hand', 4.0), ('torso', 0.0), ('', 2.0)))
+    names = ('left hand', 'lefthand', 'hand/3', 'LeftHand on torso', 'torsohat')
+    assert [governing_speed(rules, name) for name in names] == [('hand', 4.0)] * 4 + [
+        (ANY_OTHER, 2.0)
+    ]
 
 
 def test_of_words_that_fit_the_greatest_speed_counts():

@@ -44,13 +44,14 @@ def message(folder, last):
 def test_the_boxes_of_a_message_are_those_that_the_nodes_take(tmp_path):
     file = message(tmp_path, '{ns: arms, id: 9, action: 2}')
     scene = load_body(file)
-    assert [box.name for box in scene.boxes] == ['torso', 'arms[0]', 'arms[1]']
+    assert [box.name for box in scene.boxes] == ['torso/0', 'arms/0[0]', 'arms/0[1]']
     pytest.importorskip('rclpy')
     from rrth_planner.ros.messages.body import scene_of, WearerBody
     from rrth_planner.ros.messages.message_file import message_from_file
     from visualization_msgs.msg import MarkerArray
 
     body = WearerBody().apply(message_from_file(file, MarkerArray), 0.0, 'torso')
+    assert [box.name for box in scene.boxes] == [box.name for box in scene_of(body).boxes]
     np.testing.assert_allclose(scene.numbers, scene_of(body).numbers, atol=1e-12)
 
 

@@ -60,9 +60,11 @@ def test_markers_act_over_the_wire_as_in_rviz(start):
     say_all(planner, stranger)
     body = inputs_of(planner).body
 
+    def present():
+        return body.value.at(planner.get_clock().now().nanoseconds * 1e-9)
+
     def boxes():
-        now = planner.get_clock().now().nanoseconds * 1e-9
-        return {b.name for _, part in body.value.at(now).parts for b in part.boxes}
+        return {b.name for _, part in present().parts for b in part.boxes}
 
     def say(*markers):
         stranger.publishers['body_boxes'].publish(array(*markers))
@@ -80,11 +82,59 @@ def test_markers_act_over_the_wire_as_in_rviz(start):
     stranger.wait_until(lambda: boxes() == {'torso/0', 'head/0'})
     say(command(Marker.DELETEALL, 'head'))
     stranger.wait_until(lambda: boxes() == {'torso/0'})
+    # Nothing is seen any more, but it is somewhere.
     say(command(Marker.DELETEALL))
     stranger.wait_until(lambda: not boxes())
     message = stranger.answer().message
+    assert message.startswith('SENSOR_INFO_STALE (-24): the body on ')
+    assert 'has lost parts: "hat/0", ' in message
+    say(*(command(Marker.DELETE, ns) for ns in ('hat', 'head', 'torso')))
+    # A motion was commanded: what is deleted meanwhile is kept for a while.
+    stranger.wait_until(lambda: not present().lost)
+    message = stranger.answer().message
     assert message.startswith('UNABLE_TO_AQUIRE_SENSOR_DATA (-5): the body on ')
     assert 'is empty' in message
+
+
+def test_a_hand_that_a_stream_leaves_out_is_lost_over_the_wire(start):
+    planner, stranger = start(keep_lost=0.5)
+    say_all(planner, stranger)
+    out, body = stranger.publishers['body_boxes'], inputs_of(planner).body
+    hand = box('hands', 3, center=(0.2, 0.0, -0.5), size=(0.1, 0.1, 0.1), text='left hand')
+
+    def until(condition, *markers):
+        # A stream, whatever the machine does besides.
+        def streamed():
+            out.publish(array(*markers))
+            return condition()
+
+        stranger.wait_until(streamed)
+
+    def known():
+        return body.value.at(planner.get_clock().now().nanoseconds * 1e-9)
+
+    until(lambda: known().n_boxes == 3, *wearer().markers, hand)
+    until(lambda: stranger.value('lost parts') == '"left hand"', *wearer().markers)
+    message = stranger.answer().message
+    assert 'has lost parts: "left hand"; expected each of them to be published again' in message
+    # Nothing moves: what is deleted is gone at once.
+    gone = command(Marker.DELETE, 'hands', 3)
+    until(lambda: not known().lost, gone, *wearer().markers[1:])
+    until(lambda: known().n_boxes == 3, *wearer().markers, hand)
+    assert stranger.answer().success
+    # A motion was commanded: whoever deletes a part may not see it, which is no reason to hit it.
+    until(lambda: known().lost, gone, *wearer().markers[1:])
+    ((key, part),) = known().lost
+    assert key == ('hands', 3)
+    assert part.ends == pytest.approx(part.expires + 0.5)
+    until(lambda: not known().lost, gone, *wearer().markers[1:])
+    # After a pause another description of the same publisher replaces all of the last one.
+    until(lambda: known().n_boxes == 3, *wearer().markers, hand)
+    stranger.wait_until(lambda: stranger.value('monitor') in ('no motion', 'holding'))
+    time.sleep(1.2)
+    out.publish(wearer())
+    stranger.wait_until(lambda: known().n_boxes == 2)
+    assert not known().lost
 
 
 def test_two_planners_on_one_host_answer_each_for_its_own_topics(spinning, wait_until):

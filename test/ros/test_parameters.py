@@ -126,6 +126,7 @@ def test_pairs_that_are_allowed_no_more_may_not_meet():
         ('time_limit', 'soon', 'Wrong parameter type'),
         ('arm', 'other.yaml', 'read-only'),
         ('base_frame', 'camera', 'read-only'),
+        ('separation', False, 'read-only'),
     ],
 )
 def test_a_bad_value_is_rejected_and_changes_nothing(started, name, value, sentence):
@@ -173,6 +174,9 @@ def test_an_empty_array_is_rejected(started):
         ('max_jerk', [1.0, 2.0], OptionsError),
         ('algorithm', 'a_star', OptionsError),
         ('base_frame', '', OptionsError),
+        ('separation', 'on', OptionsError),
+        ('separation', 1, OptionsError),
+        ('separation', [True], OptionsError),
         ('arm', '/nowhere/arm.yaml', ModelError),
     ],
 )
@@ -183,6 +187,28 @@ def test_a_bad_override_is_rejected_at_the_start(started, name, value, error):
 
 def test_every_option_of_the_core_is_a_parameter():
     assert {f.name for f in fields(RRTHOptions)} <= {s.name for s in declared(4)}
+
+
+@pytest.mark.parametrize(
+    ('value', 'chosen'),
+    [
+        ('auto', 'auto'),
+        (True, 'true'),
+        (False, 'false'),
+        ('true', 'true'),
+        ('False', 'false'),
+    ],
+)
+def test_separation_is_a_word_or_a_truth_value(started, value, chosen):
+    _, parameters = started(separation=value)
+    assert parameters.separates == chosen
+    assert (parameters.separation is None) == (chosen == 'false')
+    assert parameters.body_timeout == (0.0 if chosen == 'false' else 0.2)
+
+
+def test_a_bad_separation_is_rejected_in_a_sentence(started):
+    with pytest.raises(OptionsError, match=r"^separation: 'on', expected auto, true or false$"):
+        started(separation='on')
 
 
 def test_an_arm_of_ones_own_is_loaded(started, tmp_path):

@@ -44,6 +44,7 @@ SETTINGS = {
 }
 # A node, and the parameters that decide what it offers.
 STARTS = [
+    ('rrth_planner', {'separation': 'auto'}),
     ('rrth_planner', {'separation': True}),
     ('rrth_planner', {'separation': False}),
     ('arm_playback', {}),

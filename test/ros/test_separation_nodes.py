@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('fcl')
 
-from diagnostic_msgs.msg import DiagnosticStatus  # noqa: E402
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
@@ -48,13 +48,14 @@ class Client(Node):
         self.body = self.create_publisher(MarkerArray, 'body_boxes', 10)
         self.target = self.create_publisher(PointStamped, 'target', LATCHED)
         self.states, self.commitments, self.planned, self.said = [], [], [], []
-        self.clear, self.stamps = [], []
+        self.clear, self.stamps, self.figures = [], [], {}
         self.create_subscription(JointState, 'joint_states', self.states.append, 500)
         self.create_subscription(JointTrajectory, 'joint_trajectory', self.commitments.append, 500)
         name = 'rrth_planner/planned_trajectory'
         self.create_subscription(JointTrajectory, name, self.planned.append, LATCHED)
         name = 'rrth_planner/state'
         self.create_subscription(DiagnosticStatus, name, self.said.append, LATCHED)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_figures, 10)
         self.create_subscription(Bool, 'rrth_planner/ray_clear', self.clear.append, 10)
         self.plan = self.create_client(Trigger, 'rrth_planner/plan')
         self.is_over, self.is_seen = Event(), Event()
@@ -62,9 +63,12 @@ class Client(Node):
         self._thread = Thread(target=self._publish, daemon=True)
         self._thread.start()
 
+    def _on_figures(self, msg):
+        self.figures = {pair.key: pair.value for pair in msg.status[0].values}
+
     def _publish(self):
         markers = [
-            samples.box(b.name, center=b.center.tolist(), size=b.size.tolist())
+            samples.box(b.name, center=b.center.tolist(), size=b.size.tolist(), text=b.name)
             for b in worlds.wearer().boxes
         ]
         while not self.is_over.is_set():
@@ -153,6 +157,9 @@ def test_all_that_the_arm_is_given_is_separate_and_leads_to_the_target(separated
     assert np.abs(np.array(planned.points[-1].positions) - client.positions()).max() < 1e-3
     assert client.said[0].message == 'NORMAL'
     wait_until(lambda: client.clear and client.clear[-1].data)
+    shown = client.figures['greatest speeds'].split(', ')
+    assert shown[:2] == ['"torso" 0 m/s (torso)', '"head" 1 m/s (head)']
+    assert '"upper_arm_left" 1.6 m/s (upper arm)' in shown
 
 
 def test_an_arm_whose_planner_is_killed_comes_to_rest_where_it_was_told(

@@ -9,7 +9,7 @@ from rrth_planner.pipeline.in_process_planner import InProcessPlanner
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.client.planner_client import PlannerClient
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
@@ -57,7 +57,7 @@ def plan_without_moving(
     # Not published, a motion counts as long as it could be.
     outcome = plan_request(
         inputs,
-        parameters,
+        in_effect(parameters, inputs.source),
         now,
         planner,
         lambda: False,

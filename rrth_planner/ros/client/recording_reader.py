@@ -17,6 +17,7 @@ from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RecordError
 from rrth_planner.model.scene import Scene
 from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.body_publishers import BodyPublishers, UNNUMBERED
 from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
 from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading, JointReading
@@ -148,15 +149,21 @@ class RecordingReader:
         return CommandedMotion(stamped if abs(stamped - sent) <= SAME_CLOCK else sent, trajectory)
 
     def _bodies(self) -> list[tuple[float, Scene]]:
-        order, body = MarkerOrder(), WearerBody()
+        order, publishers, body = MarkerOrder(), BodyPublishers(), WearerBody()
 
         def read(recorded: RecordedMessage) -> tuple[float, Scene]:
             nonlocal body
             # By the clock of the stamps.
             now = recorded.received / NANOSECONDS
             edits = read_edits(recorded.msg, now, self._base_frame)
+            sent = recorded.sent, UNNUMBERED
             body = order.apply(
-                body, edits, (recorded.sent, 0), now, lambda other: other[0] > recorded.sent
+                body,
+                edits,
+                sent,
+                now,
+                lambda other: other[0] > recorded.sent,
+                is_description=publishers.is_description(recorded.msg, sent, now),
             )
             return self._when(recorded), scene_of(body)
 

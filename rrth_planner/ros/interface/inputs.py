@@ -22,8 +22,9 @@ from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import REST_SPEED, StartState
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
+from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 
@@ -35,6 +36,9 @@ CLOCK_STEP = 0.1
 MOVED, LATELY, REMEMBERED = 0.01, 0.25, 64
 # Velocities are those of this time at least: what a tracker's noise adds is small then [s].
 STEADY = 0.08
+
+# Why a body that was sent once is not taken as that of a wearer who stands still.
+STREAM_ENDED = ', since a stream of bodies, or one with a stamp, has come (separation: auto)'
 
 
 class RequestError(RrthError):
@@ -209,6 +213,7 @@ class Inputs:
     def __init__(self, body_topic: str, target_topic: str, joint_topic: str) -> None:
         """Begin without a message."""
         self.body = Input(body_topic, WearerBody())
+        self.source = BodySource()
         self.target: Input[PointingGoal | None] = Input(target_topic, None)
         self.joints: Input[JointReading | None] = Input(joint_topic, None)
         # Why the last message with all joints was rejected; None: it was not.
@@ -284,7 +289,8 @@ class Inputs:
             raise RequestError(
                 code,
                 f'the body on {source.topic} has lost parts: {lost}; expected each of them to be '
-                'published again or deleted (DELETE)',
+                'published again or deleted by name (DELETE; while a motion runs it takes effect '
+                'after keep_lost)',
             )
         if body.n_boxes == 0 and not body.lost:
             raise RequestError(
@@ -302,7 +308,8 @@ class Inputs:
             )
         late = source.overdue(now, parameters.body_timeout)
         if late:
-            raise _late(source, f'{late} s (body_timeout)', code)
+            why = STREAM_ENDED if parameters.separates == AUTO else ''
+            raise _late(source, f'{late} s (body_timeout){why}', code)
         return body
 
     def require_fresh(self, now: float, parameters: PlannerParameters) -> WearerBody:

@@ -21,10 +21,11 @@ from rrth_planner.io.settings import (
 )
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
-from rrth_planner.model.errors import ModelError, OptionsError, RrthError
+from rrth_planner.model.errors import ModelError, OptionsError, RrthError, shown
 from rrth_planner.model.separation import BODY_SPEEDS, Separation, SeparationRules
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.options import ALGORITHMS
+from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
 # The options of all algorithms by name; the same name means the same in each.
@@ -36,7 +37,8 @@ NOT_GIVEN = -1.0
 TIMEOUTS = {'body_timeout': 0.2, 'joint_timeout': 0.1}
 # Whether a motion that stopped goes on by itself, or after `~/reset`.
 AUTO, MANUAL = 'auto', 'manual'
-
+# Whether there is separation always, never, or (auto) unless the body stands still.
+ALWAYS, NEVER = 'true', 'false'
 
 RULES = SeparationRules()
 SPEEDS = [f'{words}: {speed:g}' for words, speed in BODY_SPEEDS]
@@ -55,11 +57,14 @@ def declared(dof: int) -> tuple[Setting, ...]:
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     second = 'library behind the second check of every motion'
-    separate = 'publish only motions that are proven clear of a wearer who moves'
+    separate = (
+        'publish only motions that are proven clear of a wearer who moves; auto: unless his body '
+        'stands still, as one that was sent once'
+    )
     meeting = 'greatest speed of a part of the arm that may meet the wearer'
     moving = (
-        'greatest speeds of parts of the body by words of their names; the greatest of those that '
-        'fit'
+        'greatest speeds of parts of the body by whole words of their texts, 0 by the whole text; '
+        'the greatest of those that fit'
     )
     late = 'greatest delay with which the controller executes a motion'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
@@ -102,7 +107,14 @@ def declared(dof: int) -> tuple[Setting, ...]:
             f'older joint positions are rejected; {by_default.format(TIMEOUTS["joint_timeout"])}',
             *given_timeout,
         ),
-        Setting('separation', True, '-', separate, is_read_only=True),
+        Setting(
+            'separation',
+            AUTO,
+            f'{AUTO}, {ALWAYS} or {NEVER}',
+            separate,
+            is_read_only=True,
+            is_dynamic=True,
+        ),
         Setting('contact_speed', RULES.contact_speed, 'm/s', meeting, 0.0, 10.0),
         Setting('body_speeds', SPEEDS, 'words: m/s', moving),
         Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
@@ -121,6 +133,8 @@ class PlannerParameters(PlanSettings):
     ----------
     stop_limits : MotionLimits
         Of fail-safe stops.
+    separates : str
+        `ALWAYS`, `NEVER` or `AUTO`, as the node was started.
     separation : Separation or None
         What commitments are proven with; None: motions are published as they are planned.
     controller_delay : float
@@ -141,6 +155,7 @@ class PlannerParameters(PlanSettings):
     arm: ArmModel
     base_frame: str
     stop_limits: MotionLimits
+    separates: str
     separation: Separation | None
     controller_delay: float
     resume: str
@@ -151,6 +166,24 @@ class PlannerParameters(PlanSettings):
     required_boxes: tuple[str, ...]
     replan: bool
     incident_folder: str
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether motions are published as they are planned since the body stands still."""
+        return self.separates == AUTO and self.separation is None
+
+
+def in_effect(parameters: PlannerParameters, source: BodySource) -> PlannerParameters:
+    """Return the parameters of a request, or of a check, for a body of such a source."""
+    is_standing = parameters.separates == AUTO and source.stands_still
+    return _beside_standing(parameters) if is_standing else parameters
+
+
+# Of the same parameters it is asked with each body.
+@lru_cache(maxsize=4)
+def _beside_standing(parameters: PlannerParameters) -> PlannerParameters:
+    """Return parameters without separation, with which a body gets never too old."""
+    return replace(parameters, separation=None, body_timeout=0.0)
 
 
 def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerParameters:
@@ -172,8 +205,13 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     own = (*('base_frame', 'body_latency', 'keep_lost', 'replan', 'incident_folder', 'resume'),)
     if values['resume'] not in (AUTO, MANUAL):
         raise OptionsError(f'resume: "{values["resume"]}", expected {AUTO} or {MANUAL}')
-    timeouts = {
-        name: values[name] if values[name] >= 0.0 else default * values['separation']
+    separates = str(values['separation']).lower()
+    if separates not in (AUTO, ALWAYS, NEVER):
+        raise OptionsError(
+            f'separation: {shown(values["separation"])}, expected {AUTO}, {ALWAYS} or {NEVER}'
+        )
+    timeouts: dict[str, Any] = {
+        name: values[name] if values[name] >= 0.0 else default * (separates != NEVER)
         for name, default in TIMEOUTS.items()
     }
     # ROS has no type for an empty array.
@@ -184,6 +222,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     return PlannerParameters(
         arm=arm,
         stop_limits=stop_limits,
+        separates=separates,
         separation=Separation(
             arm=arm,
             rules=rules,
@@ -191,7 +230,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
             limits=settings.limits,
             stop_limits=stop_limits,
         )
-        if values['separation']
+        if separates != NEVER
         else None,
         controller_delay=rules.controller_delay,
         **timeouts,

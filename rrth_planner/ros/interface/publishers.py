@@ -6,10 +6,11 @@ from nav_msgs.msg import Path
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import ALWAYS, NEVER, PlannerParameters
 from rrth_planner.ros.messages.plan_markers import plan_markers
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg, tool_path_to_msg
 from rrth_planner.ros.middleware.qos import COMMANDED, COMMITTED, LATCHED, RAY_CLEAR
@@ -24,28 +25,54 @@ LONGEST_FLUSH = 0.5
 class PlanPublishers:
     """The topics that the planner publishes; late subscribers get the last plan too."""
 
-    def __init__(self, node: Node, is_separated: bool = False) -> None:
-        """Advertise them; is_separated: each motion on `joint_trajectory` is safe by itself."""
-        # An old commitment must not be executed by a controller that comes late.
-        motions = COMMITTED if is_separated else COMMANDED
-        # Who asks for latched motions, or for liveliness, then takes `~/planned_trajectory`.
-        quietly = PublisherEventCallbacks(use_default_callbacks=not is_separated)
-        self._trajectory = node.create_publisher(
-            JointTrajectory, 'joint_trajectory', motions, event_callbacks=quietly
-        )
+    def __init__(self, node: Node, separates: str) -> None:
+        """Advertise them; separates: as in `PlannerParameters`."""
+        self._node = node
+        # Of whole motions, and of commitments, which each are safe by themselves.
+        self._whole: Publisher | None = None
+        self._committed: Publisher | None = None
+        if separates == ALWAYS:
+            self.separate()
+        else:
+            self._whole = node.create_publisher(JointTrajectory, 'joint_trajectory', COMMANDED)
         self._planned = self._ray_clear = None
-        if is_separated:
+        if separates != NEVER:
             name = '~/planned_trajectory'
             self._planned = node.create_publisher(JointTrajectory, name, LATCHED)
             self._ray_clear = node.create_publisher(Bool, '~/ray_clear', RAY_CLEAR)
         self._tool_path = node.create_publisher(Path, '~/tool_path', LATCHED)
         self._markers = node.create_publisher(MarkerArray, '~/markers', LATCHED)
 
+    def separate(self) -> None:
+        """Have commitments published from now on; whole motions too, until they are withdrawn."""
+        if self._committed is None:
+            # An old commitment must not be executed by a controller that comes late. Who asks for
+            # latched motions, or for liveliness, takes `~/planned_trajectory`.
+            self._committed = self._node.create_publisher(
+                JointTrajectory,
+                'joint_trajectory',
+                COMMITTED,
+                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+            )
+
+    def withdraw_whole(self) -> None:
+        """Withdraw the last whole motion, or its stop, once commitments are published."""
+        if self._committed is not None and self._whole is not None:
+            whole, self._whole = self._whole, None
+            self._node.destroy_publisher(whole)
+
     def publish_motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
     ) -> None:
         """Publish a motion for the arm to begin at a time [s]."""
-        self._trajectory.publish(self.motion(trajectory, parameters, begin))
+        self._publisher(parameters).publish(self.motion(trajectory, parameters, begin))
+
+    def _publisher(self, parameters: PlannerParameters) -> Publisher:
+        """Return the publisher of what the arm executes of a motion with these parameters."""
+        found = self._whole if parameters.separation is None else self._committed
+        if found is None:
+            raise RuntimeError('no publisher of such motions, expected that of their separation')
+        return found
 
     def motion(
         self, trajectory: Trajectory, parameters: PlannerParameters, begin: float
@@ -62,8 +89,8 @@ class PlanPublishers:
 
     def assert_liveliness(self) -> None:
         """Assert that the running motion is monitored."""
-        if self._planned is None:
-            self._trajectory.assert_liveliness()
+        if self._whole is not None:
+            self._whole.assert_liveliness()
 
     def publish_ray_clear(self, is_clear: bool) -> None:
         """Publish whether the pointing ray meets nobody, with separation."""
@@ -72,7 +99,9 @@ class PlanPublishers:
 
     def flush(self) -> None:
         """Wait briefly until all subscribers have the last motion."""
-        self._trajectory.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
+        for publisher in (self._whole, self._committed):
+            if publisher is not None:
+                publisher.wait_for_all_acked(Duration(seconds=LONGEST_FLUSH))
 
     def tool_path(self, trajectory: Trajectory, parameters: PlannerParameters) -> Path:
         """Return the tool's path along a motion."""

@@ -11,13 +11,16 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rrth_planner.execution.body_motion import BodyMotion, RAISED, SHARE
+from rrth_planner.execution.body_motion import body_at, BodyMotion, RAISED, SHARE
 from rrth_planner.model.errors import one_line
+from rrth_planner.model.separation import governing_speed, SeparationRules
 from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.separation_status import (
+    NO_PROMISE,
     separation_to_msg,
+    SeparationState,
     SeparationStatus,
 )
 from rrth_planner.ros.messages.body import WearerBody
@@ -31,6 +34,8 @@ PERIOD = 1.0
 WARNING_PERIOD = 5.0
 # A rate is published again once it has changed by so much [-].
 RATE_STEP = 0.05
+# The diagnostics name the speeds of so many boxes.
+MOST_SPEEDS = 100
 # Number of lost parts that are remembered as reported.
 MOST_NAMED = 1000
 # Changes are published at most this often; the last one always is [s].
@@ -76,7 +81,7 @@ class Reporter:
 
     def __init__(self, node: Node, inputs: Inputs, parameters: PlannerParameters) -> None:
         """Advertise `/diagnostics`; the owner keeps `self.parameters` up to date."""
-        self.parameters = parameters
+        self._given = parameters
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -102,8 +107,17 @@ class Reporter:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
             node.create_timer(PERIOD, self._publish, clock=steady),
-            node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
+            node.create_timer(SHORTEST_PERIOD, self._on_timer, clock=steady),
         ]
+
+    @property
+    def parameters(self) -> PlannerParameters:
+        """Of what begins now; without separation beside a body that stands still (`auto`)."""
+        return in_effect(self._given, self._inputs.source)
+
+    @parameters.setter
+    def parameters(self, given: PlannerParameters) -> None:
+        self._given = given
 
     def remaining_motion_checked(self, elapsed: float) -> None:
         """Count a check of the remaining motion against a new body, and its time [s]."""
@@ -139,7 +153,19 @@ class Reporter:
 
     def separation_status(self, status: SeparationStatus) -> None:
         """Publish how the running motion is executed, where that has changed."""
-        self._separation, before = status, self._published_state
+        self._separation = status
+        self._publish_changed_state()
+
+    @property
+    def _shown_state(self) -> SeparationStatus:
+        """What `~/state` says; the first body of a stream is not yet taken for one that stands."""
+        is_known = self._inputs.source.time_until_known(time.monotonic()) <= 0.0
+        if self.parameters.stands_still and is_known:
+            return SeparationStatus(SeparationState.UNSEPARATED, NO_PROMISE)
+        return self._separation
+
+    def _publish_changed_state(self) -> None:
+        status, before = self._shown_state, self._published_state
         if (status.state, status.cause) != (before.state, before.cause):
             self.publish_soon()
         elif abs(status.rate - before.rate) < RATE_STEP:
@@ -147,10 +173,11 @@ class Reporter:
         self._publish_state()
 
     def _publish_state(self) -> None:
+        status = self._shown_state
         if self._state is not None:
             name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
-            self._state.publish(separation_to_msg(name, self._separation))
-        self._published_state = self._separation
+            self._state.publish(separation_to_msg(name, status))
+        self._published_state = status
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -165,6 +192,10 @@ class Reporter:
     def publish(self) -> None:
         """Publish the diagnostics now, or, where the last ones are too recent, soon."""
         self._is_changed = True
+        self._publish_change()
+
+    def _on_timer(self) -> None:
+        self._publish_changed_state()
         self._publish_change()
 
     def _publish_change(self) -> None:
@@ -209,7 +240,7 @@ class Reporter:
             'last incident': self._last_incident,
         }
         if self._state is not None:
-            values |= self._separation_values()
+            values |= self._separation_values(now)
         for name, topic in self._inputs.all.items():
             values[f'age of {name} [s]'] = f'{topic.age(now):.3f}'
             values[f'good messages, {name}'] = topic.n_good
@@ -219,15 +250,18 @@ class Reporter:
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
         return status_to_msg(name, level, message, values)
 
-    def _separation_values(self) -> dict[str, object]:
-        """Return what is known of separation."""
-        status, body = self._separation, self._body
+    def _separation_values(self, now: float) -> dict[str, object]:
+        """Return what is known of separation at a time [s]."""
+        status, body, separation = self._published_state, self._body, self.parameters.separation
         n_seen, n_faster = (0, 0) if body is None else (body.n_seen, body.n_faster)
         return {
             'separation': status.state.name,
             'cause': status.cause,
             'rate [-]': f'{status.rate:.3f}',
             'commitments': self._commitments,
+            'greatest speeds': ''
+            if body is None or separation is None
+            else speeds_shown(body, now, separation.rules),
             'sights of parts': n_seen,
             'faster than assumed': f'{n_faster} ({n_faster / max(n_seen, 1):.2%})',
         }
@@ -242,8 +276,8 @@ class Reporter:
             self._named.update(key for key, _ in new)
             names = WearerBody(lost=tuple(new)).lost_names()
             self._node.get_logger().warning(
-                f'{self._inputs.body.topic}: lifetime of {names} expired: no new motion until '
-                'published again or deleted'
+                f'{self._inputs.body.topic}: lifetime of {names} expired, or a body left it out: '
+                'no new motion until published again or deleted'
             )
 
     def _warn_of_publishers(self) -> None:
@@ -292,6 +326,17 @@ class Reporter:
         return text
 
 
+def speeds_shown(body: BodyMotion, now: float, rules: SeparationRules) -> str:
+    """Return how fast each box is assumed to be at a time [s], and by which words of the rules."""
+    shown, boxes = [], body.scene.boxes
+    for box, speed in zip(boxes[:MOST_SPEEDS], body_at(body, now, rules).speeds, strict=False):
+        words, stated = governing_speed(rules, box.name)
+        why = words if speed <= stated else f'{words}, was faster'
+        shown.append(f'"{box.name}" {speed:g} m/s ({why})')
+    rest = len(boxes) - len(shown)
+    return ', '.join(shown + ([f'{rest} more'] if rest else []))
+
+
 def summary(
     now: float, inputs: Inputs, parameters: PlannerParameters, report: PlanReport
 ) -> tuple[bytes, str]:
@@ -310,4 +355,6 @@ def summary(
         return DiagnosticStatus.WARN, f'waiting for {", ".join(missing)}'
     if report.code not in (None, ErrorCode.SUCCESS):
         return DiagnosticStatus.WARN, answer(report.code, report.sentence)
+    if parameters.stands_still:
+        return DiagnosticStatus.WARN, NO_PROMISE
     return DiagnosticStatus.OK, report.sentence or 'ready'

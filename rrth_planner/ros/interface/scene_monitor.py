@@ -13,8 +13,16 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.ros.interface.inputs import Input, Inputs
-from rrth_planner.ros.interface.parameters import PlannerParameters
+from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
 from rrth_planner.ros.messages.body import WearerBody
+from rrth_planner.ros.messages.body_publishers import BodyPublishers
+from rrth_planner.ros.messages.body_source import (
+    after_body,
+    as_stream,
+    BodySource,
+    has_body,
+    TRACKER,
+)
 from rrth_planner.ros.messages.definitions import fast_decoder
 from rrth_planner.ros.messages.frames import FrameIsLateError, Frames
 from rrth_planner.ros.messages.goal import goal_from_msg
@@ -31,6 +39,8 @@ WARNING_PERIOD = 5.0
 LONGEST_WAIT, WAIT_PERIOD = 0.2, 0.005
 # So many bodies wait at most.
 MOST_WAITING = 100
+# Period of the search for a node that makes bodies of what a tracker measures [s].
+SEARCH_PERIOD = 0.2
 
 
 class SceneMonitor:
@@ -42,12 +52,15 @@ class SceneMonitor:
     parameters : PlannerParameters
         For the constant ones: the arm, the base frame and `body_latency`.
     on_change : callable, optional
-        Called on the first message of a topic, on a rejection, and on the next good message.
+        Called on the first message of a topic, on a rejection, and on the next good message; and
+        when bodies are found to come as a stream.
     on_body : callable, optional
         Called after each body, with the wearer since then, its time of arrival [ns], and whether
         it is the newest of those that came.
     on_error : callable, optional
         Called after an unexpected error, with its name and message.
+    keep_removed : callable, optional
+        Returns how long a part that is removed now stays where it was [s].
 
     """
 
@@ -59,6 +72,7 @@ class SceneMonitor:
         on_change: Callable[[], None] = lambda: None,
         on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
         on_error: Callable[[str], None] = lambda what: None,
+        keep_removed: Callable[[], float] = lambda: 0.0,
     ) -> None:
         """Subscribe."""
         self._node = node
@@ -68,14 +82,19 @@ class SceneMonitor:
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
-        self._order = MarkerOrder()
-        # Bodies in frames whose poses are not known yet, and since when they wait [s].
-        self._waiting: deque[tuple[MarkerArray, Arrival, float]] = deque()
+        self._order, self._publishers = MarkerOrder(), BodyPublishers()
+        self._keep_removed = keep_removed
+        # Bodies in frames whose poses are not known yet, since when they wait [s], and which
+        # of them are descriptions.
+        self._waiting: deque[tuple[MarkerArray, Arrival, float, bool]] = deque()
         # When the last message came that was no body at all [s].
         self._undecoded = -float('inf')
         if self._frames.is_available:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self._timer = node.create_timer(WAIT_PERIOD, self._read_waiting, clock=steady)
+        if parameters.separates == AUTO:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._search = node.create_timer(SEARCH_PERIOD, self._search_tracker, clock=steady)
         # The node may be busy for a while: what came meanwhile must not get old in a queue.
         all_at_once: dict[str, Any] = {'takes_all': True}
         # The monitor waits for bodies.
@@ -109,15 +128,30 @@ class SceneMonitor:
         return goal_from_msg(msg, self._base_frame, self._frames.lookup)
 
     def _on_body(self, msg: MarkerArray, arrival: Arrival) -> None:
+        came = _steady_time(arrival)
+        is_description = self._publishers.is_description(msg, arrival.sent, came)
+        if has_body(msg):
+            self._take_source(after_body(is_description, came, self._inputs.source))
         if any(m.action == Marker.ADD and not m.header.frame_id for m in msg.markers):
             self._warn_of_empty_frame(self._inputs.body)
-        self._waiting.append((msg, arrival, time.monotonic()))
+        self._waiting.append((msg, arrival, time.monotonic(), is_description))
         self._read_waiting()
+
+    def _search_tracker(self) -> None:
+        if TRACKER in self._node.get_node_names():
+            self._take_source(as_stream(self._inputs.source))
+        if self._inputs.source.is_stream:
+            self._search.cancel()
+
+    def _take_source(self, source: BodySource) -> None:
+        was_stream, self._inputs.source = self._inputs.source.is_stream, source
+        if source.is_stream and not was_stream:
+            self._on_change()
 
     def _read_waiting(self) -> None:
         """Read the bodies in their order, until one has to wait for its frame."""
         while self._waiting:
-            msg, arrival, since = self._waiting.popleft()
+            msg, arrival, since, is_description = self._waiting.popleft()
             waited = time.monotonic() - since
             # Of a body without stamp.
             age = self._latency + 1e-9 * max(0, time.time_ns() - arrival.received)
@@ -126,7 +160,7 @@ class SceneMonitor:
             except Exception as problem:
                 may_wait = waited < LONGEST_WAIT and len(self._waiting) < MOST_WAITING
                 if isinstance(problem, FrameIsLateError) and may_wait:
-                    self._waiting.appendleft((msg, arrival, since))
+                    self._waiting.appendleft((msg, arrival, since, is_description))
                     return
                 self._reject(self._inputs.body, problem)
             else:
@@ -134,17 +168,30 @@ class SceneMonitor:
                 read = time.time_ns() if waited > WAIT_PERIOD else arrival.received
                 # What was rejected while it waited is newer, and stands.
                 is_news = arrival.is_newer is None and since > self._undecoded
-                self._take_body(edits, arrival, read, is_news)
+                self._take_body(edits, arrival, read, is_news, is_description)
 
     def _take_body(
-        self, edits: Sequence[Edit], arrival: Arrival, arrived: int, is_news: bool
+        self,
+        edits: Sequence[Edit],
+        arrival: Arrival,
+        arrived: int,
+        is_news: bool,
+        is_description: bool,
     ) -> None:
         now, body = self._now(), self._inputs.body
         # What measures no part says nothing about those that are known.
         is_news &= body.measured is None or any(edit.part is not None for edit in edits)
 
         def read() -> WearerBody:
-            return self._order.apply(body.value, edits, arrival.sent, now, arrival.is_newer)
+            return self._order.apply(
+                body.value,
+                edits,
+                arrival.sent,
+                now,
+                arrival.is_newer,
+                is_description=is_description,
+                keep_removed=self._keep_removed(),
+            )
 
         measured = measured_at(edits, now - self._latency)
         self._take(body, read, measured, is_news)
@@ -192,3 +239,8 @@ class SceneMonitor:
 
     def _now(self) -> float:
         return self._node.get_clock().now().nanoseconds * 1e-9
+
+
+def _steady_time(arrival: Arrival) -> float:
+    """Return when a message came, by the steady clock [s]."""
+    return time.monotonic() - 1e-9 * max(0, time.time_ns() - arrival.received)

@@ -18,6 +18,7 @@ class SeparationState(Enum):
     SLOWED = 1
     PROTECTIVE_STOP = 2
     FAULT = 3
+    UNSEPARATED = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +42,18 @@ class SeparationStatus:
     box: str = ''
 
 
+# What a motion beside a body that stands still comes without, and how to have it.
+NO_PROMISE = (
+    'nothing is promised of a wearer who moves, since his body came as one that stands still: '
+    'publish bodies as a stream, stamped, at 30 Hz or more'
+)
 RATE_KEY, BAR_KEY, BOX_KEY = 'rate [-]', 'part of the arm', 'box'
 LEVELS = {
     SeparationState.NORMAL: DiagnosticStatus.OK,
     SeparationState.SLOWED: DiagnosticStatus.OK,
     SeparationState.PROTECTIVE_STOP: DiagnosticStatus.WARN,
     SeparationState.FAULT: DiagnosticStatus.ERROR,
+    SeparationState.UNSEPARATED: DiagnosticStatus.WARN,
 }
 
 

@@ -71,12 +71,15 @@ INTERFACES = {
         _subscribed(
             'body_boxes',
             MARKERS,
-            'the wearer: CUBE or CUBE_LIST markers, `scale` = full size; identity, ADD, DELETE, '
-            'DELETEALL, lifetime as in RViz. An array with one bad marker is rejected whole: the '
-            'last good body stays, a running motion stops, and nothing is planned until a good '
-            'one comes. Stamp each box with the time of its measurement, and give it a lifetime: '
-            'a part whose lifetime runs out is lost; it stays where it was for `keep_lost`, then '
-            'the arm stops, and it is reported by name',
+            'the wearer: CUBE or CUBE_LIST markers, `scale` = full size, `text` = which part; '
+            'identity, ADD, DELETE, DELETEALL, lifetime nearly as in RViz. An array with one bad '
+            'marker is rejected whole: the last good body stays, a running motion stops, and '
+            'nothing is planned until a good one comes. Stamp each box with the time of its '
+            'measurement, and give it a lifetime: a part whose lifetime runs out, or that an '
+            'array with DELETEALL leaves out, is lost; it stays where it was for `keep_lost`, '
+            'then the arm stops, and it is reported by name. DELETE removes a part, while a '
+            'motion runs after `keep_lost`. An array without stamps, more than 1 s after the last '
+            'one of its publisher, is another description: what it leaves out is removed, too',
         ),
         _subscribed(
             'target',
@@ -115,26 +118,30 @@ INTERFACES = {
             'joint_trajectory',
             MOTION,
             'the next stretch of the motion and a stop, or the proven rest, with every body; '
-            'without `separation` the whole motion, latched; positions, velocities, '
-            'accelerations. It begins shortly before its publication, with the rest or the motion '
-            'that is commanded then; the stamp says when. Never published on failure',
+            'without `separation`, or beside a body that stands still, the whole motion, latched; '
+            'positions, velocities, accelerations. It begins shortly before its publication, with '
+            'the rest or the motion that is commanded then; the stamp says when. Never published '
+            'on failure',
         ),
         _published(
-            '~/planned_trajectory', MOTION, 'latched: the whole planned motion', separation=True
+            '~/planned_trajectory',
+            MOTION,
+            'latched: the whole planned motion',
+            separation=('auto', True),
         ),
         _published(
             '~/state',
             'diagnostic_msgs/msg/DiagnosticStatus',
             'latched: NORMAL, SLOWED, PROTECTIVE_STOP or FAULT, with cause, rate, part of the arm '
-            'and box',
-            separation=True,
+            'and box; UNSEPARATED beside a body that stands still',
+            separation=('auto', True),
         ),
         _published(
             '~/ray_clear',
             'std_msgs/msg/Bool',
             '50 Hz, deadline 0.1 s, liveliness: whether the pointing ray is known to meet nobody, '
-            'for tools whose beam matters',
-            separation=True,
+            'for tools whose beam matters; never beside a body that stands still',
+            separation=('auto', True),
         ),
         _published('~/tool_path', 'nav_msgs/msg/Path', 'latched: the path of the tool'),
         _published(

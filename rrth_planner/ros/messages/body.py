@@ -3,8 +3,8 @@
 """The wearer as visualization markers: which boxes there are, and until when."""
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 import functools
 import math
 
@@ -26,8 +26,9 @@ class WearerBody:
     Parameters
     ----------
     lost : tuple of ((str, int), BodyPart)
-        Those whose lifetime has passed, and that were neither deleted nor added again since: they
-        stay where they were last seen. The last of them, of at most 10,000 boxes in all.
+        Those whose lifetime has passed, or that are missing in a later body, and that were neither
+        removed nor added again since: they stay where they were last seen. The last of them, of at
+        most 10,000 boxes in all.
 
     """
 
@@ -57,18 +58,13 @@ class WearerBody:
 
     def at(self, now: float) -> 'WearerBody':
         """Return the body at a time [s]: parts whose lifetime has passed are lost."""
-        if all(part.expires > now for _, part in self.parts):
+        is_same = all(part.expires > now for _, part in self.parts)
+        if is_same and all(part.ends > now for _, part in self.lost):
             return self
-        gone = dict(self.lost)
-        gone.update(item for item in self.parts if item[1].expires <= now)
-        lost, n = deque[tuple[Key, BodyPart]](), 0
-        for key, part in reversed(gone.items()):
-            n += len(part.boxes)
-            if n > MOST_BOXES:
-                break
-            lost.appendleft((key, part))
+        lost = {key: part for key, part in self.lost if part.ends > now}
+        lost.update(item for item in self.parts if item[1].expires <= now)
         present = tuple(item for item in self.parts if item[1].expires > now)
-        return WearerBody(present, tuple(lost))
+        return WearerBody(present, _last(lost))
 
     def apply(
         self, msg: MarkerArray, now: float, base_frame: str, lookup: Lookup | None = None
@@ -76,31 +72,72 @@ class WearerBody:
         """
         Return the body after an array: all of its markers in their order, or none of them.
 
-        CUBE and CUBE_LIST markers are added or replace the one of the same ns and id; DELETE
-        removes one, DELETEALL all of its ns, or all when its ns is empty. Colours are ignored: an
-        invisible box is still an obstacle. Parameters and errors are those of `read_edits`.
+        The array is a description while no motion runs. Colours are ignored: an invisible box is
+        still an obstacle. Parameters and errors are those of `read_edits`.
         """
         return self.edited(read_edits(msg, now, base_frame, lookup), now)
 
-    def edited(self, edits: Sequence[Edit], now: float) -> 'WearerBody':
-        """Return the body after the edits of one array, received at a time [s], or raise."""
+    def edited(
+        self,
+        edits: Sequence[Edit],
+        now: float,
+        *,
+        is_description: bool = True,
+        keep_removed: float = 0.0,
+    ) -> 'WearerBody':
+        """
+        Return the body after the edits of one array, received at a time [s], or raise.
+
+        CUBE and CUBE_LIST markers are added or replace the one of the same ns and id. DELETE
+        removes one. DELETEALL begins all parts anew, or those of its ns if that is not empty: what
+        the array then leaves out is lost. A description removes it instead, where it has no stamp.
+
+        Parameters
+        ----------
+        is_description : bool
+            As `BodyPublishers.is_description` says.
+        keep_removed : float
+            How long what is removed stays where it was: drivers delete what they do not see [s].
+
+        """
         present = self.at(now)
         parts, lost = dict(present.parts), dict(present.lost)
+        # What the array takes away, and until when that stays [s].
+        stays: dict[Key, float] = {}
         for edit in edits:
-            if edit.action == Marker.DELETEALL:
-                ns = edit.key[0]
-                parts = {k: part for k, part in parts.items() if ns not in ('', k[0])}
-                lost = {k: part for k, part in lost.items() if ns not in ('', k[0])}
-                continue
-            lost.pop(edit.key, None)
-            if edit.part is None:
-                parts.pop(edit.key, None)
-            else:
+            if edit.part is not None:
+                if stays.pop(edit.key, None) is not None:
+                    # In the order of the array.
+                    parts.pop(edit.key, None)
+                lost.pop(edit.key, None)
                 parts[edit.key] = edit.part
-        body = WearerBody(tuple(parts.items()), tuple(lost.items()))
+            elif edit.action == Marker.DELETE:
+                stays[edit.key] = now + keep_removed
+            else:
+                for key, part in (*lost.items(), *parts.items()):
+                    if edit.key[0] in ('', key[0]) and key not in edit.spared:
+                        is_removed = is_description and not part.is_stamped
+                        stays.setdefault(key, now + keep_removed if is_removed else math.inf)
+        for key, ends in stays.items():
+            left = parts.pop(key, None) or lost.pop(key, None)
+            if left is not None and min(ends, left.ends) > now:
+                until = min(ends, left.ends)
+                lost[key] = replace(left, expires=min(left.expires, now), ends=until)
+        body = WearerBody(tuple(parts.items()), _last(lost))
         if body.n_boxes > MOST_BOXES:
             raise MessageError(f'{body.n_boxes} boxes, expected at most {MOST_BOXES} in all')
         return body
+
+
+def _last(lost: Mapping[Key, BodyPart]) -> tuple[tuple[Key, BodyPart], ...]:
+    """Return the last of the lost parts, of at most `MOST_BOXES` boxes in all."""
+    kept, n = deque[tuple[Key, BodyPart]](), 0
+    for key, part in reversed(tuple(lost.items())):
+        n += len(part.boxes)
+        if n > MOST_BOXES:
+            break
+        kept.appendleft((key, part))
+    return tuple(kept)
 
 
 # The same body is the same scene each time: what is derived from it is kept, here and in the

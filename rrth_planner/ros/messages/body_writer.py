@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wearer as a message: from the core's boxes, and from files of either layout."""
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -17,9 +18,18 @@ COLOR = (0.85, 0.65, 0.55, 0.8)
 
 
 def body_to_msg(scene: Scene, frame: str) -> MarkerArray:
-    """Return boxes, given in a frame, as markers that replace every box before."""
-    boxes = (box_marker(box.name, k, box, COLOR) for k, box in enumerate(scene.boxes))
-    markers = [Marker(action=Marker.DELETEALL), *boxes]
+    """
+    Return boxes, given in a frame, as the markers of a whole wearer, without a stamp.
+
+    A box has the same ns and id in each body, so that it replaces itself.
+    """
+    markers = [Marker(action=Marker.DELETEALL)]
+    n_called = Counter[str]()
+    for box in scene.boxes:
+        marker = box_marker(box.name, n_called[box.name], box, COLOR)
+        marker.text = box.name
+        markers.append(marker)
+        n_called[box.name] += 1
     for marker in markers:
         marker.header.frame_id = frame
     return MarkerArray(markers=markers)

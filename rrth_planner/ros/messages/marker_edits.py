@@ -10,11 +10,11 @@ import math
 from typing import Any
 
 import numpy as np
-from rrth_planner.io.wearer_file import LONGEST_TEXT
+from rrth_planner.io.wearer_file import marker_name
 from rrth_planner.kernels.collision.boxes import first_bad, place, POSED
 from rrth_planner.kernels.layout import NUMBERS, ROTATION, SIZE
 from rrth_planner.model.arrays import Array, FARTHEST
-from rrth_planner.model.errors import MessageError, one_line, SceneError
+from rrth_planner.model.errors import MessageError, SceneError
 from rrth_planner.model.scene import Box
 from rrth_planner.ros.messages.fields import (
     NANOSECONDS,
@@ -49,21 +49,36 @@ class BodyPart:
         When they are lost [s, the clock of `now`]; inf: never.
     measured : float
         When they were measured [s].
+    is_stamped : bool
+        Whether the publisher says when that was.
+    ends : float
+        When they are gone, once they were removed while a motion runs [s]; inf: they were not.
 
     """
 
     boxes: tuple[Box, ...]
     expires: float = math.inf
     measured: float = -math.inf
+    is_stamped: bool = False
+    ends: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edit:
-    """The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds."""
+    """
+    The edit by a marker: Marker.ADD, DELETE or DELETEALL, its (ns, id), and what it adds.
+
+    Parameters
+    ----------
+    spared : frozenset of (str, int)
+        What a late DELETEALL does nothing to: newer arrays have edited these.
+
+    """
 
     action: int
     key: Key
     part: BodyPart | None = None
+    spared: frozenset[Key] = frozenset()
 
 
 def measured_at(edits: Sequence[Edit], default: float) -> float:
@@ -124,12 +139,6 @@ def read_edits(
     )
 
 
-def marker_name(marker: Any) -> str:
-    """Return the name of a marker: its text, or `ns/id` where it has none."""
-    name = marker.text or (f'{marker.ns}/{marker.id}' if marker.ns else f'{marker.id}')
-    return one_line(name, LONGEST_TEXT)
-
-
 class _Reading:
     """The boxes of the markers that have been read, before they are placed."""
 
@@ -159,8 +168,12 @@ class _Reading:
 
 def _read(
     marker: Any, now: float, latency: float, reading: _Reading
-) -> tuple[float, float] | None:
-    """Read the boxes of a marker; return when they expire and were measured [s]; None: no box."""
+) -> tuple[float, float, bool] | None:
+    """
+    Read the boxes of a marker; return when they expire and were measured [s]; None: no box.
+
+    The third value: whether the time of the measurement is the marker's own stamp.
+    """
     if len(marker.ns) > LONGEST_NAMESPACE:
         raise MessageError(
             f'ns of {len(marker.ns)} characters, expected at most {LONGEST_NAMESPACE}'
@@ -191,7 +204,8 @@ def _read(
             f'header.stamp: {measured - now:.3f} s in the future, expected at most {MOST_AHEAD:g} '
             '(by the same clock as the planner: see use_sim_time)'
         )
-    frame, name = reading.frame(marker.header.frame_id, stamp), marker_name(marker)
+    frame = reading.frame(marker.header.frame_id, stamp)
+    name = marker_name(marker.text, marker.ns, marker.id)
     if marker.type == Marker.CUBE:
         reading.add(name, (*row, 0.0, 0.0, 0.0), frame)
     else:
@@ -201,11 +215,11 @@ def _read(
             )
         for k, point in enumerate(marker.points):
             reading.add(f'{name}[{k}]', row + triple_of(point, f'points[{k}]'), frame)
-    return now + lifetime if lifetime > 0.0 else math.inf, measured
+    return now + lifetime if lifetime > 0.0 else math.inf, measured, stamp != 0
 
 
 def _label(index: int, marker: Any) -> str:
-    return f'marker {index} ("{marker_name(marker)}")'
+    return f'marker {index} ("{marker_name(marker.text, marker.ns, marker.id)}")'
 
 
 def boxes_of(names: Sequence[str], numbers: Array) -> tuple[Box, ...]:

@@ -3,6 +3,7 @@
 """Order of the edits of each marker, so that a late array undoes nothing."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.fields import Stamp
@@ -35,11 +36,15 @@ class MarkerOrder:
         sent: Stamp,
         received: float,
         is_newer: Callable[[Stamp], bool] | None = None,
+        *,
+        is_description: bool = True,
+        keep_removed: float = 0.0,
     ) -> WearerBody:
         """
         Return the body after an array that came at a time [s], and remember when it was sent.
 
-        is_newer: of a late array, whether another one was sent after it.
+        is_newer: of a late array, whether another one was sent after it. The last two are those of
+        `WearerBody.edited`.
 
         Raises
         ------
@@ -48,7 +53,9 @@ class MarkerOrder:
 
         """
         kept = edits if is_newer is None else list(self._kept(body, edits, is_newer))
-        after = body.edited(kept, received).at(received)
+        after = body.edited(
+            kept, received, is_description=is_description, keep_removed=keep_removed
+        ).at(received)
         for edit in edits:
             if edit.action == Marker.DELETEALL:
                 self._remember_all(edit.key[0], sent, is_newer or (lambda _: False))
@@ -68,11 +75,10 @@ class MarkerOrder:
         keys = [key for key, _ in (*body.parts, *body.lost)]
         for edit in edits:
             if edit.action == Marker.DELETEALL:
-                of_all = [key for key in keys if edit.key[0] in ('', key[0])]
-                changes = [Edit(Marker.DELETE, key) for key in of_all]
-            else:
-                changes = [edit]
-            yield from (one for one in changes if not self._is_overtaken(one.key, is_newer))
+                spared = (key for key in keys if self._is_overtaken(key, is_newer))
+                yield replace(edit, spared=frozenset(spared))
+            elif not self._is_overtaken(edit.key, is_newer):
+                yield edit
 
     def _is_overtaken(self, key: Key, is_newer: Callable[[Stamp], bool]) -> bool:
         """Return whether a marker has a newer edit."""

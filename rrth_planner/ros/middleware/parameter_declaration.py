@@ -25,7 +25,12 @@ OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One parameter: its name, default, unit, meaning, and range (None: no range)."""
+    """
+    One parameter: its name, default, unit, meaning, and range (None: no range).
+
+    is_dynamic: of any type, as a text that may also be true or false, which YAML takes for no
+    text; whoever reads it checks the value.
+    """
 
     name: str
     default: Any
@@ -34,12 +39,15 @@ class Setting:
     low: float | None = None
     high: float | None = None
     is_read_only: bool = False
+    is_dynamic: bool = False
 
     @property
     def descriptor(self) -> ParameterDescriptor:
         """For `ros2 param describe`; a step other than 0 would reject values."""
         msg = ParameterDescriptor(
-            description=f'{self.description} [{self.unit}]', read_only=self.is_read_only
+            description=f'{self.description} [{self.unit}]',
+            read_only=self.is_read_only,
+            dynamic_typing=self.is_dynamic,
         )
         if self.low is None or self.high is None:
             return msg
@@ -53,6 +61,8 @@ class Setting:
 
     def check(self, value: Any) -> None:
         """Raise OptionsError when a value is not of the default's type, or out of range."""
+        if self.is_dynamic:
+            return
         is_array = isinstance(self.default, list)
         kind = type(self.default[0] if is_array else self.default)
         # An empty array comes as None; others as arrays of Python's or as lists.

@@ -36,7 +36,7 @@ from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import part_of, Trajectory
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
-from rrth_planner.ros.interface.parameters import MANUAL, PlannerParameters
+from rrth_planner.ros.interface.parameters import MANUAL, NEVER, PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -59,6 +59,8 @@ NOT_SEPARATE = 'the remaining motion is no longer proven separate from the weare
 MARGIN_LEFT = 0.5
 # With separation it goes on for so long while the wearer is in the way further on [s].
 PATIENCE = 0.3
+# Why a whole motion is stopped that began beside a body that stands still.
+STREAM_BEGAN = 'bodies come as a stream now: from here on motions are proven separate from it'
 # Why a motion is given up.
 TOO_NEAR = 'the wearer is too near for the motion to continue'
 NOT_FOLLOWED = 'the arm is at rest off its motion, and does not follow it'
@@ -278,6 +280,11 @@ class ExecutionMonitor:
         return self._goal
 
     @property
+    def executes_whole(self) -> bool:
+        """Whether the arm executes a motion that was published as a whole, or the stop of one."""
+        return self.running is not None and self._parameters.separation is None
+
+    @property
     def is_monitoring(self) -> bool:
         """Whether a motion is monitored that is not being stopped."""
         return self._state is MonitorState.MONITORING
@@ -491,12 +498,15 @@ class ExecutionMonitor:
             self._stop_for_failure()
         if not self.pending_stop:
             self._publishers.assert_liveliness()
-        if self._reporter.parameters.separation is not None:
+        if self._reporter.parameters.separates != NEVER:
             self._publishers.publish_ray_clear(self._is_ray_clear())
 
     def _is_ray_clear(self) -> bool:
         """Return whether the pointing ray is known to be clear of the wearer."""
         parameters, now = self._reporter.parameters, self._now()
+        if parameters.separation is None:
+            # Where a wearer is who was described once is not known either.
+            return False
         try:
             # Where a part is that was lost is not known.
             body = self._inputs.body_at(now, parameters)
@@ -520,8 +530,12 @@ class ExecutionMonitor:
         if self._state is not MonitorState.MONITORING:
             return None
         # Also of an arm that is off its motion.
+        parameters = self._reporter.parameters
+        if self._parameters.stands_still and not parameters.stands_still:
+            self.fail(STREAM_BEGAN)
+            return None
         try:
-            self._inputs.require_fresh(now, self._reporter.parameters)
+            self._inputs.require_fresh(now, parameters)
         except RequestError as problem:
             self.fail(str(problem))
             return None

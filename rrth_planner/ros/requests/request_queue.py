@@ -25,6 +25,7 @@ from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import PlanReport, Reporter
+from rrth_planner.ros.interface.separation_status import NO_PROMISE
 from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
@@ -45,6 +46,8 @@ AGAIN = 0.01
 RAY_PATIENCE = 2.0
 # After a stop the same goal is tried for so long, so often [s].
 PATIENCE, RESUME_PERIOD = 5.0, 0.05
+# It is waited for so long, each time, until it is known whether the body stands still [s].
+LONGEST_UNKNOWN = 2.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -250,9 +253,9 @@ class PlanQueue:
         patience: how long to plan again while the wearer moves [s]; None: `time_limit`. Return
         whether the wearer is in the way of it, or has moved.
         """
-        parameters = self._reporter.parameters
+        parameters = self._parameters_for(ticket)
 
-        def settle_published(outcome: PlanOutcome) -> None:
+        def settle_published(outcome: PlanOutcome, parameters: PlannerParameters) -> None:
             settle(self._response(outcome, parameters, begin))
 
         try:
@@ -279,7 +282,7 @@ class PlanQueue:
         goal: PointingGoal | None,
         ticket: _Ticket,
         parameters: PlannerParameters,
-        settle_published: Callable[[PlanOutcome], None],
+        settle_published: Callable[[PlanOutcome, PlannerParameters], None],
         patience: float | None,
     ) -> PlanOutcome:
         """
@@ -298,6 +301,7 @@ class PlanQueue:
                 outcome: PlanOutcome, revalidation: Revalidation, n_stops: int = n_stops
             ) -> bool:
                 assert outcome.trajectory is not None
+                parameters = revalidation.parameters
                 start = 0.0 if outcome.handover is None else outcome.handover.time
                 msg = self._publishers.motion(outcome.trajectory, parameters, start)
 
@@ -309,7 +313,7 @@ class PlanQueue:
                         )
                     is_published = self._publish(ticket, outcome, revalidation, n_stops, msg)
                     if is_published:
-                        settle_published(outcome)
+                        settle_published(outcome, parameters)
                     return is_published
 
                 try:
@@ -339,6 +343,32 @@ class PlanQueue:
             if not may_change or ticket.is_cancelled or time.monotonic() >= end:
                 return outcome
             time.sleep(AGAIN)
+            parameters = self._parameters_for(ticket)
+
+    def _parameters_for(self, ticket: _Ticket) -> PlannerParameters:
+        """
+        Return the parameters of a plan, once it is known whether the body stands still.
+
+        Called in the worker's thread, which waits for that.
+        """
+        end = time.monotonic() + LONGEST_UNKNOWN
+        while not ticket.is_cancelled and time.monotonic() < end:
+            left = self._inputs.source.time_until_known(time.monotonic())
+            if not self._reporter.parameters.stands_still or left <= 0.0:
+                break
+            time.sleep(min(left, AGAIN))
+        return self._reporter.parameters
+
+    def _require_same_source(self, parameters: PlannerParameters) -> None:
+        """Raise RequestError where it is not known any more that the body stands still."""
+        is_standing = self._reporter.parameters.stands_still
+        left = self._inputs.source.time_until_known(time.monotonic())
+        if is_standing != parameters.stands_still or (is_standing and left > 0.0):
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'another body came while the motion was planned, expected the same one while it '
+                'stands still, or a stream of them',
+            )
 
     def _await_clear_ray(self, parameters: PlannerParameters, ticket: _Ticket) -> None:
         """
@@ -375,6 +405,8 @@ class PlanQueue:
         """Return the response to a request that began at a time, by `time.perf_counter`."""
         code, sentence, plan = outcome.code, outcome.sentence, outcome.plan
         trajectory, figures = outcome.trajectory, PlanReport()
+        if trajectory is not None and parameters.stands_still:
+            sentence = f'{sentence}; {NO_PROMISE}'
         if plan is not None:
             figures = replace(figures, seed=plan.seed, planning_time=plan.planning_time)
         if plan is not None and plan.path is not None and trajectory is not None:
@@ -412,6 +444,7 @@ class PlanQueue:
         """
         monitor, parameters = self._monitor, revalidation.parameters
         require_not_cancelled(lambda: ticket.is_cancelled)
+        self._require_same_source(parameters)
         if n_stops != monitor.n_stops:
             raise RequestError(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -448,6 +481,8 @@ class PlanQueue:
     def _follow_up(self) -> None:
         """Show the newest motion; after a stop, check it a second time and plan again."""
         self._show_newest()
+        if not self._monitor.executes_whole:
+            self._publishers.withdraw_whole()
         for stop in self._monitor.take_stops():
             self.prepare(partial(self._check_stop, stop))
             if stop.goal is not None and not stop.is_replanned:
