@@ -9,6 +9,7 @@ import numpy as np
 from rrth_planner.collision.reference_checker import bar_distances, bar_ends_at
 from rrth_planner.model.arm import ArmModel, Bar, bars_of, Capsule, mount_bars
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.joint_range import start_bounds
 from rrth_planner.model.reach import reach_table
 
 # Pairs with so many joints between them at most are proven never to collide, if they do not, with
@@ -82,7 +83,8 @@ def _farthest(arm: ArmModel) -> float:
     """Return a length of the pointing ray beyond which it meets no part of the arm [m]."""
     ends = [np.linalg.norm(c.ends, axis=1).max() + c.radius for c in arm.capsules]
     slides = np.array(arm.is_prismatic)
-    offsets = np.abs(arm.dh[:, [1, 3]]).sum() + np.abs(arm.bounds[:, slides]).max(axis=0).sum()
+    lengths = np.abs(start_bounds(arm)[:, slides]).max(axis=0)
+    offsets = np.abs(arm.dh[:, [1, 3]]).sum() + lengths.sum()
     return float(offsets + max(ends, default=0.0) + max(arm.radii.max(), 0.0) + arm.radii[-1])
 
 
@@ -117,7 +119,7 @@ def _never_collide(arm: ArmModel, pair: BarPair, bars: tuple[Bar, ...], length: 
     joints = list(_joints(arm, pair, bars))
     # A bar that slides may move, too.
     reaches = reach_table(arm, length)[[pair.inner, pair.outer]].max(axis=1).sum(axis=0)[joints]
-    low, high = arm.bounds[:, joints]
+    low, high = start_bounds(arm)[:, joints]
     middles, halves = 0.5 * (low + high)[None], 0.5 * (high - low)[None]
     n_cells = 1
     while len(middles):

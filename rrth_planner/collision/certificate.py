@@ -60,7 +60,7 @@ def certify(trajectory: Trajectory, world: World, begin: float = 0.0) -> Certifi
     """
     check_dof(trajectory.positions, world.bounds.shape[1], 'trajectory')
     if len(trajectory.times) == 1 or begin >= trajectory.duration:
-        is_free = world.is_valid(trajectory.positions[-1])
+        is_free = world.is_free(trajectory.positions[-1])
         return Certificate(is_proven=is_free, piece=-1 if is_free else 0, is_violated=not is_free)
     first, share = 0, 0.0
     if begin > 0.0:

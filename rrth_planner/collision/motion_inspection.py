@@ -14,6 +14,7 @@ from rrth_planner.collision.reference_checker import (
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import RrthError
+from rrth_planner.model.joint_range import start_bounds
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import MotionLimits, Trajectory
 
@@ -90,7 +91,12 @@ def inspect_motion(
         if not (np.abs(value) <= limit).all():
             worst = float((np.abs(value) / getattr(limits, what)).max())
             raise UnsafeMotionError(f'{what} reaches {worst:.3f} times its limit, expected 1 [-]')
-    if not ((q >= arm.bounds[0] - BOUND_TOLERANCE) & (q <= arm.bounds[1] + BOUND_TOLERANCE)).all():
+    beyond = np.maximum(arm.bounds[0] - q, q - arm.bounds[1])
+    # A joint that begins beyond a limit is never further from it than before.
+    farthest = start_bounds(arm)[1] - arm.bounds[1] + BOUND_TOLERANCE
+    led_in = np.where(beyond[0] <= farthest, np.maximum(beyond[0], 0.0), 0.0)
+    nearest = np.minimum.accumulate(np.minimum(np.maximum(beyond, 0.0), led_in))
+    if not (beyond <= nearest + BOUND_TOLERANCE).all():
         raise UnsafeMotionError('a joint exceeds its position limits')
     tool = frames(arm, q[-1:])[0, -1]
     reach = float(np.linalg.norm(target - tool[:3, 3]))

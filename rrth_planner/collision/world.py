@@ -26,6 +26,7 @@ from rrth_planner.model.arm import (
 )
 from rrth_planner.model.arrays import Array, check_dof, FARTHEST
 from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.joint_range import bounds_from
 from rrth_planner.model.reach import reach_table
 from rrth_planner.model.scene import Scene
 
@@ -125,10 +126,15 @@ class World:
 
         A point on a map has no ray.
         """
+        return self.is_in_bounds(q) and self.is_free(q, ray_length)
+
+    def is_free(self, q: Array, ray_length: float | None = None) -> bool:
+        """Return whether q, shape (dof,), is free, be it within the joints' limits or not."""
         if self.chain is chain.NO_CHAIN:
-            return self.is_edge_valid(q, q)
+            place = self.resolution, self.chain, self.robot, self.obstacles
+            return bool(self.edge_check(q, q, *place))
         ray = self.ray_length if ray_length is None else ray_length
-        return self.is_in_bounds(q) and bool(
+        return bool(
             arm_validity.is_configuration_free(q, ray, self.chain, self.robot, self.obstacles)
         )
 
@@ -211,6 +217,17 @@ def arm_world(arm: ArmModel, scene: Scene, margin: float, ray_guard_length: floa
 def grown(world: World, by: float) -> World:
     """Return the same world with every box grown by that much more on every side [m]."""
     return replace(world, obstacles=grown_groups(world.obstacles, by))
+
+
+def with_start(world: World, arm: ArmModel, q_start: Array) -> World:
+    """
+    Return the same world with limits that reach as far as a start beyond them, shape (dof,) [rad].
+
+    For straight edges from there: on one that ends within the limits no joint moves further out.
+    """
+    if world.is_in_bounds(q_start):
+        return world
+    return replace(world, bounds=bounds_from(arm, q_start))
 
 
 @functools.lru_cache(maxsize=32)

@@ -14,6 +14,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.bernstein import first_outside, to_bernstein
 from rrth_planner.model.errors import MessageError, OptionsError
+from rrth_planner.model.joint_range import bounds_from, not_led_in
 from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, sample, Trajectory
 
 # A motion is rejected where it exceeds a limit by more than this share.
@@ -165,6 +166,8 @@ def accept(
     ----------
     trajectory : Trajectory
         The new motion; the bounds of the arm hold along its whole curve, not only at the points.
+        A joint may begin a little beyond (`joint_range.start_bounds`), and then moves towards its
+        limit only.
     start_time, time : float
         When the new motion begins, and now [s].
 
@@ -222,9 +225,10 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
     rates = scale / durations[:, None, None]
     first = c[:, 1:] * _POWERS * rates
     second = first[:, 1:] * _POWERS[:4] * rates
+    least, most = bounds_from(arm, trajectory.positions[0])
     v, a = top * rules.limits.velocity, top * rules.limits.acceleration
     for what, unit, polynomials, low, high in (
-        ('position', 'rad', c, arm.bounds[0] - BOUND_TOLERANCE, arm.bounds[1] + BOUND_TOLERANCE),
+        ('position', 'rad', c, least - BOUND_TOLERANCE, most + BOUND_TOLERANCE),
         ('velocity', 'rad/s', first, -v, v),
         ('acceleration', 'rad/s^2', second, -a, a),
     ):
@@ -238,6 +242,13 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
                 f'{arm.joint_names[i]}: {what} {value:.6g} at {instant:.6g} s, '
                 f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]'
             )
+    k = not_led_in(arm, trajectory)
+    if k is not None:
+        raise MessageError(
+            f'{arm.joint_names[k]}: the motion begins beyond a limit, at '
+            f'{trajectory.positions[0, k]:.6g}, and moves not only towards it, expected '
+            f'{arm.bounds[0, k]:.6g} to {arm.bounds[1, k]:.6g} [rad]'
+        )
 
 
 def _pieces(trajectory: Trajectory) -> tuple[Array, Array]:

@@ -97,7 +97,7 @@ def is_remaining_free(
     if len(trajectory.times) == 1:
         world = arm_world(arm, scene, margin, ray_guard_length)
         reach = max(ray_guard_length, running.target_distance)
-        return world.is_valid(trajectory.positions[0], reach)
+        return world.is_free(trajectory.positions[0], reach)
     robot, chain = arm_rows(arm, ray_guard_length)
     return bool(
         trajectory_check.is_remaining_motion_free(
@@ -147,7 +147,7 @@ def escapes_by_continuing(
     world = arm_world(arm, scene, margin, ray_guard_length)
     reach = max(ray_guard_length, running.target_distance)
     return (
-        world.is_valid(trajectory.positions[-1], reach)
+        world.is_free(trajectory.positions[-1], reach)
         and leads_out(trajectory, without_ray(world), margin, trajectory.duration, phase)
         and gets_no_deeper(trajectory, world, phase)
     )

@@ -20,6 +20,7 @@ LAYOUT = (
     'T = Rx(alpha) Tx(a) Rz(theta + offset) Tz(d).',
     'Lengths in metres, angles in radians; radius: of the bars that the offsets a and d of a row',
     'are; capsules: of the link that the joint moves, in its frame after the row.',
+    'type: revolute, prismatic, or continuous (it turns without a stop).',
     "tool: the frame after the last joint, whose pointing ray leaves along +z; mount: the arm's",
     "base in the wearer's base frame, x forward, y left, z up.",
 )
@@ -31,7 +32,7 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
     (lower, upper), radii = arm.bounds.tolist(), arm.radii.tolist()
     joints = []
     for k, joint in enumerate(arm.joint_names):
-        kind = 'prismatic' if arm.is_prismatic[k] else 'revolute'
+        kind = _kind(arm, k)
         limits = {'lower': lower[k], 'upper': upper[k]}
         radius = {} if radii[k] == NO_BARS else {'radius': radii[k]}
         row = {'name': joint, 'type': kind, **rows[k], **limits, **radius}
@@ -48,6 +49,12 @@ def arm_to_mapping(arm: ArmModel, name: str) -> dict[str, Any]:
         'mount': mount | _capsules_of(arm, 0),
     }
     return result | ({'allowed': [list(pair) for pair in arm.allowed]} if arm.allowed else {})
+
+
+def _kind(arm: ArmModel, k: int) -> str:
+    if arm.is_continuous[k]:
+        return 'continuous'
+    return 'prismatic' if arm.is_prismatic[k] else 'revolute'
 
 
 def _capsules_of(arm: ArmModel, link: int) -> dict[str, Any]:
@@ -117,6 +124,7 @@ def arm_from_mapping(data: Mapping[str, Any]) -> ArmModel:
         T_base_mount=pose_matrix(position, quaternion),
         capsules=tuple(capsules),
         allowed=_allowed(given.get('allowed', [])),
+        is_continuous=tuple(joint['type'] == 'continuous' for joint in joints),
     )
 
 
@@ -156,8 +164,10 @@ def _joint(index: int, data: Any) -> dict[str, Any]:
     given = mapping(data, f'joint {index}', wanted, ModelError, ('radius', 'capsules'))
     label = f'joint "{printable(given["name"], f"joint {index}: name", ModelError)}"'
     kind = given['type']
-    if kind not in ('revolute', 'prismatic'):
-        raise ModelError(f'{label}: type {shown(kind)}, expected revolute or prismatic')
+    if kind not in ('continuous', 'revolute', 'prismatic'):
+        raise ModelError(
+            f'{label}: type {shown(kind)}, expected continuous, revolute or prismatic'
+        )
     limit = 'm' if kind == 'prismatic' else 'rad'
     units = {**ROW, 'lower': limit, 'upper': limit, 'radius': 'm'}
     return {**given, **_numbers(given, label, units)}

@@ -85,6 +85,8 @@ class ArmModel:
     allowed : tuple of (str, str)
         Pairs that may meet: a part of the arm, by the name that messages give it, and another
         part or a box.
+    is_continuous : tuple of bool
+        Which revolute joints have no stop, but limits of their numbers; empty: none.
 
     Raises
     ------
@@ -101,6 +103,7 @@ class ArmModel:
     T_base_mount: Array
     capsules: tuple[Capsule, ...] = ()
     allowed: tuple[tuple[str, str], ...] = ()
+    is_continuous: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         """Validate and freeze."""
@@ -117,6 +120,13 @@ class ArmModel:
             raise ModelError(f'is_prismatic: {len(prismatic)} values, expected {dof}')
         object.__setattr__(self, 'joint_names', names)
         object.__setattr__(self, 'is_prismatic', prismatic)
+        continuous = tuple(bool(flag) for flag in self.is_continuous) or (False,) * dof
+        if len(continuous) != dof or any(np.array(continuous) & prismatic):
+            raise ModelError(
+                f'is_continuous: {list(continuous)}, expected {dof} values, True for revolute '
+                'joints only'
+            )
+        object.__setattr__(self, 'is_continuous', continuous)
         for field, shape, unit in (
             ('dh', (dof + 1, 4), 'rad and m'),
             ('bounds', (2, dof), 'rad or m'),

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from rrth_planner.model.arm import ArmModel, Bar, bars_of, Capsule, mount_bars, tool_in_last_link
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.joint_range import start_bounds
 
 # A chain of offsets from one axis to one point: (row, 'a' or 'd'), in the order of the chain.
 Offsets = list[tuple[int, str]]
@@ -111,7 +112,8 @@ def _extremes(arm: ArmModel, ray_length: float, row: int) -> tuple[float, ...]:
         return (ray_length,)
     d = float(arm.dh[row, 3])
     if arm.is_prismatic[row]:
-        return (d + float(arm.bounds[0, row]), d + float(arm.bounds[1, row]))
+        low, high = start_bounds(arm)[:, row].tolist()
+        return (d + low, d + high)
     return (d,)
 
 

@@ -70,9 +70,9 @@ def plan_escape(
     ----------
     question : PlanQuestion
     world : World
-        Its boxes grown by the margin.
+        Its boxes grown by the margin, its limits those of a motion from q_start.
     q_start : ndarray, shape (dof,)
-        Where the arm is, at rest, within its limits and in a box [rad].
+        Where the arm is, at rest, within those limits and in a box [rad].
     spares : tuple of float
         Clearance beyond the margin to end with; the next where there is no room for one [m].
     should_stop : callable

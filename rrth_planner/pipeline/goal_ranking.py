@@ -6,6 +6,7 @@ import numpy as np
 from rrth_planner.collision.separation import permitted_ahead
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.joint_range import keeps_room
 from rrth_planner.model.path import Path
 from rrth_planner.model.separation import seen_body, SeenBody, Separation
 from rrth_planner.model.trajectory import Trajectory
@@ -53,7 +54,8 @@ def quickest_path(question: PlanQuestion, world: World, q_start: Array, path: Pa
     best = path
     blends = round_corners(path, world, question.limits)
     soonest = permitted_duration(parameterize(path, blends, question.limits), body, settings)
-    for q_goal in _straight_goals(question, world, q_start):
+    has_room = keeps_room(question.arm, path.waypoints[-1])
+    for q_goal in _straight_goals(question, world, q_start, has_room):
         edge = Path(np.stack([q_start, q_goal]))
         motion = parameterize(edge, (), question.limits)
         if motion.duration >= soonest:
@@ -73,8 +75,14 @@ def permitted_duration(motion: Trajectory, body: SeenBody, settings: Separation)
     return float(0.5 * (slowness[1:] + slowness[:-1]).sum() * (places[1] - places[0]))
 
 
-def _straight_goals(question: PlanQuestion, world: World, q_start: Array) -> list[Array]:
-    """Return the goals that a straight free edge reaches, the nearest first."""
+def _straight_goals(
+    question: PlanQuestion, world: World, q_start: Array, has_room: bool
+) -> list[Array]:
+    """
+    Return the goals that a straight free edge reaches, the nearest first.
+
+    has_room: only those that keep away from the joints' limits.
+    """
     arm, goal = question.arm, question.goal
     spares = [spare for spare in (question.reserve, SPARES[0]) if spare >= SPARES[0]]
     roomy = next((w for w in (grown(world, s) for s in spares) if w.is_valid(q_start)), None)
@@ -86,6 +94,7 @@ def _straight_goals(question: PlanQuestion, world: World, q_start: Array) -> lis
         q_goal
         for place in np.clip(places, *arm.bounds)
         for q_goal in goal_configurations(arm, goal, roomy, place, FEW).q_goals[:NEAREST]
+        if keeps_room(arm, q_goal) or not has_room
     ]
     found.sort(key=lambda q_goal: float(np.linalg.norm(q_goal - q_start)))
     return [q_goal for q_goal in found if roomy.is_edge_valid(q_start, q_goal)][:N_TIMED]

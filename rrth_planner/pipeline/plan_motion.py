@@ -11,11 +11,12 @@ import numpy as np
 from rrth_planner.collision.certificate import certify, least_clearance
 from rrth_planner.collision.penetration import box_depths
 from rrth_planner.collision.violation import Disagreement
-from rrth_planner.collision.world import arm_world, grown, World
+from rrth_planner.collision.world import arm_world, grown, with_start, World
 from rrth_planner.kernels import jit
 from rrth_planner.model.arm import ArmModel, reach_to, tool_pose
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.joint_range import joints_beyond
 from rrth_planner.model.path import Path
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import SeparationRules
@@ -29,6 +30,8 @@ from rrth_planner.pipeline.rejection import (
     CANCELLED,
     depth_sentence,
     lead_rejection,
+    led_in_rejection,
+    led_in_sentence,
     Rejection,
     start_rejection,
     target_rejection,
@@ -147,6 +150,8 @@ def plan_question(
     world = _world_of(arm, scene, margin, question.ray_guard_length)
     escape, disagreement = None, None
     leads: Iterable[LeadIn | None | Rejection] = (None,)
+    # A joint may begin a little beyond its limit: straight edges lead it in.
+    around = with_start(world, arm, q_start)
     rejection = start_rejection(arm, grown(world, SPARES[-1]), q_start)
     is_in_box = rejection is not None and world.colliding_bars(q_start) is None
     if rejection is not None and rejection.status is PlanStatus.START_IN_COLLISION and is_in_box:
@@ -156,7 +161,7 @@ def plan_question(
                 rejection, sentence=f'{sentence}, expected an arm at rest or clear of it'
             )
         else:
-            out = plan_escape(question, world, q_start, SPARES, should_stop)
+            out = plan_escape(question, around, q_start, SPARES, should_stop)
             if isinstance(out, Escape):
                 rejection, escape = None, out
                 leads = (out.lead_in(question.limits),)
@@ -165,20 +170,28 @@ def plan_question(
     if rejection is None:
         rejection = CANCELLED if should_stop() else target_rejection(scene, question.goal, margin)
     if moving is not None:
-        leads = _leads(arm, world, moving, question.limits)
+        leads = _leads(arm, around, moving, question.limits)
     for lead in leads if rejection is None else ():
         if isinstance(lead, Rejection):
             rejection = lead
             break
         q_from = q_start if lead is None else lead.q_stop
-        found = find_path(question, world, q_from, should_stop, begin)
+        q_first: Array = np.clip(q_from, *arm.bounds)
+        is_led_in = len(joints_beyond(arm, q_from)) > 0
+        if is_led_in:
+            rejection = led_in_rejection(arm, grown(world, SPARES[-1]), q_from, q_first)
+            if rejection is not None:
+                break
+        found = find_path(question, world, q_first, should_stop, begin)
         if isinstance(found, Rejection):
             rejection = found
             break
         assert found.path is not None
         paths = [found.path]
         if question.rules is not None:
-            paths.insert(0, quickest_path(question, world, q_from, found.path))
+            paths.insert(0, quickest_path(question, world, q_first, found.path))
+        if is_led_in:
+            paths = [Path(np.concatenate([q_from[None], path.waypoints])) for path in paths]
         for path in dict.fromkeys(paths):
             reach = reach_to(arm, question.goal.target, path.waypoints[-1])
             timed = time_path(question, world, path, lead, escape, reach, should_stop)
@@ -241,16 +254,16 @@ def _leads(
     """
     Yield the lead-ins of an arm in motion: straight ahead, or a stop along its present motion.
 
-    Where neither is possible, yield the rejection.
+    The limits are those of the world. Where neither is possible, yield the rejection.
     """
     straight = lead_in(moving.state, limits)
     rejection = lead_rejection(arm, world, straight, limits)
     if rejection is None:
         # Rounding may have put a joint past its limit.
-        yield replace(straight, q_stop=np.clip(straight.q_stop, *arm.bounds))
+        yield replace(straight, q_stop=np.clip(straight.q_stop, *world.bounds))
     stop = stop_first(moving, limits)
     if stop is not None and certify(stop.trajectory, world).is_proven:
-        yield replace(stop, q_stop=np.clip(stop.q_stop, *arm.bounds))
+        yield replace(stop, q_stop=np.clip(stop.q_stop, *world.bounds))
     elif rejection is not None:
         yield rejection
 
@@ -275,6 +288,8 @@ def _solved(
         q_start = trajectory.positions[:1]
         path = Path(np.concatenate([q_start, path.waypoints]))
         note = f', {escape.sentence}{note}'
+    if len(joints_beyond(question.arm, trajectory.positions[0])) > 0:
+        note = f', {led_in_sentence(question.arm, trajectory.positions[0])}{note}'
     return MotionPlan(
         status=PlanStatus.SOLVED,
         sentence=(

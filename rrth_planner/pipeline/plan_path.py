@@ -9,6 +9,7 @@ import time
 import numpy as np
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
+from rrth_planner.model.joint_range import goal_bounds, keeps_room
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.pipeline.rejection import CANCELLED, goal_rejection, Rejection
 from rrth_planner.pipeline.request import PlanQuestion
@@ -39,6 +40,8 @@ def find_path(
     """
     Return the shortest path found, or why there is none.
 
+    A goal is next to a joint's limit only where no other is found.
+
     Parameters
     ----------
     world : World
@@ -51,19 +54,42 @@ def find_path(
         When the request came, by `time.perf_counter`: its time limit counts from there [s].
 
     """
+    found = _find_path(question, world, q_start, should_stop, begin)
+    if isinstance(found, Rejection):
+        return found
+    assert found.path is not None
+    if keeps_room(question.arm, found.path.waypoints[-1]):
+        return found
+    kept = replace(world, bounds=goal_bounds(question.arm))
+    other = _find_path(question, kept, q_start, should_stop, begin)
+    if isinstance(other, PlanResult):
+        return other
+    return replace(found, is_reproducible=False) if other.status is PlanStatus.TIMEOUT else found
+
+
+def _find_path(
+    question: PlanQuestion,
+    world: World,
+    q_start: Array,
+    should_stop: Callable[[], bool],
+    begin: float,
+) -> PlanResult | Rejection:
+    """Return what `find_path` does, with goals anywhere in the bounds of the world."""
     arm, goal, options = question.arm, question.goal, question.options
     goals: GoalSet | None = None
     result: PlanResult | None = None
     n_samples, is_clocked = 0, False
+    # A start may be where goals may not.
+    q_near = q_start if world.is_in_bounds(q_start) else np.clip(q_start, *world.bounds)
     reserves = [share * question.reserve for share in SHARES]
     for spare in (*(r for r in reserves if r > SPARES[0]), *SPARES, 0.0):
         roomy = grown(world, spare)
         # Without spare clearance only where the start has none: an arm that was in motion.
-        if not roomy.is_valid(q_start) or (spare == 0.0 and goals is not None):
+        if not roomy.is_free(q_start) or (spare == 0.0 and goals is not None):
             continue
-        goals = goal_configurations(arm, goal, roomy, q_start, FEW)
+        goals = goal_configurations(arm, goal, roomy, q_near, FEW)
         if len(goals.q_goals) == 0 and spare <= SPARES[0]:
-            goals = goal_configurations(arm, goal, roomy, q_start, MANY)
+            goals = goal_configurations(arm, goal, roomy, q_near, MANY)
         if len(goals.q_goals) == 0:
             continue
         # Half of the time for the wide search, the rest for the narrow one.
@@ -71,6 +97,9 @@ def find_path(
         left = max(1e-3, share * options.time_limit - (time.perf_counter() - begin))
         n_most = FEW_SAMPLES if spare > SPARES[0] else options.max_samples
         limited = replace(options, time_limit=left, max_samples=min(n_most, options.max_samples))
+        if q_near is not q_start:
+            # Which edges from there are free says nothing of those from the start.
+            goals = replace(goals, n_bent=0)
         problem = pointing_problem(arm, goal, roomy, q_start, goals)
         rng = np.random.default_rng(question.seed)
         result = plan(problem, limited, rng, should_stop)

@@ -8,19 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.penetration import box_depths
-from rrth_planner.collision.world import World
+from rrth_planner.collision.world import with_start, World
 from rrth_planner.kernels.layout import ROTATION, SIZE
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.goal import PointingGoal
+from rrth_planner.model.joint_range import joints_beyond, ROUNDING, start_bounds
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.planning.pointing_goals import GoalSet
 from rrth_planner.timing.lead_in import LeadIn
 
-# A joint this far beyond its limit is at it [rad, m].
-ROUNDING = 1e-6
 # A joint may move faster than its limit by this share.
 EXCESS = 0.005
 
@@ -62,19 +61,15 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
     world : World
         Its boxes grown by the margin and the least clearance beyond it.
     q_start : ndarray, shape (dof,)
-        [rad].
+        Within the limits, or so little beyond that it can be led in [rad].
 
     """
-    if world.is_valid(q_start):
+    least, most = start_bounds(arm)
+    outside = np.flatnonzero((q_start < least - ROUNDING) | (q_start > most + ROUNDING))
+    if len(outside) > 0:
+        return Rejection(PlanStatus.START_OUT_OF_BOUNDS, _place_sentence(arm, q_start, outside[0]))
+    if world.is_free(q_start):
         return None
-    for k, name in enumerate(arm.joint_names):
-        low, high = arm.bounds[:, k]
-        if not low - ROUNDING <= q_start[k] <= high + ROUNDING:
-            unit = 'm' if arm.is_prismatic[k] else 'rad'
-            return Rejection(
-                PlanStatus.START_OUT_OF_BOUNDS,
-                f'{name} is at {q_start[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}',
-            )
     colliding = world.colliding_bars(q_start)
     if colliding is not None:
         return Rejection(
@@ -83,6 +78,45 @@ def start_rejection(arm: ArmModel, world: World, q_start: Array) -> Rejection | 
             'that may meet are listed as `allowed`',
         )
     return Rejection(PlanStatus.START_IN_COLLISION, 'the arm violates the margin')
+
+
+def led_in_rejection(
+    arm: ArmModel, world: World, q_start: Array, q_first: Array
+) -> Rejection | None:
+    """
+    Return why joints cannot move from q_start to their limits, at q_first, or None.
+
+    Parameters
+    ----------
+    world : World
+        Its boxes grown by the margin and the least clearance beyond it.
+    q_start, q_first : ndarray, shape (dof,)
+        [rad].
+
+    """
+    if with_start(world, arm, q_start).is_edge_valid(q_start, q_first) and world.is_valid(q_first):
+        return None
+    beyond = joints_beyond(arm, q_start)
+    return Rejection(
+        PlanStatus.START_OUT_OF_BOUNDS,
+        f'{_place_sentence(arm, q_start, beyond[0])}, or a way to its limit that is free',
+    )
+
+
+def led_in_sentence(arm: ArmModel, q_start: Array) -> str:
+    """Return the joints that are led in from beyond a limit, and how far, as a sentence."""
+    parts = []
+    for k in joints_beyond(arm, q_start).tolist():
+        unit = 'm' if arm.is_prismatic[k] else 'rad'
+        excess = abs(q_start[k] - np.clip(q_start[k], *arm.bounds[:, k]))
+        parts.append(f'{arm.joint_names[k]} led in from {excess:.2g} {unit} beyond its limit')
+    return ', '.join(parts)
+
+
+def _place_sentence(arm: ArmModel, q: Array, k: int) -> str:
+    low, high = arm.bounds[:, k]
+    unit = 'm' if arm.is_prismatic[k] else 'rad'
+    return f'{arm.joint_names[k]} is at {q[k]:.6g} {unit}, expected {low:.6g} to {high:.6g} {unit}'
 
 
 def depth_sentence(world: World, depths: Array, margin: float) -> str:
@@ -125,7 +159,7 @@ def lead_rejection(
             f'{limits.velocity[k]:g} {unit} or an arm at rest',
         )
     ways = np.concatenate([lead.trajectory.positions, lead.q_stop[None]])
-    low, high = arm.bounds
+    low, high = world.bounds
     beyond = np.maximum(low - ways, ways - high).max(axis=0)
     k = int(beyond.argmax())
     if beyond[k] > ROUNDING:

@@ -11,6 +11,7 @@ from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.trajectory_validation import violation_seen
 from rrth_planner.collision.violation import Disagreement
 from rrth_planner.collision.world import grown, World
+from rrth_planner.model.joint_range import not_led_in
 from rrth_planner.model.path import Path
 from rrth_planner.model.status import PlanStatus
 from rrth_planner.model.trajectory import joined, MotionLimits, Trajectory
@@ -76,7 +77,11 @@ def time_path(
     if any(blend.half_length > 0.0 for blend in rounded):
         choices.append(tuple(replace(blend, half_length=0.0) for blend in rounded))
     escape_time = 0.0 if escape is None else escape.trajectory.duration
-    timed = in_time(path, choices, limits, lead)
+    timed = [
+        motion
+        for motion in in_time(path, choices, limits, lead)
+        if not_led_in(question.arm, motion) is None
+    ]
     if not timed:
         return Rejection(
             PlanStatus.START_MOVES,

@@ -21,6 +21,7 @@ from rrth_planner.model.arm import (
 )
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.joint_range import start_bounds
 from rrth_planner.model.rotation import quaternion_xyzw
 from rrth_planner.simulation.body_shapes import BodyBox, BodyCapsule, capsules_within
 from rrth_planner.simulation.mechanics import Mechanics
@@ -169,7 +170,8 @@ def _add_arm(spec: Any, arm: ArmModel, mechanics: Mechanics) -> list[tuple[Bar, 
             type=mujoco.mjtJoint.mjJNT_SLIDE if slides else mujoco.mjtJoint.mjJNT_HINGE,
             axis=[0.0, 0.0, 1.0],
             limited=True,
-            range=arm.bounds[:, i],
+            # A stop is further out than the limit that a controller keeps.
+            range=start_bounds(arm)[:, i],
             armature=mechanics.armature[i],
             damping=np.full(3, mechanics.damping[i]),
             frictionloss=mechanics.friction[i],
@@ -283,7 +285,7 @@ def _ends_of(arm: ArmModel, bar: Bar) -> tuple[int, Array]:
         return row, np.array([[0.0, 0.0, 0.0], [a, 0.0, 0.0]])
     if arm.is_prismatic[row]:
         # Of a length that `stretch` sets; here the greatest one.
-        d = max(d + arm.bounds[:, row], key=abs)
+        d = max(d + start_bounds(arm)[:, row], key=abs)
     return row + 1, np.array([[0.0, 0.0, -d], [0.0, 0.0, 0.0]])
 
 

@@ -78,6 +78,26 @@ def test_what_is_wrong_with_a_motion_is_named(changes, words):
         inspect(motion(**changes))
 
 
+@pytest.mark.parametrize('by', [1e-5, 0.01, 0.05])
+def test_a_joint_that_begins_beyond_its_limit_may_move_towards_it_only(by):
+    beyond = np.array([0.0, by, *START[2:]])
+    inspect(motion(positions=[beyond, END], times=[0.0, 2.0]), q_present=beyond)
+    there_and_back = {
+        'times': [0.0, 2.0, 4.0, 6.0],
+        'positions': [beyond, END, [*END[:1], 0.9 * by, *END[2:]], END],
+        'velocities': np.zeros((4, 4)),
+        'accelerations': np.zeros((4, 4)),
+    }
+    with pytest.raises(UnsafeMotionError, match='position limits'):
+        inspect(motion(**there_and_back), q_present=beyond)
+
+
+def test_from_far_beyond_its_limit_no_joint_may_move():
+    beyond = np.array([0.0, 0.051, *START[2:]])
+    with pytest.raises(UnsafeMotionError, match='position limits'):
+        inspect(motion(positions=[beyond, END], times=[0.0, 2.0]), q_present=beyond)
+
+
 def test_a_contact_on_the_way_is_found_and_named():
     middle = tool_pose(ARM, 0.5 * (START + END))
     with pytest.raises(UnsafeMotionError, match='pebble'):

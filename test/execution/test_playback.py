@@ -136,6 +136,50 @@ def test_a_motion_that_does_not_fit_is_rejected(move, words):
         taken(standing(FOLDED), move)
 
 
+# joint_2 beyond its upper limit, which is 0 rad.
+BEYOND = FOLDED + [0.0, 0.36, 0.0, 0.0]
+
+
+@pytest.mark.parametrize('by', [1e-5, 0.01, 0.05])
+@pytest.mark.parametrize(('joint', 'side'), [(1, 1.0), (1, -1.0), (3, 1.0)])
+def test_a_joint_that_begins_a_little_beyond_its_limit_may_move_towards_it(by, joint, side):
+    q = FOLDED.copy()
+    q[joint] = ARM.bounds[int(side > 0.0), joint] + side * by
+    there = q.copy()
+    there[joint] -= side * 0.3
+    playback = taken(standing(q), motion(q, there, duration=2.0))
+    np.testing.assert_allclose(playback.state_at(2.0)[0], there, atol=1e-12)
+    # It may rest there, and stop before it is within its limits.
+    stopped = stop(playback, LIMITS, 0.1)
+    assert (stopped.state_at(1.0)[0] != there).any()
+    taken(standing(q), motion(q, duration=1.0))
+
+
+@pytest.mark.parametrize(
+    ('move', 'words'),
+    [
+        (motion(BEYOND, BEYOND + [0.0, 0.01, 0.0, 0.0], duration=1.0), 'joint_2: position 0.02'),
+        (
+            motion(BEYOND, FOLDED, BEYOND - [0.0, 0.005, 0.0, 0.0], duration=1.0),
+            'joint_2: the motion begins beyond a limit, at 0.01, and moves not only towards it',
+        ),
+        (
+            motion(BEYOND, BEYOND - [0.0, 0.006, 0.0, 0.0], BEYOND, FOLDED, duration=1.0),
+            'joint_2: the motion begins beyond a limit',
+        ),
+        (
+            motion(BEYOND + [0.0, 0.041, 0.0, 0.0], FOLDED, duration=1.0),
+            r'joint_2: position 0.051 at 0 s, expected -3.14159 to 1e-06 \[rad\]',
+        ),
+        # The other joints stay within theirs.
+        (motion(BEYOND, FOLDED + [0.0, 0.0, 1.58, 0.0], duration=3.0), 'joint_3: position'),
+    ],
+)
+def test_beyond_its_limit_a_joint_moves_nowhere_else(move, words):
+    with pytest.raises(MessageError, match=words):
+        taken(standing(move.positions[0]), move)
+
+
 @pytest.mark.parametrize('size', [1e200, 1e306, 1e308])
 def test_numbers_that_overflow_are_rejected_without_a_warning(size, recwarn):
     move = Trajectory(

@@ -3,6 +3,7 @@
 """The planner's node, called as a stranger would call it."""
 
 from dataclasses import replace
+from itertools import pairwise
 import os
 import re
 import signal
@@ -680,6 +681,22 @@ def test_a_handover_begins_at_the_present_velocity(start):
     assert not any(msg.points[-1].velocities)
     # It begins at a time that it names, so that a late message causes no jump.
     assert msg.header.stamp.sec > 0
+
+
+@pytest.mark.parametrize('by', [1e-5, 0.02])
+def test_an_arm_that_rests_beyond_a_limit_is_led_in(start, by):
+    planner, stranger = start()
+    say_all(planner, stranger, joint_states=joints([0.0, by, *FOLDED[2:]]))
+    response = stranger.answer()
+    assert response.success, response.message
+    assert f'joint_2 led in from {by:.2g} rad beyond its limit' in response.message
+    stranger.wait_until(lambda: stranger.received['joint_trajectory'])
+    points = stranger.received['joint_trajectory'][-1].points
+    places = [point.positions[1] for point in points]
+    inside = next(i for i, place in enumerate(places) if place <= 0.0)
+    assert places[0] == by
+    assert all(before >= after for before, after in pairwise(places[: inside + 1]))
+    assert max(places[inside:]) <= 0.0
 
 
 def test_velocities_that_are_no_numbers_are_rejected(start):

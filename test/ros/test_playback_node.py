@@ -262,6 +262,22 @@ def test_whatever_is_rejected_is_named_and_moves_nothing(playback, observer):
         assert not any(np.any(state.velocity) for state in observer.states[n_states:])
 
 
+def test_an_arm_beyond_a_limit_moves_in_but_not_out(playback, observer):
+    beyond = np.array([0.0, 0.01, np.pi / 2, np.pi / 2])
+    playback(initial_positions=beyond.tolist())
+    for q_to in (beyond + [0.0, 0.01, 0.0, 0.0], beyond + [0.3, 0.0005, 0.0, 0.0]):
+        n_logs = len(observer.logs)
+        observer.motions.publish(motion(beyond, q_to, 1.0))
+        observer.wait_for_rejection('joint_2: position 0.0', first=n_logs)
+        assert observer.is_still_at(beyond)
+    observer.motions.publish(motion(beyond, FOLDED, 1.2))
+    wait_until(lambda: observer.is_still_at(FOLDED))
+    n_logs = len(observer.logs)
+    observer.motions.publish(motion(FOLDED, beyond, 1.2))
+    observer.wait_for_rejection('joint_2: position', first=n_logs)
+    assert observer.is_still_at(FOLDED)
+
+
 def test_the_list_of_rejections_begins_with_a_motion_that_is_taken(playback, observer):
     playback()
     observer.motions.publish(changed(lambda m: None))

@@ -84,6 +84,7 @@ def import_chain(chain: UrdfChain, T_base_link: Array, radius: float) -> Importe
         bounds=chain.bounds,
         radii=np.full(len(dh), radius),
         T_base_mount=T_base_link @ T_0,
+        is_continuous=tuple(joint.type == 'continuous' for joint in chain.moving),
     )
     points = chain.points @ T_base_link[:3, :3].T + T_base_link[:3, 3]
     return ImportedArm(

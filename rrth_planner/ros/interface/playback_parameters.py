@@ -11,6 +11,7 @@ from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import OptionsError
+from rrth_planner.model.joint_range import start_bounds
 from rrth_planner.model.trajectory import MotionLimits
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
 
@@ -104,7 +105,7 @@ def initial_positions(node: Node, arm: ArmModel) -> Sequence[float]:
             f'initial_positions: {len(q)} values, expected {arm.dof}, one for each of '
             f'{list(arm.joint_names)} [rad]'
         )
-    for name, value, low, high in zip(arm.joint_names, q, *arm.bounds, strict=True):
+    for name, value, low, high in zip(arm.joint_names, q, *start_bounds(arm), strict=True):
         if not low <= value <= high:
             raise OptionsError(
                 f'initial_positions: {name} at {value}, expected {low:.4f} to {high:.4f} [rad]'

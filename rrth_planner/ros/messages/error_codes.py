@@ -49,8 +49,8 @@ MEANINGS = {
     ErrorCode.SENSOR_INFO_STALE: 'the body is older than `body_timeout` (counted from the stamp), '
     'the last one was rejected, a part of it is lost, or the node is too busy to read the '
     'bodies that came',
-    ErrorCode.START_STATE_INVALID: 'a joint is outside its limits, or the arm moves and has no '
-    'room to stop straight ahead',
+    ErrorCode.START_STATE_INVALID: 'a joint is outside its limits, by more than 0.05 rad or 5 mm '
+    'or without a free way in, or the arm moves and has no room to stop straight ahead',
     ErrorCode.NO_IK_SOLUTION: 'no configuration within the joint limits aims at the target',
     ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, or '
     'an unexpected error occurred: the answer names the file of the incident, by which to replay '
