@@ -15,10 +15,10 @@ from rrth_planner.model.scene import Box
 # Module and package of each, by the name of the choice.
 LIBRARIES = {'fcl': 'python-fcl', 'coal': 'coal'}
 # Bars become capsules this thin, and their radius is taken off the distance: of thick ones fcl
-# overestimates it by up to half a millimetre. Then coal is good to a micrometre, and so is fcl in
-# general; this bound covers it. But where things lie symmetrically, and round thin boxes, fcl at
-# times stops searching too early, and overestimates a distance by up to 0.1 m: one in 500 of those
-# from boxes under 5 mm [m].
+# overestimates it by up to half a millimetre. Then coal is good to a micrometre, and fcl to a few;
+# this bound covers it. But fcl at times stops searching too early where things lie symmetrically
+# or a box is thin: beside boxes under 5 mm one distance in 250 is more than that too great, by up
+# to 0.1 m [m].
 THINNEST, DOUBT = 1e-6, 1e-3
 # Objects that meet are this far apart at most, by rounding of coal [m].
 MET = 5e-7
