@@ -27,19 +27,22 @@ class Boxes:
     def __del__(self) -> None:
         self._library.release(self._shapes, are_boxes=True)
 
-    def nearest(self, item: Any, known: list[float]) -> tuple[float, int]:
+    def nearest(
+        self, item: Any, known: list[float], margins: Sequence[float]
+    ) -> tuple[float, int]:
         """
-        Return the distance of an object from the nearest box [m], and the index of that box.
+        Return how far an object is beyond the margin of the nearest box, and the box's index.
 
-        known (m,): lower bounds of the distances [m]; replaced by the distance of each box that is
-        checked.
+        margins (m,): a distance for each box [m]; known (m,): lower bounds of the distances beyond
+        them [m], replaced by that of each box that is checked.
         """
         least, nearest, library = math.inf, -1, self._library
         query, request, result = library.query, library.request, library.result
         for j in sorted(range(len(known)), key=known.__getitem__):
             if known[j] - DOUBT >= least:
                 break
-            known[j] = distance = query(item, self._shapes[j].item, request, result)
+            distance = query(item, self._shapes[j].item, request, result) - margins[j]
+            known[j] = distance
             if distance < least:
                 least, nearest = distance, j
         return least, nearest
@@ -129,10 +132,15 @@ class PlacedBar:
         return item
 
     def nearest(
-        self, boxes: Boxes, known: list[float], placements: Iterator[Placement], q: Array
+        self,
+        boxes: Boxes,
+        known: list[float],
+        margins: Sequence[float],
+        placements: Iterator[Placement],
+        q: Array,
     ) -> tuple[float, str]:
-        """Return the distance from the nearest box [m], and its name; known as for the boxes."""
-        distance, j = boxes.nearest(self.place(next(placements), q), known)
+        """Return how far it is beyond the margin of the nearest box, by name; as for boxes [m]."""
+        distance, j = boxes.nearest(self.place(next(placements), q), known, margins)
         return distance + THINNEST - self.radius, boxes.names[j] if j >= 0 else ''
 
 
@@ -148,7 +156,12 @@ class PlacedPair:
         self.name, self.bars = self._inner.name, (self._inner, self._outer)
 
     def nearest(
-        self, boxes: Boxes, known: list[float], placements: Iterator[Placement], q: Array
+        self,
+        boxes: Boxes,
+        known: list[float],
+        margins: Sequence[float],
+        placements: Iterator[Placement],
+        q: Array,
     ) -> tuple[float, str]:
         """Return the distance of the two bars [m], and the name of the outer one."""
         one, other = [bar.place(next(placements), q) for bar in self.bars]

@@ -29,6 +29,12 @@ from rrth_planner.model.trajectory import (
 INTERVALS = 12
 # Tolerance of that depth: the certificate needs a gap, however small [m].
 GAP = 1e-6
+# A bar this near to the middle of a box may as well be on its other side, as far as joints and
+# boxes are known. So bars escape only from boxes that, shrunk by their depth, have more than this
+# from the middle to each face [m].
+LEAST_HALF = 1e-3
+# A bar this near to a grown box counts as in it there [m].
+NEAR = 1e-5
 
 
 def box_depths(world: World, q: Array, ray_lengths: Array | None = None) -> Array:
@@ -109,6 +115,18 @@ def half_widths(world: World) -> Array:
     return halves
 
 
+def may_escape(world: World, depths: Array) -> NDArray[np.bool_]:
+    """
+    Return whether bars that deep in boxes may escape from each, (..., m) [m].
+
+    Not where a bar is near the middle of the box, or beyond: then no side is known to be the one
+    that it is on, and the escape could lead through the wearer.
+    """
+    left = half_widths(world) - depths
+    found: NDArray[np.bool_] = (depths < -NEAR) | (left > LEAST_HALF + GAP)
+    return found
+
+
 def leads_out(
     trajectory: Trajectory, world: World, margin: float, end: float, begin: float = 0.0
 ) -> bool:
@@ -119,7 +137,8 @@ def leads_out(
     box, neither that of the bars nor that of the pointing ray. Within an interval both are proven
     free of the boxes shrunk by their depth at its start; a box that they are not in, or have left,
     is not shrunk. At the end both are clear of all boxes. So the arm enters no other box, and
-    nowhere gets deeper by more than `GAP` than at the start of the interval.
+    nowhere gets deeper by more than `GAP` than at the start of the interval. No bar is near the
+    middle of a box: see `may_escape`.
 
     The ray has no body: where it is deeper than the margin, and therefore in the wearer already,
     that box does not count for it.
@@ -138,7 +157,7 @@ def leads_out(
     if (
         (deep[-1] > 0.0).any()
         or (np.diff(allowed, axis=0) > 0.0).any()
-        or (of_bars >= half_widths(world)).any()
+        or not may_escape(world, deep[:, 0]).all()
     ):
         return False
     # Pieces, each of which is within an interval; the first ones of each.

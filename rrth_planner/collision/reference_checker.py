@@ -22,6 +22,9 @@ from rrth_planner.model.trajectory import Trajectory
 ROUNDING = 1e-9
 # So small an imaginary part of a joint position that its square is nothing [s].
 TINY = 1e-30
+# A bar is on a known side of a box where so much is left of the box, from its middle to each face,
+# once it is shrunk until the bar is clear of it [m]. Depths are halved to, from so far away [m].
+LEFT, FAR, HALVINGS = 1e-3, 1.0, 40
 # A part of a bar is looked at in so many places, and once more in so many round the nearest one.
 PLACES, ROUNDS = 33, 2
 # Bounds are made for so many instants together.
@@ -212,6 +215,47 @@ def bar_radii(arm: ArmModel) -> Array:
     capsules = [capsule.radius for capsule in arm.capsules if capsule.link > 0]
     radii: Array = np.concatenate([capsules, offsets[offsets != NO_BARS]])
     return radii
+
+
+def penetration_depths(
+    arm: ArmModel, scene: Scene, q: Array, ray_length: float, margin: float
+) -> Array:
+    """
+    Return by how much each grown box would have to shrink on every side for each bar to be clear.
+
+    (n_bars, m) [m], bars as `arm.bars_of`, at q, shape (dof,); < 0: apart, by no more than `FAR`.
+    Infinite where the bar reaches the middle of the box: it is in it until nothing of it is left.
+    """
+    parts = bars_of(arm)
+    ends = bar_ends_at(arm, q[None], ray_length)[0, : len(parts), None]
+    radii = np.array([bar.radius for bar in parts])[:, None, None]
+    centers, rotations, halves = (
+        np.array([getattr(box, name) for box in scene.boxes])
+        for name in ('center', 'rotation', 'size')
+    )
+    halves = 0.5 * halves + margin
+
+    def is_met(by: Array) -> NDArray[np.bool_]:
+        half = halves - by[..., None]
+        is_left = (half > 0.0).all(axis=-1)
+        return is_left & bar_box_contact(ends, centers[:, None], rotations, half + radii)
+
+    shape = (len(ends), len(scene.boxes))
+    low = np.full(shape, -FAR)
+    high = np.broadcast_to(halves.min(axis=1), shape)
+    is_apart, is_across = ~is_met(low), is_met(high - ROUNDING)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_hit = is_met(middle)
+        low, high = np.where(is_hit, middle, low), np.where(is_hit, high, middle)
+    return np.where(is_apart, -FAR, np.where(is_across, np.inf, high))
+
+
+def may_escape(scene: Scene, depths: Array, margin: float) -> NDArray[np.bool_]:
+    """Return whether bars that deep in the grown boxes, (..., m) [m], may escape from each."""
+    halves = np.array([0.5 * box.size.min() + margin for box in scene.boxes])
+    found: NDArray[np.bool_] = (depths <= 0.0) | (halves - depths > LEFT)
+    return found
 
 
 def least_clearance(arm: ArmModel, scene: Scene, q: Array, ray_length: float) -> float:

@@ -33,7 +33,8 @@ PERIOD = 0.001
 # Distances this much below the margin are rounding of the library, not violations [m].
 TOLERANCE = 3e-6
 # During an escape this distance is demanded from boxes that much smaller: the library does not
-# report the penetration depth of a contact [m].
+# report the penetration depth of a contact. Where nothing is left of such a box, the arm is too
+# near to its middle for a side to escape to [m].
 APART = 1e-3
 # Samples taken at once within a gap: of many, some may turn out to be needless.
 MAX_SAMPLES = 8
@@ -54,7 +55,10 @@ def nearest(
     boxes = boxes_of(scene, library)
     bars = [PlacedBar(arm, k, ray_length, library) for k in range(len(bars_of(arm)))]
     placed = placements(arm, bars, q[None], [0] * len(bars))
-    found = [(bar.nearest(boxes, _unknown(arm, scene, bar.name), placed, q), bar) for bar in bars]
+    none = [0.0] * len(scene.boxes)
+    found = [
+        (bar.nearest(boxes, _unknown(arm, scene, bar.name), none, placed, q), bar) for bar in bars
+    ]
     (distance, box), bar = min(found, key=lambda one: one[0][0])
     return Violation(0.0, distance, bar.name if box else '', box)
 
@@ -100,8 +104,8 @@ class _Sample(NamedTuple):
     The distances of a bar at an instant, given by its index.
 
     `displacement`: upper bound of how far the bar has moved until then; `free`: how far it may
-    move before and after without violating the margin; `bounds` (m,): lower bounds of the
-    distances of the boxes [m].
+    move before and after without violating a margin; `bounds` (m,): lower bounds of the distances
+    of the boxes beyond their margins [m].
     """
 
     instant: int
@@ -124,18 +128,22 @@ _Gap = tuple[PlacedPart, _Sample, _Sample]
 
 
 class _Advancement:
-    """Conservative advancement along a trajectory, and the first violation found."""
+    """
+    Conservative advancement along a trajectory, and the first violation found.
+
+    margins (m,): to be kept from each box [m]. The distance of a violation is beyond that margin.
+    """
 
     def __init__(
         self,
         arm: ArmModel,
         scene: Scene,
         trajectory: Trajectory,
-        margin: float,
+        margins: Sequence[float],
         ray_length: float,
         library: str,
     ) -> None:
-        self._arm, self._trajectory, self._margin = arm, trajectory, margin
+        self._arm, self._trajectory, self._margins = arm, trajectory, margins
         self._library, self._boxes = library, boxes_of(scene, library)
         self.last = max(1, math.ceil(trajectory.duration / PERIOD))
         self._times = np.linspace(0.0, trajectory.duration, self.last + 1)
@@ -169,16 +177,14 @@ class _Advancement:
         for part, index, place, way, known in zip(
             parts, indices, places, moved.tolist(), bounds.tolist(), strict=True
         ):
-            distance, box = part.nearest(self._boxes, known, placed, q[place])
-            # Of itself the arm only has to be clear.
-            margin = self._margin if part.k < len(self.bars) else 0.0
-            if distance < margin - TOLERANCE and (self.violation is None or index < self.last):
+            distance, box = part.nearest(self._boxes, known, self._margins, placed, q[place])
+            if distance < -TOLERANCE and (self.violation is None or index < self.last):
                 # Later instants need not be checked any more.
                 self.last = index
                 self.violation = Violation(
                     float(self._times[index]), distance, part.name, box, part.k >= len(self.bars)
                 )
-            samples.append(_Sample(index, way, max(0.0, distance - margin - DOUBT), known))
+            samples.append(_Sample(index, way, max(0.0, distance - DOUBT), known))
         return samples
 
     def parts_at_end(self, reach: float) -> list[PlacedPart]:
@@ -228,10 +234,33 @@ def first_violation(
     reach: how much of the ray must stay clear in motion, and at the end [m]; library: name of one
     of `distance_library.LIBRARIES`.
     """
-    advancement = _Advancement(arm, scene, trajectory, margin, ray_guard_length, library)
+    margins = [margin] * len(scene.boxes)
+    violation = _first(arm, scene, trajectory, margins, ray_guard_length, reach, library)
+    return None if violation is None else _from_body(violation, margin)
+
+
+def _from_body(violation: Violation, margin: float) -> Violation:
+    """Return a violation with its distance from the body, not from the margin round it [m]."""
+    # Of itself the arm only has to be clear.
+    if violation.is_of_arm:
+        return violation
+    return replace(violation, distance=violation.distance + margin)
+
+
+def _first(
+    arm: ArmModel,
+    scene: Scene,
+    trajectory: Trajectory,
+    margins: Sequence[float],
+    ray_length: float,
+    reach: float,
+    library: str,
+) -> Violation | None:
+    """Return `first_violation` for a margin of each box, its distance beyond the margin [m]."""
+    advancement = _Advancement(arm, scene, trajectory, margins, ray_length, library)
     end = advancement.last
     starts = sorted({0, end // 2, end})
-    at_end = advancement.parts_at_end(reach) if reach > ray_guard_length else []
+    at_end = advancement.parts_at_end(reach) if reach > ray_length else []
     # All samples of a round are taken at once: the kinematics of one instant take as long as those
     # of a dozen.
     samples = iter(
@@ -270,8 +299,9 @@ def first_escape_violation(
     depths (2, m): penetration depths at the start in each box, grown by the margin, of the bars
     without the pointing ray and of the ray: by how much the box would have to shrink on every
     side for them to be clear [m]; < 0: clear. No motion may exceed them, except in a box that the
-    ray is in itself, without the margin: that counts for the other bars alone. escape_time: when
-    the escape ends; 0: there is none [s]. All else as for `first_violation`.
+    ray is in itself, without the margin, or not `APART` from the middle of: that counts for the
+    other bars alone, which may never be so deep. escape_time: when the escape ends; 0: there is
+    none [s]. All else as for `first_violation`.
     """
     if escape_time == 0.0:
         return None
@@ -280,22 +310,27 @@ def first_escape_violation(
     violations = []
     for ray, depth in ((0.0, depths[0]), (ray_guard_length, depths.max(axis=0))):
         boxes: list[Box] = []
+        margins: list[float] = []
         kept: dict[str, float] = {}
-        for i, by in enumerate((margin - np.maximum(depth, 0.0)).tolist()):
-            box = scene.boxes[i]
+        for i, box in enumerate(scene.boxes):
             if is_void[i] and ray > 0.0:
                 continue
+            by, apart = margin - max(float(depth[i]), 0.0), APART
             size = box.size + 2.0 * (by - APART)
-            if not (size > 0.0).all():
+            if (size > 0.0).all():
+                box = Box(box.name, box.center, size, box.rotation)
+            elif depth[i] <= 0.0:
+                apart = margin
+            elif ray > 0.0:
+                continue
+            else:
                 return Violation(0.0, by, 'the arm', box.name)
-            boxes.append(Box(box.name, box.center, size, box.rotation))
+            boxes.append(box)
+            margins.append(apart)
             kept[box.name] = max(by, kept.get(box.name, by))
-        violation = first_violation(arm, Scene(tuple(boxes)), escape, APART, ray, 0.0, library)
+        violation = _first(arm, Scene(tuple(boxes)), escape, margins, ray, 0.0, library)
         if violation is not None:
-            if not violation.is_of_arm:
-                distance = violation.distance - APART + kept[violation.box]
-                violation = replace(violation, distance=distance)
-            violations.append(violation)
+            violations.append(_from_body(violation, kept.get(violation.box, 0.0)))
     return min(violations, key=lambda violation: violation.time, default=None)
 
 
@@ -311,5 +346,5 @@ def _entered(
     distances = [-math.inf] * len(grown)
     ray = PlacedBar(arm, len(bars_of(arm)) - 1, ray_length, library)
     boxes = boxes_of(Scene(tuple(grown)), library)
-    ray.nearest(boxes, distances, placements(arm, [ray], q[None], [0]), q)
+    ray.nearest(boxes, distances, [0.0] * len(grown), placements(arm, [ray], q[None], [0]), q)
     return np.array(distances) <= DOUBT

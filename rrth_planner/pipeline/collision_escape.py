@@ -6,7 +6,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from rrth_planner.collision.penetration import box_depths, GAP, half_widths, INTERVALS, leads_out
+from rrth_planner.collision.penetration import (
+    box_depths,
+    GAP,
+    half_widths,
+    INTERVALS,
+    leads_out,
+    LEAST_HALF,
+    may_escape,
+)
 from rrth_planner.collision.world import grown, World
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.path import Path
@@ -89,6 +97,16 @@ def plan_escape(
         return Rejection(
             PlanStatus.START_IN_COLLISION,
             f'{sentence}, expected less than {escape_depth:g} m (escape_depth)',
+        )
+    stuck = np.flatnonzero(~may_escape(world, of_bars.max(axis=0)))
+    if len(stuck):
+        box = int(stuck[of_bars[:, stuck].max(axis=0).argmax()])
+        only = np.where(np.arange(of_bars.shape[1]) == box, of_bars, -np.inf)
+        most = max(0.0, float(half_widths(world)[box]) - LEAST_HALF)
+        return Rejection(
+            PlanStatus.START_IN_COLLISION,
+            f'{depth_sentence(world, only, question.margin)}, expected less than {most:.4f} m: '
+            'near the middle of a box, or beyond, no side is known to escape to',
         )
     for spare in spares:
         roomy, rng = grown(world, spare), np.random.default_rng(question.seed)

@@ -258,6 +258,18 @@ def test_the_margin_is_respected_to_the_hundredth_of_a_millimetre(checker):
         assert violation.distance == pytest.approx(gap, abs=5e-6)
 
 
+def test_a_line_in_a_box_violates_a_margin_of_nothing(checker):
+    arm = table_1_arm()
+    q = np.array([0.3, -1.2, 0.4, 0.7])
+    hold = straight(q, q)
+    assert checker.first_violation(arm, plate_beside(arm, q, 1e-5), hold, 0.0, 1.0, 0.5) is None
+    for depth in (1e-5, 1e-3, 0.05):
+        scene = plate_beside(arm, q, -depth)
+        violation = checker.first_violation(arm, scene, hold, 0.0, 1.0, 0.5)
+        assert violation is not None, depth
+        assert (violation.bar, violation.box) == ('pointing ray', 'plate')
+
+
 def test_a_box_crossed_in_a_few_milliseconds_is_not_jumped_over(checker):
     arm = table_1_arm()
     q_from, q_to = np.array([-1.5, -0.8, 0.0, 0.5]), np.array([1.5, -0.8, 0.0, 0.5])

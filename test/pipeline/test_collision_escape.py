@@ -11,6 +11,7 @@ import re
 from hypothesis import given, strategies
 import numpy as np
 import pytest
+from rrth_planner.collision.distance_library import LIBRARIES
 from rrth_planner.collision.penetration import (
     box_depths,
     escape_depths,
@@ -63,7 +64,7 @@ ARM, BARS, POINTING = slice(None), slice(-1), slice(-1, None)
 BODIES = [wearer(), *(varied_body(np.random.default_rng(k)) for k in range(5))]
 
 
-def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more):
+def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, margin=MARGIN, **more):
     return plan_motion.plan_motion(
         arm,
         scene,
@@ -71,7 +72,7 @@ def ask(arm, scene, q_start, *, target=TARGET, escape_depth=ESCAPE_DEPTH, **more
         PointingGoal(target),
         limits(),
         OPTIONS,
-        margin=MARGIN,
+        margin=margin,
         ray_guard_length=RAY,
         seed=1,
         escape_depth=escape_depth,
@@ -499,6 +500,69 @@ def test_a_hand_that_is_closed_round_the_arm_is_rejected():
     assert plan.status is PlanStatus.START_IN_COLLISION
     assert 'no straight escape is proven free' in plan.sentence
     assert '"hand"' in plan.sentence or '"finger_' in plan.sentence
+
+
+def beside_sheet(thickness, gap):
+    """Return an arm, and a wearer whose badge of a thickness is that far beside a bar [m]."""
+    arm, scene = pressed(bar=0)
+    hand = scene.boxes[-1]
+    begin, end = oracle_bars(arm, FOLDED[None], RAY)[0, 0]
+    size = np.array([0.05, thickness, 0.05])
+    center = 0.2 * begin + 0.8 * end - (0.5 * thickness + gap) * hand.rotation[:, 1]
+    return arm, Scene((*scene.boxes[:-1], Box('badge', center, size, hand.rotation)))
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize(
+    ('thickness', 'gap', 'most'),
+    [
+        # Thinner than twice a millimetre, only from some way off.
+        (1e-7, 0.0, 0.019),
+        (1e-7, 5e-4, 0.019),
+        (1e-7, 1.1e-3, None),
+        (1e-3, 0.0, 0.0195),
+        (1e-3, 4e-4, 0.0195),
+        (1e-3, 6e-4, None),
+        (1e-3, 0.015, None),
+        (3e-3, 0.0, None),
+        # Nearer to the middle than a millimetre, and beyond.
+        (3e-3, -1e-3, 0.0205),
+        (3e-3, -2.5e-3, 0.0205),
+        (0.03, -0.0139, None),
+        (0.03, -0.0141, 0.034),
+    ],
+)
+def test_an_arm_escapes_from_a_thin_box_while_its_side_is_known(thickness, gap, most, library):
+    pytest.importorskip(library)
+    arm, scene = beside_sheet(thickness, gap)
+    plan = ask(arm, scene, FOLDED, second_checker=library)
+    if most is None:
+        assert plan.status is PlanStatus.SOLVED, plan.sentence
+        assert escape_said(plan.sentence)[0] == ['badge']
+        q = positions_at(plan.trajectory, np.arange(0.0, plan.escape_time, 1e-3))
+        assert not collides(arm, scene.boxes[-1], q, gap - 2e-6, BARS).any()
+        return
+    assert plan.status is PlanStatus.START_IN_COLLISION
+    assert 'box "badge": penetration depth ' in plan.sentence
+    assert f'expected less than {most:.4f} m: near the middle of a box' in plan.sentence
+    # Nor is a motion proven that goes on away from it.
+    world = arm_world(arm, scene, MARGIN, RAY)
+    clear = ask(*beside_sheet(thickness, 2e-3), FOLDED).trajectory
+    assert not leads_out(clear, world, MARGIN, clear.duration)
+    assert second_opinion(arm, scene, world, clear) is not None
+
+
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_thin_boxes_that_an_arm_is_not_in_do_not_keep_it_from_escaping(library):
+    pytest.importorskip(library)
+    arm, scene = pressed(MARGIN + 0.005, bar=0)
+    badges = [
+        Box(f'badge_{i}', [1.0, 1.0, 0.1 * i], np.full(3, size), np.eye(3))
+        for i, size in enumerate((1e-7, 1e-4, 1.9e-3))
+    ]
+    plan = ask(arm, Scene((*scene.boxes, *badges)), FOLDED, margin=0.0, second_checker=library)
+    assert plan.status is PlanStatus.SOLVED, plan.sentence
+    assert escape_said(plan.sentence)[0] == ['hand']
 
 
 def test_a_hand_that_is_closed_round_the_ray_holds_nothing():
