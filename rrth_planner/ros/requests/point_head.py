@@ -146,9 +146,9 @@ class PointHeadServer:
 
     def _stop(self, pursuit: _Pursuit) -> None:
         """Plan no more for a goal, and stop an arm that executes its motion."""
-        self._queue.withdraw(pursuit.goal)
         if self._monitor.goal is pursuit.goal and self._monitor.is_monitoring:
             self._monitor.brake(CANCELLED)
+        self._queue.withdraw(pursuit.goal)
 
     def _follow_all(self) -> None:
         """Publish feedback, and note which goals have ended."""

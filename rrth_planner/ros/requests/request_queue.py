@@ -204,15 +204,17 @@ class PlanQueue:
     def cancel(self) -> int:
         """Cancel the requests that have published no motion yet; return their number."""
         ended, self._open, self._resumption = self._open, set(), None
-        for ticket in ended:
+        # A copy is made at one go, while the worker removes tickets.
+        for ticket in ended.copy():
             ticket.is_cancelled = True
         return len(ended)
 
     def withdraw(self, goal: PointingGoal) -> None:
         """Cancel what is planned for this goal, unless its motion is published already."""
-        for ticket in [ticket for ticket in self._open if ticket.goal is goal]:
-            ticket.is_cancelled = True
-            self._open.discard(ticket)
+        for ticket in self._open.copy():
+            if ticket.goal is goal:
+                ticket.is_cancelled = True
+                self._open.discard(ticket)
         if self._resumption is not None and self._resumption.goal is goal:
             self._resumption = None
 
