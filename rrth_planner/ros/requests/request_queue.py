@@ -44,6 +44,8 @@ AGAIN = 0.01
 RAY_PATIENCE = 2.0
 # After a stop the same goal is tried for so long, so often [s].
 PATIENCE, RESUME_PERIOD = 5.0, 0.05
+# More requests than these do not wait [-].
+MOST_WAITING = 64
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -154,7 +156,8 @@ class PlanQueue:
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
-        self._n_requests = 0
+        # So far, and how many of them are not answered yet.
+        self._n_requests, self._n_waiting = 0, 0
         # The goal that was given up last after a stop, and the response to its last try.
         self._given_up: tuple[PointingGoal | None, Response | None] = None, None
         # Not the node's clock: simulated time may stand still.
@@ -164,8 +167,12 @@ class PlanQueue:
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
         future, ticket = Future(), _Ticket(goal)
-        self._n_requests += 1
         begin = time.perf_counter()
+        if self._n_waiting >= MOST_WAITING:
+            sentence = f'{MOST_WAITING} requests wait for an answer already: ask again later'
+            outcome = PlanOutcome(ErrorCode.PREEMPTED, sentence)
+            return self._response(outcome, self._reporter.parameters, begin)
+        self._n_requests += 1
 
         def work() -> None:
             try:
@@ -177,6 +184,7 @@ class PlanQueue:
                 executor.wake()
 
         self._open.add(ticket)
+        self._n_waiting += 1
         try:
             self._worker.submit(work)
             response: Response = await future
@@ -186,6 +194,7 @@ class PlanQueue:
                 executor.create_task(self.prepare, response.conclude)
             return response
         finally:
+            self._n_waiting -= 1
             self._open.discard(ticket)
 
     def prepare(self, work: Callable[[], None]) -> None:
