@@ -44,8 +44,8 @@ AGAIN = 0.01
 RAY_PATIENCE = 2.0
 # After a stop the same goal is tried for so long, so often [s].
 PATIENCE, RESUME_PERIOD = 5.0, 0.05
-# More requests than these do not wait [-].
-MOST_WAITING = 64
+# More requests than these do not wait; that is logged at most this often [s].
+MOST_WAITING, WARNING_PERIOD = 64, 5.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -169,9 +169,9 @@ class PlanQueue:
         future, ticket = Future(), _Ticket(goal)
         begin = time.perf_counter()
         if self._n_waiting >= MOST_WAITING:
-            sentence = f'{MOST_WAITING} requests wait for an answer already: ask again later'
-            outcome = PlanOutcome(ErrorCode.PREEMPTED, sentence)
-            return self._response(outcome, self._reporter.parameters, begin)
+            sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
+            self._node.get_logger().warning(sentence, throttle_duration_sec=WARNING_PERIOD)
+            return Response(False, ErrorCode.PREEMPTED, sentence, Path, lambda: None)
         self._n_requests += 1
 
         def work() -> None:
