@@ -52,9 +52,10 @@ MEANINGS = {
     ErrorCode.START_STATE_INVALID: 'a joint is outside its limits, or the arm moves and has no '
     'room to stop straight ahead',
     ErrorCode.NO_IK_SOLUTION: 'no configuration within the joint limits aims at the target',
-    ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, the planning '
-    'process gave no answer within 5 s after `time_limit`, or an unexpected error occurred: the answer names the file of the incident, by which to replay '
-    'it, and the log has the details',
+    ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, the '
+    'planning process gave no answer within 5 s after `time_limit`, or an unexpected error '
+    'occurred: the answer names the file of the incident, by which to replay it, and the log has '
+    'the details',
 }
 
 CODE_OF_STATUS = {
