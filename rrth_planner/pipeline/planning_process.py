@@ -22,10 +22,11 @@ from rrth_planner.planning.options import TreeOptions
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
 # A process hangs that has not answered so long after a cancellation, the time limit of a plan, or
-# any other question [s].
-LONGEST_STOP = 5.0
+# any other question [s]. To end it and to answer for it takes less than a second more.
+LONGEST_STOP = 4.0
 # So does one that has not warmed up for so long; what is compiled in memory takes minutes [s].
 LONGEST_WARM_UP = 600.0
+# What is said of one then.
 HANGS = 'while working, since it had not answered in time'
 
 

@@ -53,7 +53,7 @@ MEANINGS = {
     'room to stop straight ahead',
     ErrorCode.NO_IK_SOLUTION: 'no configuration within the joint limits aims at the target',
     ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, the '
-    'planning process gave no answer within 5 s after `time_limit`, or an unexpected error '
+    'planning process hangs (at most 5 s after `time_limit`), or an unexpected error '
     'occurred: the answer names the file of the incident, by which to replay it, and the log has '
     'the details',
 }
