@@ -20,7 +20,6 @@ from geometry_msgs.msg import PointStamped  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
-from rrth_planner.ros.requests.request_queue import MOST_WAITING  # noqa: E402
 import samples  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Bool  # noqa: E402
@@ -53,7 +52,12 @@ for client in clients:
 # Inside of the torso.
 request = GetPlan.Request()
 request.goal.header.frame_id = 'torso'
-futures = [client.call_async(request) for client in clients for _ in range(n_requests)]
+futures = []
+for client in clients:
+    for _ in range(n_requests):
+        futures.append(client.call_async(request))
+        # A writer keeps no more than its depth, too.
+        time.sleep(0.1 / depth)
 print('sent', flush=True)
 executor = SingleThreadedExecutor()
 executor.add_node(node)
@@ -175,8 +179,8 @@ def test_a_client_that_leaves_with_open_requests_stops_no_motion_of_another(
         """Return the number of answers that were not sent, as the planner says."""
         return sum(int(line.split()[1]) for line in said if 'clients that are not there' in line)
 
-    # One that was killed counts as there until its lease ends.
-    wait_until(lambda: is_killed or n_gone() >= min(n_requests, MOST_WAITING))
+    # One that was killed counts as there until its lease ends, one that left for a moment.
+    wait_until(lambda: is_killed or n_gone() > 0)
     # The motion comes to its end.
     wait_until(lambda: np.abs(watcher.states[-1].velocity).max() < 1e-6)
     print(f'{n_requests} open requests: {n_gone()} answers not sent', end=', ')
