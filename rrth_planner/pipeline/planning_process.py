@@ -21,12 +21,17 @@ from rrth_planner.planning.options import TreeOptions
 
 # Period of the check for cancellation [s].
 POLL_PERIOD = 2e-2
-# A process that has not answered so long after a cancellation hangs [s].
-LONGEST_STOP = 5.0
+# A process hangs that has not answered so long after a cancellation, the time limit of a plan, or
+# any other question [s]. To end it and to answer for it takes less than a second more.
+LONGEST_STOP = 4.0
+# So does one that has not warmed up for so long; what is compiled in memory takes minutes [s].
+LONGEST_WARM_UP = 600.0
+# What is said of one then.
+HANGS = 'while working, since it had not answered in time'
 
 
 class PlanningProcessError(RrthError):
-    """The planning process ended while it worked."""
+    """The planning process ended while it worked, or gave no answer in time."""
 
 
 class PlanningTraceback(Exception):
@@ -69,15 +74,15 @@ class PlanningProcess:
     """
     A planner in a process of its own.
 
-    It starts at once, ends with this process in any case, and is restarted where it has died: the
-    call that it died in raises PlanningProcessError. For one caller at a time.
+    It starts at once, ends with this process in any case, and is restarted where it has died or
+    hangs: the call that it did so in raises PlanningProcessError. For one caller at a time.
 
     Parameters
     ----------
     arm, options, second_checker
         Kernels and library are loaded for these.
     on_death : callable
-        Called with a sentence after the process has died.
+        Called with a sentence after the process has died, or was killed since it hangs.
     worker : WorkerProcess, optional
         One that is started already.
 
@@ -106,12 +111,13 @@ class PlanningProcess:
         self, question: PlanQuestion, should_stop: Callable[[], bool] = lambda: False
     ) -> MotionPlan:
         """As of `Planner`."""
-        plan: MotionPlan = self._ask('plan', *parts_of(question), should_stop=should_stop)
+        longest = question.options.time_limit + LONGEST_STOP
+        plan: MotionPlan = self._ask(longest, 'plan', *parts_of(question), should_stop=should_stop)
         return plan
 
     def violation_seen(self, *arguments: Any) -> Violation | None:
         """As of `Planner`."""
-        violation: Violation | None = self._ask('violation_seen', *arguments)
+        violation: Violation | None = self._ask(LONGEST_STOP, 'violation_seen', *arguments)
         return violation
 
     def close(self) -> None:
@@ -128,40 +134,58 @@ class PlanningProcess:
         self._n_asked, self._is_busy = 0, False
         self._begin('warm_up', *self._warm_up)
 
-    def _require_ready(self) -> None:
-        """Wait for the end of the warm-up, unless it has ended."""
+    def _require_ready(self, end: float = math.inf) -> None:
+        """Wait for the end of the warm-up, unless it has ended, until a monotonic time [s]."""
         if self._is_busy:
-            self._end(lambda: False)
+            self._end(lambda: False, end)
 
     def _ask(
-        self, name: str, *arguments: Any, should_stop: Callable[[], bool] = lambda: False
+        self,
+        longest: float,
+        name: str,
+        *arguments: Any,
+        should_stop: Callable[[], bool] = lambda: False,
     ) -> Any:
+        """Return the answer to a question, or raise PlanningProcessError after a time [s]."""
+        end = time.monotonic() + longest
         if not self._worker.is_alive():
             self._restart('while idle')
-        self._require_ready()
-        self._begin(name, *arguments)
+        self._require_ready(end)
+        self._begin(name, *arguments, longest=longest)
         return self._end(should_stop)
 
-    def _begin(self, name: str, *arguments: Any) -> None:
+    def _begin(self, name: str, *arguments: Any, longest: float = LONGEST_WARM_UP) -> None:
+        """Ask a question; a process that has not answered after a time [s] hangs."""
         self._n_asked += 1
+        self._hangs = time.monotonic() + longest
         # A dead process is detected while waiting for the answer.
         with suppress(OSError):
             self._channel.send(self._n_asked, name, *arguments)
         self._is_busy = True
 
-    def _end(self, should_stop: Callable[[], bool]) -> Any:
-        """Return the answer to the last call, or raise its error."""
-        stopped, number, answer = math.inf, 0, None
+    def _end(self, should_stop: Callable[[], bool], end: float = math.inf) -> Any:
+        """
+        Return the answer to the last question, or raise its error.
+
+        end: until when to wait for a process that does not hang, by the monotonic clock [s].
+        """
+        number, answer, is_stopped = 0, None, False
         try:
             # The answer to an earlier call, which nobody waited for, may come first.
             while number != self._n_asked:
                 while not self._channel.is_readable(POLL_PERIOD):
-                    if stopped == math.inf and should_stop():
-                        stopped = time.monotonic()
+                    present = time.monotonic()
+                    if not is_stopped and should_stop():
+                        is_stopped, self._hangs = True, min(self._hangs, present + LONGEST_STOP)
                         self._channel.send(STOP)
-                    if time.monotonic() - stopped > LONGEST_STOP:
-                        raise TimeoutError(f'no answer {LONGEST_STOP:g} s after a cancellation')
+                    if present > self._hangs:
+                        self._worker.kill()
+                        raise PlanningProcessError(self._restart(HANGS))
+                    if present > end:
+                        raise PlanningProcessError('the planning process still loads: ask again')
                 number, answer = self._channel.receive()
+        except PlanningProcessError:
+            raise
         except Exception as problem:
             raise PlanningProcessError(self._restart('while working')) from problem
         self._is_busy = False
@@ -170,7 +194,7 @@ class PlanningProcess:
         return answer
 
     def _restart(self, when: str) -> str:
-        """Replace a process that has died; return the sentence for the log."""
+        """Replace a process that has died or hangs; return the sentence for the log."""
         code = self._worker.end()
         sentence = f'the planning process ended with code {code} {when}; another one is started'
         self._on_death(sentence)

@@ -9,12 +9,16 @@ This module imports nothing big, so that the process starts first and loads whil
 from multiprocessing.connection import Pipe
 import os
 import signal
+import socket
+import struct
 import subprocess
 import sys
 
 WORKER = 'rrth_planner.pipeline.planning_worker'
 # A process that has not ended by itself after this time is killed [s].
 LONGEST_END = 5.0
+# To send it something takes no longer than this, a whole number [s].
+LONGEST_SEND = 5
 
 
 class WorkerProcess:
@@ -38,6 +42,10 @@ class WorkerProcess:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         end.close()
+        # One that hangs reads nothing: what it is sent must not wait for ever.
+        with socket.socket(fileno=os.dup(self.line.fileno())) as line:
+            longest = struct.pack('ll', LONGEST_SEND, 0)
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, longest)
 
     @property
     def pid(self) -> int:
@@ -47,6 +55,10 @@ class WorkerProcess:
     def is_alive(self) -> bool:
         """Return whether it has not ended yet."""
         return self._process.poll() is None
+
+    def kill(self) -> None:
+        """Kill it, as one that hangs."""
+        self._process.kill()
 
     def end(self) -> int:
         """End it, and return its exit code."""

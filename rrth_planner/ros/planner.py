@@ -18,6 +18,7 @@ from rrth_planner.model.errors import MessageError, RrthError
 from rrth_planner.pipeline.worker_process import WorkerProcess
 from rrth_planner.ros.interface.parameters import declare_parameters, PlannerParameters
 from rrth_planner.ros.messages.error_codes import answer, code_of_rejection, ErrorCode
+from rrth_planner.ros.middleware.answers import Answers
 from rrth_planner.ros.middleware.executor import settle_interpreter, spin
 from rrth_planner.ros.middleware.qos import SERVICE
 from std_srvs.srv import Trigger
@@ -96,7 +97,7 @@ class PlannerNode(Node):
             (Trigger, '~/reset', self._on_reset),
         ):
             self.create_service(kind, name, callback, qos_profile=SERVICE, callback_group=group)
-        self._serve_action()
+        self._serve_action(Answers(self))
         self.get_logger().info(f'ready after {time.monotonic() - BEGIN:.1f} s')
 
     def _create_components(self, parameters: PlannerParameters) -> None:
@@ -132,7 +133,7 @@ class PlannerNode(Node):
             self._planner,
         )
 
-    def _serve_action(self) -> None:
+    def _serve_action(self, answers: Answers) -> None:
         """Offer the action point_head, where its type is installed."""
         from rrth_planner.ros.messages.point_head import PointHead
 
@@ -146,6 +147,7 @@ class PlannerNode(Node):
                 self._reporter,
                 self._monitor,
                 self._queue,
+                answers,
             )
 
     def close(self) -> None:

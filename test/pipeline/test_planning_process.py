@@ -135,6 +135,41 @@ def test_one_that_hangs_is_replaced_once_its_request_is_cancelled(process, said,
     assert process.plan(question()).status is PlanStatus.SOLVED
 
 
+def test_one_that_hangs_over_a_question_is_replaced_after_its_time_limit(process, said):
+    assert process.plan(question()).status is PlanStatus.SOLVED
+    asked = question(options=RRTHOptions(time_limit=0.1))
+    motion, arm = process.plan(question()).trajectory, worlds.table_1_arm()
+    # More than a pipe holds.
+    huge = Scene(tuple(Box(f'{k}', [9.0, 9.0, k], np.ones(3), np.eye(3)) for k in range(5000)))
+    for ask in (
+        lambda: process.plan(asked),
+        lambda: process.plan(dataclasses.replace(asked, scene=huge)),
+        lambda: process.violation_seen(arm, worlds.wearer(), motion, 0.02, 1.0, 1.0),
+    ):
+        before, n_said = process.pid, len(said)
+        os.kill(before, signal.SIGSTOP)
+        with pytest.raises(PlanningProcessError, match='since it had not answered in time'):
+            ask()
+        assert len(said) == n_said + 1
+        assert process.pid != before
+        # The next one waits for its successor to load, as long as that takes.
+        assert process.plan(question()).status is PlanStatus.SOLVED
+
+
+def test_a_question_does_not_wait_for_ever_for_a_process_that_loads():
+    loading = PlanningProcess(worlds.table_1_arm(), RRTHOptions())
+    before = loading.pid
+    os.kill(before, signal.SIGSTOP)
+    with pytest.raises(PlanningProcessError, match='still loads: ask again'):
+        loading.plan(question(options=RRTHOptions(time_limit=0.1)))
+    # It may be compiling, which takes minutes.
+    assert loading.pid == before
+    os.kill(before, signal.SIGCONT)
+    loading.warm_up(worlds.table_1_arm(), RRTHOptions())
+    assert loading.plan(question()).status is PlanStatus.SOLVED
+    loading.close()
+
+
 def test_a_stop_that_comes_after_the_answer_stops_nothing():
     ours, theirs = map(Channel, Pipe())
     thread = Thread(target=worker.serve, args=(theirs, {'double': lambda k: 2 * k}))

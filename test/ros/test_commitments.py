@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 import time
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -225,6 +226,35 @@ def test_a_sharp_stop_that_a_late_body_did_not_prevent_ends_at_rest_and_says_why
     assert arm.statuses[-1].state is SeparationState.SLOWED
     arm.frames(900, hand)
     assert np.abs(arm.commanded(arm.now)[0] - arm.motion.positions[-1]).max() < 1e-6
+
+
+NAMES = [
+    name
+    for name, value in vars(commitments.Commitments).items()
+    if isinstance(value, FunctionType) and not name.startswith('__')
+]
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_what_fails_for_ever_stops_the_arm_beside_a_wearer(separated, monkeypatch, name):
+    arm, hand = beside(separated, 0.3)
+    n_calls = []
+
+    def fail(*_, **__):
+        n_calls.append(name)
+        raise ZeroDivisionError(name)
+
+    monkeypatch.setattr(commitments.Commitments, name, fail)
+    arm.monitor.brake('of the test')
+    arm.frames(5, hand)
+    # What was published last ends at rest, and nothing follows it.
+    trajectory, begin = arm.published[-1]
+    assert not arm.monitor.is_monitoring or arm.monitor.pending_stop
+    n = len(arm.published)
+    arm.frames(60, hand)
+    assert len(arm.published) == n
+    assert arm.now > begin + trajectory.duration
+    assert not trajectory.velocities[-1].any()
 
 
 def frames_until_given_up(arm, place, hand):

@@ -225,3 +225,23 @@ def test_an_error_in_the_report_of_an_error_does_not_end_the_node(node):
     finally:
         node.destroy_timer(timer)
     assert seen[:2] == ['ValueError: of the callback'] * 2
+
+
+def test_an_error_is_acted_on_before_it_is_logged_and_where_it_cannot_be_logged(node):
+    order = []
+
+    def fail():
+        raise ValueError('of the callback')
+
+    class BrokenLogger:
+        def error(self, _):
+            order.append('log')
+            raise OSError('no space left')
+
+    node.get_logger = BrokenLogger
+    timer = node.create_timer(0.001, fail)
+    try:
+        spin(node, lambda _: order.append('act'), is_over=lambda: len(order) > 3)
+    finally:
+        node.destroy_timer(timer)
+    assert order[:4] == ['act', 'log'] * 2

@@ -21,6 +21,7 @@ from rrth_planner.ros.interface.inputs import Input, Inputs  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
 from rrth_planner.ros.middleware.qos import LEASE  # noqa: E402
 from rrth_planner.ros.monitor import execution_monitor, execution_tracker  # noqa: E402
+from rrth_planner.ros.monitor.commitments import Commitments  # noqa: E402
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor  # noqa: E402
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker  # noqa: E402
 from rrth_planner.ros.planner import PlannerNode  # noqa: E402
@@ -160,7 +161,15 @@ def places():
         (execution_tracker, name)
         for name in ('phase_of', 'sample', 'has_missed_stop', 'is_on_other')
     ]
-    for owner in (ExecutionMonitor, ExecutionTracker, Inputs, Input, WearerBody, ExecutingMotion):
+    for owner in (
+        ExecutionMonitor,
+        ExecutionTracker,
+        Commitments,
+        Inputs,
+        Input,
+        WearerBody,
+        ExecutingMotion,
+    ):
         found += [
             (owner, name)
             for name, value in vars(owner).items()

@@ -37,7 +37,7 @@ from rrth_planner.ros.messages.joint_state import configuration_from_msg
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from rrth_planner.ros.middleware.parameter_declaration import ARM
-from rrth_planner.ros.middleware.qos import LATCHED
+from rrth_planner.ros.middleware.qos import LATCHED, SERVICE
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
@@ -123,7 +123,8 @@ class PlannerClient(Node):
                 LATCHED,
                 event_callbacks=quietly,
             )
-        self._plan = self.create_client(Trigger, f'{NODE}/plan')
+        # It may wait among many others, whose answers it receives, too.
+        self._plan = self.create_client(Trigger, f'{NODE}/plan', qos_profile=SERVICE)
         self._spinner = SingleThreadedExecutor()
         self._spinner.add_node(self)
 

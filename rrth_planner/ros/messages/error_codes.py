@@ -37,7 +37,7 @@ MEANINGS = {
     'every motion that was planned until `time_limit`',
     ErrorCode.UNABLE_TO_AQUIRE_SENSOR_DATA: 'no body, target or joints yet: says which topic',
     ErrorCode.TIMED_OUT: 'no path within `time_limit`',
-    ErrorCode.PREEMPTED: 'cancelled',
+    ErrorCode.PREEMPTED: 'cancelled, or 64 requests wait for their answers already',
     ErrorCode.START_STATE_IN_COLLISION: 'a bar of the arm is `escape_depth` or deeper in a box, '
     'or no escape of bars and ray is proven: which part of the arm, which box, how deep',
     ErrorCode.GOAL_IN_COLLISION: 'the target is inside a box, or all goal configurations that '
@@ -52,9 +52,10 @@ MEANINGS = {
     ErrorCode.START_STATE_INVALID: 'a joint is outside its limits, by more than 0.05 rad or 5 mm '
     'or without a free way in, or the arm moves and has no room to stop straight ahead',
     ErrorCode.NO_IK_SOLUTION: 'no configuration within the joint limits aims at the target',
-    ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, or '
-    'an unexpected error occurred: the answer names the file of the incident, by which to replay '
-    'it, and the log has the details',
+    ErrorCode.FAILURE: 'the motion could not be certified, the two checkers disagree, the '
+    'planning process hangs (at most 5 s after `time_limit`), or an unexpected error '
+    'occurred: the answer names the file of the incident, by which to replay it, and the log has '
+    'the details',
 }
 
 CODE_OF_STATUS = {

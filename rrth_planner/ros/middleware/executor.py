@@ -243,11 +243,14 @@ def spin(
             except Exception as problem:
                 if not rclpy.ok():
                     return
-                node.get_logger().error(traceback.format_exc())
+                problems = [problem]
                 try:
                     on_error(one_line(f'{type(problem).__name__}: {problem}'))
-                except Exception:
-                    node.get_logger().error(traceback.format_exc())
+                except Exception as other:
+                    problems.append(other)
+                for one in problems:
+                    with suppress(Exception):
+                        node.get_logger().error(''.join(traceback.format_exception(one)))
     finally:
         executor.close()
 

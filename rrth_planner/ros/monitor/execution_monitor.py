@@ -330,19 +330,21 @@ class ExecutionMonitor:
         """Stop the arm, if it executes a motion; the lock is held."""
         self.n_faults += is_fault and self.running is not None
         if self.running is not None and self._state is MonitorState.MONITORING:
-            self._commitments.fail(why, is_fault)
             # What is not to be planned again does not become so by what fails later.
             self._is_replanned = is_replanned and (self._is_replanned or not self.pending_stop)
             self.pending_stop = why
             self._pending_since = time.perf_counter()
             self._stop_for_failure()
+            with suppress(Exception):
+                self._commitments.fail(why, is_fault)
         elif self.running is not None and is_fault:
             # The arm stops already; what is planned for after that does not begin.
-            self._commitments.fail(why, is_fault)
             self.stop_reason, self.n_stops = why, self.n_stops + 1
             if not self._stops or self._stops[-1].is_replanned:
                 with suppress(Exception):
                     self._record_stop(self.running.trajectory, None, is_replanned=False)
+            with suppress(Exception):
+                self._commitments.fail(why, is_fault)
 
     def _run_fail_safe(self, check: Callable[[], None]) -> None:
         """Run a check; an error in it ends in a stop."""
@@ -350,9 +352,11 @@ class ExecutionMonitor:
             with self._lock:
                 check()
         except Exception as problem:
-            with suppress(Exception):
-                self._node.get_logger().error(traceback.format_exc())
-            self.fail(f'the monitor failed, {_named(problem)}', is_replanned=False)
+            try:
+                self.fail(f'the monitor failed, {_named(problem)}', is_replanned=False)
+            finally:
+                with suppress(Exception):
+                    self._node.get_logger().error(''.join(traceback.format_exception(problem)))
 
     def _check_remaining_motion(self, body: WearerBody, arrived: int) -> None:
         """Stop the arm unless its remaining motion is proven free; the lock is held."""
@@ -550,8 +554,8 @@ class ExecutionMonitor:
         stop = self._stop_of(before, phase, now)
         if self._is_withheld(stop, before, now):
             return
-        self._tracker.repeat_stop(stop)
         self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+        self._tracker.repeat_stop(stop)
         self._node.get_logger().error(
             'arm did not follow the commanded stop: stop published again'
         )

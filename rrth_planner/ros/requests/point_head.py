@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 import numpy as np
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
@@ -25,6 +25,8 @@ from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.messages.paced_goal import paced_goal
 from rrth_planner.ros.messages.point_head import PointHead
+from rrth_planner.ros.middleware.answers import Answers
+from rrth_planner.ros.middleware.paced_action_server import PacedActionServer
 from rrth_planner.ros.middleware.qos import SERVICE
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
 from rrth_planner.ros.requests.request_queue import PlanQueue
@@ -71,6 +73,7 @@ class PointHeadServer:
         reporter: Reporter,
         monitor: ExecutionMonitor,
         queue: PlanQueue,
+        answers: Answers,
     ) -> None:
         """Offer the action."""
         self._node, self._scene_monitor, self._inputs = node, scene_monitor, inputs
@@ -80,7 +83,8 @@ class PointHeadServer:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._follow_all, clock=steady)
         self._timer.cancel()
-        self._server = ActionServer(
+        self._server = PacedActionServer(
+            answers,
             node,
             PointHead,
             '~/point_head',
@@ -146,9 +150,9 @@ class PointHeadServer:
 
     def _stop(self, pursuit: _Pursuit) -> None:
         """Plan no more for a goal, and stop an arm that executes its motion."""
-        self._queue.withdraw(pursuit.goal)
         if self._monitor.goal is pursuit.goal and self._monitor.is_monitoring:
             self._monitor.brake(CANCELLED)
+        self._queue.withdraw(pursuit.goal)
 
     def _follow_all(self) -> None:
         """Publish feedback, and note which goals have ended."""

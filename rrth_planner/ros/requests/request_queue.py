@@ -48,6 +48,8 @@ RAY_PATIENCE = 2.0
 PATIENCE, RESUME_PERIOD = 5.0, 0.05
 # It is waited for so long, each time, until it is known whether the body stands still [s].
 LONGEST_UNKNOWN = 2.0
+# More requests than these do not wait; that is logged at most this often [s].
+MOST_WAITING, WARNING_PERIOD = 64, 5.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
 
 
@@ -158,7 +160,8 @@ class PlanQueue:
         self._unseen: tuple[PlanOutcome, PlannerParameters] | None = None
         self._shown = -SHORTEST_SHOW
         self._is_closed = False
-        self._n_requests = 0
+        # So far, and how many of them are not answered yet.
+        self._n_requests, self._n_waiting = 0, 0
         # The goal that was given up last after a stop, and the response to its last try.
         self._given_up: tuple[PointingGoal | None, Response | None] = None, None
         # Not the node's clock: simulated time may stand still.
@@ -168,8 +171,12 @@ class PlanQueue:
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
         future, ticket = Future(), _Ticket(goal)
-        self._n_requests += 1
         begin = time.perf_counter()
+        if self._n_waiting >= MOST_WAITING:
+            sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
+            self._node.get_logger().warning(sentence, throttle_duration_sec=WARNING_PERIOD)
+            return Response(False, ErrorCode.PREEMPTED, sentence, Path, lambda: None)
+        self._n_requests += 1
 
         def work() -> None:
             try:
@@ -181,6 +188,7 @@ class PlanQueue:
                 executor.wake()
 
         self._open.add(ticket)
+        self._n_waiting += 1
         try:
             self._worker.submit(work)
             response: Response = await future
@@ -190,6 +198,7 @@ class PlanQueue:
                 executor.create_task(self.prepare, response.conclude)
             return response
         finally:
+            self._n_waiting -= 1
             self._open.discard(ticket)
 
     def prepare(self, work: Callable[[], None]) -> None:
@@ -208,15 +217,17 @@ class PlanQueue:
     def cancel(self) -> int:
         """Cancel the requests that have published no motion yet; return their number."""
         ended, self._open, self._resumption = self._open, set(), None
-        for ticket in ended:
+        # A copy is made at one go, while the worker removes tickets.
+        for ticket in ended.copy():
             ticket.is_cancelled = True
         return len(ended)
 
     def withdraw(self, goal: PointingGoal) -> None:
         """Cancel what is planned for this goal, unless its motion is published already."""
-        for ticket in [ticket for ticket in self._open if ticket.goal is goal]:
-            ticket.is_cancelled = True
-            self._open.discard(ticket)
+        for ticket in self._open.copy():
+            if ticket.goal is goal:
+                ticket.is_cancelled = True
+                self._open.discard(ticket)
         if self._resumption is not None and self._resumption.goal is goal:
             self._resumption = None
 
