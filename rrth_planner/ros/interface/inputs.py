@@ -107,22 +107,23 @@ class InputSnapshot:
     scene: Scene
     goal: PointingGoal
     joints: JointReading
+    rest_speed: float = REST_SPEED
 
     @property
     def q_start(self) -> Array:
-        """Of the reading, shape (dof,) [rad]."""
-        return self.joints.positions
+        """Where the arm rests, shape (dof,) [rad]."""
+        return self.joints.mean_positions(self.rest_speed)
 
     def is_moving(self, now: float) -> bool:
         """Return whether the arm moves at a time [s]."""
-        return self.joints.is_moving(now)
+        return self.joints.is_moving(now, self.rest_speed)
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise self._rejection(
-                arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved
-            )
+            expected = f'an arm at rest (at most {self.rest_speed:g} rad/s, rest_speed)'
+            velocities = self.joints.mean_velocities(self.rest_speed)
+            raise _rejection(arm, velocities, expected, ArmHasMoved)
 
     def is_about_to_move(self, running: ExecutingMotion | None, now: float, span: float) -> bool:
         """Return whether the arm rests within its motion, and moves on in less than a span [s]."""
@@ -141,7 +142,7 @@ class InputSnapshot:
         """Return the predicted state of a moving arm at a time [s], or raise RequestError."""
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
-            raise self._rejection(arm, 'a velocity for every joint')
+            raise _rejection(arm, joints.velocities, 'a velocity for every joint')
         known = None
         if running is not None and joints.taken < running.start_time <= time:
             # The arm was not on it yet: a stop, say, may just have been published.
@@ -158,7 +159,8 @@ class InputSnapshot:
                 known,
             )
         if not np.isfinite(found.state.positions).all():
-            raise self._rejection(arm, f'a finite position {time - joints.taken:.3f} s later')
+            expected = f'a finite position {time - joints.taken:.3f} s later'
+            raise _rejection(arm, joints.velocities, expected)
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
@@ -173,14 +175,15 @@ class InputSnapshot:
             found = joints.taken - running.start_time, 1.0
         return found
 
-    def _rejection(
-        self, arm: ArmModel, expected: str, kind: type[RequestError] = RequestError
-    ) -> RequestError:
-        speeds = np.abs(self.joints.velocities)
-        k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-        speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
-        sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
-        return kind(ErrorCode.START_STATE_INVALID, sentence)
+
+def _rejection(
+    arm: ArmModel, velocities: Array, expected: str, kind: type[RequestError] = RequestError
+) -> RequestError:
+    speeds = np.abs(velocities)
+    k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
+    speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
+    sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
+    return kind(ErrorCode.START_STATE_INVALID, sentence)
 
 
 class Inputs:
@@ -243,7 +246,8 @@ class Inputs:
         """
         body = self.body_at(now, parameters)
         goal = self._goal() if goal is None else goal
-        return InputSnapshot(scene_of(body), goal, self.joints_at(now, parameters.joint_timeout))
+        joints = self.joints_at(now, parameters.joint_timeout)
+        return InputSnapshot(scene_of(body), goal, joints, parameters.rest_speed)
 
     def body_at(
         self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0

@@ -55,8 +55,9 @@ ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # An arm that has rested for so long [s], while it was commanded further than this [rad], ignores
-# its motion: its controller rejects what it is given. It has moved where it went so far [rad].
-IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
+# its motion: its controller rejects what it is given. It has moved where it rests so far from the
+# start [rad].
+IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 2e-3
 # A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
 # long the controller has one that is published [s].
 LATEST, ARRIVAL = 0.02, 0.005
@@ -82,8 +83,8 @@ class Commitments:
         self.present: Commitment | None = None
         # The last ones, in their order: a controller may have rejected one.
         self._recent: deque[Commitment] = deque(maxlen=REMEMBERED)
-        # Since when the arm rests [s], what was commanded then, and where it was.
-        self._rest: tuple[float, Array, Array] | None = None
+        # Since when the arm rests [s], and what was commanded then.
+        self._rest: tuple[float, Array] | None = None
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
@@ -197,16 +198,13 @@ class Commitments:
 
     def is_ignored(self, reading: JointReading | None) -> bool:
         """Take note of where the arm is; return whether it rests while it is to move on."""
-        if reading is None or not self.is_active:
+        if reading is None or self._parameters is None or not self.is_active:
             return False
-        place = self._commanded(reading.taken)
-        since, then, here = self._rest or (reading.taken, place, reading.positions)
-        # Not every driver has velocities.
-        way = float(np.abs(reading.positions - here).max())
-        if reading.is_moving(reading.taken) or way > MOVED:
+        if reading.is_moving(reading.taken, self._parameters.rest_speed):
             self._rest = None
             return False
-        self._rest = since, then, here
+        place = self._commanded(reading.taken)
+        self._rest = since, then = self._rest or (reading.taken, place)
         return (
             reading.taken - since > IGNORED_AFTER
             and float(np.abs(place - then).max()) > IGNORED_WAY
@@ -215,9 +213,10 @@ class Commitments:
 
     def has_moved(self, reading: JointReading | None) -> bool:
         """Return whether the arm is elsewhere than where its motion begins."""
-        if reading is None or self.planned is None:
+        if reading is None or self.planned is None or self._parameters is None:
             return False
-        way = reading.positions - self.planned.trajectory.positions[0]
+        place = reading.mean_positions(self._parameters.rest_speed)
+        way = place - self.planned.trajectory.positions[0]
         return float(np.abs(way).max()) > MOVED
 
     @property
@@ -354,9 +353,14 @@ class Commitments:
         Return whether it does. An arm that lags behind what is commanded executes it.
         """
         begun = [c for c in self._recent if reading is not None and c.start_time <= reading.taken]
-        if reading is None or len(begun) < 2:
+        if reading is None or self._parameters is None or len(begun) < 2:
             return False
-        is_at_rest = begun[-1].end_time < reading.taken and not reading.is_moving(reading.taken)
+        is_at_rest = begun[-1].end_time < reading.taken and not reading.is_moving(
+            reading.taken, self._parameters.rest_speed
+        )
+        if is_at_rest:
+            mean = reading.mean_positions(self._parameters.rest_speed)
+            reading = replace(reading, positions=mean)
         aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
         gap = np.inf
         # What was commanded until then, by all of them in turn.

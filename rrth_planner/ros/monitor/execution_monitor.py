@@ -179,7 +179,7 @@ class ExecutionMonitor:
                     # Left to itself until a handover, the controller would not move as is proven.
                     phase = now - present.start_time
                     commanded = with_lead_in(present, phase, commanded, now)
-                self._tracker.begin(commanded, now)
+                self._tracker.begin(commanded, now, parameters.rest_speed)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._in_the_way_since = MonitorState.MONITORING, None
                 publish()
@@ -531,7 +531,7 @@ class ExecutionMonitor:
         is_waiting = self._state is MonitorState.MONITORING and (
             self._commitments.waits_for_reset(now)
         )
-        if self._tracker.is_over(now) and not is_waiting:
+        if self._tracker.is_over(now, self._parameters.rest_speed) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion(TOO_NEAR)
             self._end_motion()

@@ -22,9 +22,6 @@ from rrth_planner.ros.interface.parameters import PlannerParameters
 from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.requests.handover import Handover, LEADS
 
-# A motion that starts further from the arm than this would begin with a jump [rad].
-START_TOLERANCE = 1e-3
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revalidation:
@@ -104,7 +101,8 @@ class Revalidation:
     def _require_arm(self, present: InputSnapshot, now: float) -> None:
         """Raise ArmHasMoved where the arm is not at the start of the motion."""
         snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
-        expected = snapshot.q_start
+        expected, tolerance = snapshot.q_start, self.parameters.start_tolerance
+        place = present.q_start
         if handover is None:
             present.require_rest(now, arm)
             if present.is_about_to_move(self.running, now, LEADS[0]):
@@ -116,13 +114,15 @@ class Revalidation:
             expected = snapshot.start_state_at(
                 handover.running, present.joints.taken, arm
             ).state.positions
-        moved = float(np.abs(present.q_start - expected).max())
-        if not moved <= START_TOLERANCE:
+            place = present.joints.positions
+        moved = float(np.abs(place - expected).max())
+        # A motion that starts further from the arm would begin with a jump.
+        if not moved <= tolerance:
             what = 'moved by' if handover is None else 'deviates from its trajectory by'
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
-                f'{START_TOLERANCE:g} rad',
+                f'{tolerance:g} rad (start_tolerance)',
             )
 
     def _require_proof(self, scene: Scene) -> None:
