@@ -115,7 +115,13 @@ class PlannerNode(Node):
         self._reporter = Reporter(self, inputs, parameters)
         self._monitor = ExecutionMonitor(self, inputs, self._reporter, publishers)
         self._scene_monitor = SceneMonitor(
-            self, parameters, inputs, self._reporter.publish, self._monitor.on_body, self.fail
+            self,
+            parameters,
+            inputs,
+            self._reporter.publish,
+            self._monitor.on_body,
+            self.fail,
+            self._monitor.check_clock,
         )
         self._queue = PlanQueue(
             self,

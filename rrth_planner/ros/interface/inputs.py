@@ -199,6 +199,15 @@ class Inputs:
         # The last bodies, and when they came by the monotonic clock [s].
         self._bodies: deque[tuple[float, WearerBody]] = deque(maxlen=REMEMBERED)
 
+    def shift(self, step: float) -> None:
+        """Take the times of all inputs by a clock that was set forward by a step [s]."""
+        self.body.value = self.body.value.shifted(step)
+        if self.joints.value is not None:
+            self.joints.value = self.joints.value.shifted(step)
+        for source in self.all.values():
+            if source.measured is not None:
+                source.measured += step
+
     def body_came(self) -> None:
         """Remember the present body, to see whether the wearer moves."""
         bodies = self._bodies

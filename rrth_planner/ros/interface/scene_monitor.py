@@ -48,6 +48,8 @@ class SceneMonitor:
         it is the newest of those that came.
     on_error : callable, optional
         Called after an unexpected error, with its name and message.
+    check_clock : callable, optional
+        Called before a message is read: its times are compared with those of others.
 
     """
 
@@ -59,12 +61,14 @@ class SceneMonitor:
         on_change: Callable[[], None] = lambda: None,
         on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
         on_error: Callable[[str], None] = lambda what: None,
+        check_clock: Callable[[], None] = lambda: None,
     ) -> None:
         """Subscribe."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame, self._latency = parameters.base_frame, parameters.body_latency
         self._on_change, self._notify_body = on_change, on_body
+        self._check_clock = check_clock
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
@@ -116,6 +120,8 @@ class SceneMonitor:
 
     def _read_waiting(self) -> None:
         """Read the bodies in their order, until one has to wait for its frame."""
+        if self._waiting:
+            self._check_clock()
         while self._waiting:
             msg, arrival, since = self._waiting.popleft()
             waited = time.monotonic() - since
@@ -160,6 +166,7 @@ class SceneMonitor:
         # Other machines share this topic: messages without any joint of the arm are ignored.
         if not has_joint_of(msg, self._joint_names):
             return
+        self._check_clock()
         now, source = self._now(), self._inputs.joints
         self._take(
             source,

@@ -110,6 +110,17 @@ class JointReading:
         motion = _mean_motion(self, rest_speed)
         return self.positions if motion is None else motion[0]
 
+    def shifted(self, step: float) -> 'JointReading':
+        """Return the reading by a clock that was set forward by a step [s]."""
+        recent = None if self.recent is None else (self.recent[0] + step, self.recent[1])
+        return replace(
+            self,
+            taken=self.taken + step,
+            received=self.received + step,
+            velocities_expire=self.velocities_expire + step,
+            recent=recent,
+        )
+
 
 @functools.lru_cache(maxsize=8)
 def _mean_motion(reading: JointReading, rest_speed: float) -> tuple[Array, Array] | None:

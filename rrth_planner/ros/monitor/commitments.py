@@ -180,6 +180,21 @@ class Commitments:
         """Forget the running motion."""
         self.planned = self.present = self._replaced = None
 
+    def shift(self, step: float) -> None:
+        """Take all times by a clock that was set forward by a step [s]."""
+        self.planned = self.planned and self.planned.shifted(step)
+        self._replaced = self._replaced and self._replaced.shifted(step)
+        present, recent = self.present, [*self._recent]
+        shifted = [replace(c, start_time=c.start_time + step) for c in recent]
+        self._recent = deque(shifted, maxlen=REMEMBERED)
+        if present is not None:
+            # It is one of them, as a rule.
+            found = next((b for a, b in zip(recent, shifted, strict=True) if a is present), None)
+            self.present = found or replace(present, start_time=present.start_time + step)
+        self._body, self._rest = self._body and self._body.shifted(step), None
+        self._came, self._blocked = self._came + step, self._blocked + step
+        self._held_until += step
+
     def hold(self, until: float) -> None:
         """Let the present commitment be the last one until a time [s]."""
         self._held_until = until

@@ -100,6 +100,12 @@ class ExecutionTracker:
         """Track nothing any more."""
         self.motion = self._stopped = self._previous = None
 
+    def shift(self, step: float) -> None:
+        """Take all times by a clock that was set forward by a step [s]."""
+        motions = self.motion, self._stopped, self._previous
+        self.motion, self._stopped, self._previous = (m and m.shifted(step) for m in motions)
+        self._last_on_motion += step
+
     def is_over(self, now: float, rest_speed: float = REST_SPEED) -> bool:
         """
         Return whether the motion, if there is one, has ended and the arm is at rest.
