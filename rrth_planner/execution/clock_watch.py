@@ -58,9 +58,9 @@ def watch_clock(
         if abs(left) <= STEP:
             # What is left counts together with what comes.
             return ClockWatch(node - left, steady, steady), None
-        return ClockWatch(node, steady, steady), _set_by(step, 'clock')
+        return ClockWatch(node, steady, steady), _set_by(step)
     if node < before.node - STEP:
-        return ClockWatch(node, steady, steady), _set_by(node - before.node, 'simulated clock')
+        return ClockWatch(node, steady, steady), _set_by(node - before.node)
     if node > before.node:
         return ClockWatch(node, steady, steady), None
     if steady - before.advanced <= PAUSE:
@@ -69,6 +69,6 @@ def watch_clock(
     return ClockWatch(before.node, steady, math.inf), ClockStep(0.0, sentence)
 
 
-def _set_by(step: float, what: str) -> ClockStep:
+def _set_by(step: float) -> ClockStep:
     direction = 'forward' if step > 0.0 else 'back'
-    return ClockStep(step, f'the {what} was set {direction} by {abs(step):.3f} s')
+    return ClockStep(step, f'the clock was set {direction} by {abs(step):.3f} s')

@@ -203,7 +203,7 @@ def test_a_simulated_clock_that_is_set_back_or_stands_still_stops_the_arm(
         client = under_way(False, (Machine(), Machine()), sim=True)
         if set_back:
             time_now[0] -= set_back
-            words = 'simulated clock was set back'
+            words = 'the clock was set back'
         else:
             is_running.clear()
             words = 'stood still'
