@@ -79,7 +79,7 @@ def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, s
     with ExitStack() as stack:
         client = Encoders()
         remapped = ['--ros-args', '-r', 'joint_states:=exact_states']
-        values = f'separation:={separation}', 'body_timeout:=1.0', 'joint_timeout:=1.0'
+        values = f'separation:={separation}', 'body_timeout:=10.0', 'joint_timeout:=10.0'
         given = ['--ros-args', *(word for value in values for word in ('-p', value))]
         node = 'rrth_planner.ros.{}_node'.format
         stack.enter_context(ChildProcess(node('playback'), remapped, lambda _: None))
