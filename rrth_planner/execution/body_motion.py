@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The wearer from one sight to the next: how old each part is, and whether it kept its speed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 import itertools
 
@@ -55,6 +55,16 @@ class BodyMotion:
     n_seen: int = 0
     n_faster: int = 0
     faster: tuple[tuple[str, float], ...] = ()
+
+    def shifted(self, step: float) -> 'BodyMotion':
+        """Return the wearer by a clock that was set forward by a step [s]."""
+        scene, measured = self.earlier
+        return replace(
+            self,
+            measured=self.measured + step,
+            earlier=(scene, measured + step),
+            until=self.until + step,
+        )
 
 
 def first_sight(scene: Scene, measured: Array) -> BodyMotion:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A commanded motion, and the time within it that an arm has come to, by readings of the arm."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 import math
 
@@ -72,6 +72,10 @@ class ExecutingMotion:
     start_time: float
     target_distance: float = 0.0
     escape_time: float = 0.0
+
+    def shifted(self, step: float) -> 'ExecutingMotion':
+        """Return the motion by a clock that was set forward by a step [s]."""
+        return replace(self, start_time=self.start_time + step)
 
     def phase(self, q: Array, taken: float, now: float) -> float | None:
         """

@@ -123,6 +123,7 @@ class PlannerNode(Node):
             self._monitor.on_body,
             self.fail,
             self._keep_removed,
+            self._monitor.check_clock,
         )
         self._queue = PlanQueue(
             self,

@@ -15,9 +15,10 @@ from rrth_planner.model.trajectory import sample, Trajectory
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import declare_parameters
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.joint_state import JointReading
+from rrth_planner.ros.messages.joint_state import joint_reading
 from rrth_planner.ros.messages.marker_edits import BodyPart
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor
+import samples
 import worlds
 
 ARM = worlds.table_1_arm()
@@ -94,8 +95,9 @@ class Monitored:
 
     def read(self, q, v):
         """Let joint states come."""
-        reading = JointReading(np.array(q), np.array(v), self.now, self.now, float('inf'))
-        self.inputs.joints.value, self.inputs.joints.measured = reading, self.now
+        joints, msg = self.inputs.joints, samples.joints(q, ARM.joint_names, v)
+        joints.value = joint_reading(msg, ARM.joint_names, self.now, joints.value)
+        joints.measured = self.now
 
     def see(self, *boxes, expires=float('inf')):
         """Let a body come."""

@@ -199,7 +199,7 @@ def test_a_motion_whose_time_has_passed_is_planned_anew(ask):
 
 
 def test_an_arm_whose_motion_is_unknown_gets_no_late_motion(ask):
-    outcome, _ = ask(_slow(), 3.0, is_known=False, reading=0.1)
+    outcome, _ = ask(_slow(), 3.0, is_known=False, reading=0.2)
     assert outcome.code is ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE
     assert 'deviates from its trajectory' in outcome.sentence
     assert outcome.trajectory is None

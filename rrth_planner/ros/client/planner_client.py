@@ -33,7 +33,11 @@ from rrth_planner.ros.interface.parameters import (
     PlannerParameters,
 )
 from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
-from rrth_planner.ros.messages.joint_state import configuration_from_msg
+from rrth_planner.ros.messages.joint_state import (
+    configuration_from_msg,
+    joint_reading,
+    JointReading,
+)
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from rrth_planner.ros.middleware.open_subscription import Arrival, OpenSubscription
 from rrth_planner.ros.middleware.parameter_declaration import ARM
@@ -107,6 +111,7 @@ class PlannerClient(Node):
         # Of the arm: other joint states are ignored.
         self.joint_names: tuple[str, ...] = ()
         self.state: JointState | None = None
+        self._reading: JointReading | None = None
         # The commanded motions and the joint states, until they are cleared.
         self.commanded: list[JointTrajectory] = []
         self.observed: list[JointState] = []
@@ -234,7 +239,7 @@ class PlannerClient(Node):
 
     def wait_for_state(self, joint_names: Sequence[str]) -> None:
         """Wait for a joint state of the arm that has these joints."""
-        self.joint_names, self.state = tuple(joint_names), None
+        self.joint_names, self.state, self._reading = tuple(joint_names), None, None
         what = f'{self._joints.topic_name} of {", ".join(joint_names)}'
         self.wait_for(lambda: self.state is not None, what)
 
@@ -246,14 +251,10 @@ class PlannerClient(Node):
 
     def is_still_at(self, q: Array, tolerance: float, speed: float) -> bool:
         """Return whether the arm is so close to q [rad], and no faster than a speed [rad/s]."""
-        if np.abs(self.positions() - q).max() > tolerance:
+        reading = self._reading
+        if reading is None or np.abs(reading.mean_positions() - q).max() > tolerance:
             return False
-        assert self.state is not None
-        names = list(self.state.name)
-        if len(self.state.velocity) != len(names):
-            # Not every driver has velocities.
-            return True
-        return all(abs(self.state.velocity[names.index(n)]) <= speed for n in self.joint_names)
+        return bool((np.abs(reading.mean_velocities()) <= speed).all())
 
     def ask(self, patience: float) -> Trigger.Response:
         """Return the planner's answer; ask again while it lacks a recent input, for a time [s]."""
@@ -303,7 +304,8 @@ class PlannerClient(Node):
 
     def _on_state(self, msg: JointState, _: Arrival) -> None:
         try:
-            configuration_from_msg(msg, self.joint_names)
+            now = self.get_clock().now().nanoseconds * 1e-9
+            self._reading = joint_reading(msg, self.joint_names, now, self._reading)
         except MessageError:
             # Of other joints, or invalid: the last state counts.
             return

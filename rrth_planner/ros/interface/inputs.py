@@ -112,22 +112,23 @@ class InputSnapshot:
     scene: Scene
     goal: PointingGoal
     joints: JointReading
+    rest_speed: float = REST_SPEED
 
     @property
     def q_start(self) -> Array:
-        """Of the reading, shape (dof,) [rad]."""
-        return self.joints.positions
+        """Where the arm rests, shape (dof,) [rad]."""
+        return self.joints.mean_positions(self.rest_speed)
 
     def is_moving(self, now: float) -> bool:
         """Return whether the arm moves at a time [s]."""
-        return self.joints.is_moving(now)
+        return self.joints.is_moving(now, self.rest_speed)
 
     def require_rest(self, now: float, arm: ArmModel) -> None:
         """Raise ArmHasMoved where the arm moves at a time [s]."""
         if self.is_moving(now):
-            raise self._rejection(
-                arm, f'an arm at rest (at most {REST_SPEED:g} rad/s)', ArmHasMoved
-            )
+            expected = f'an arm at rest (at most {self.rest_speed:g} rad/s, rest_speed)'
+            velocities = self.joints.mean_velocities(self.rest_speed)
+            raise _rejection(arm, velocities, expected, ArmHasMoved)
 
     def is_commanded(self, running: ExecutingMotion | None, delay: float) -> bool:
         """Return whether the arm executes a motion, at most so much later than stated [s]."""
@@ -161,7 +162,7 @@ class InputSnapshot:
         """
         joints = self.joints
         if not np.isfinite(joints.velocities).all():
-            raise self._rejection(arm, 'a velocity for every joint')
+            raise _rejection(arm, joints.velocities, 'a velocity for every joint')
         known = None
         if (
             running is not None
@@ -182,7 +183,8 @@ class InputSnapshot:
                 known,
             )
         if not np.isfinite(found.state.positions).all():
-            raise self._rejection(arm, f'a finite position {time - joints.taken:.3f} s later')
+            expected = f'a finite position {time - joints.taken:.3f} s later'
+            raise _rejection(arm, joints.velocities, expected)
         return found
 
     def _localize(self, running: ExecutingMotion) -> tuple[float, float] | None:
@@ -197,14 +199,15 @@ class InputSnapshot:
             found = joints.taken - running.start_time, 1.0
         return found
 
-    def _rejection(
-        self, arm: ArmModel, expected: str, kind: type[RequestError] = RequestError
-    ) -> RequestError:
-        speeds = np.abs(self.joints.velocities)
-        k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
-        speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
-        sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
-        return kind(ErrorCode.START_STATE_INVALID, sentence)
+
+def _rejection(
+    arm: ArmModel, velocities: Array, expected: str, kind: type[RequestError] = RequestError
+) -> RequestError:
+    speeds = np.abs(velocities)
+    k = int(np.argmax(np.where(np.isnan(speeds), np.inf, speeds)))
+    speed = f'{speeds[k]:.3f} {"m/s" if arm.is_prismatic[k] else "rad/s"}'
+    sentence = f'{arm.joint_names[k]} moves at {speed}, expected {expected}'
+    return kind(ErrorCode.START_STATE_INVALID, sentence)
 
 
 class Inputs:
@@ -220,6 +223,15 @@ class Inputs:
         self.joint_rejection: MessageError | None = None
         # The last bodies, and when they came by the monotonic clock [s].
         self._bodies: deque[tuple[float, WearerBody]] = deque(maxlen=REMEMBERED)
+
+    def shift(self, step: float) -> None:
+        """Take the times of all inputs by a clock that was set forward by a step [s]."""
+        self.body.value = self.body.value.shifted(step)
+        if self.joints.value is not None:
+            self.joints.value = self.joints.value.shifted(step)
+        for source in self.all.values():
+            if source.measured is not None:
+                source.measured += step
 
     def body_came(self) -> None:
         """Remember the present body, to see whether the wearer moves."""
@@ -268,7 +280,8 @@ class Inputs:
         """
         body = self.body_at(now, parameters)
         goal = self._goal() if goal is None else goal
-        return InputSnapshot(scene_of(body), goal, self.joints_at(now, parameters.joint_timeout))
+        joints = self.joints_at(now, parameters.joint_timeout)
+        return InputSnapshot(scene_of(body), goal, joints, parameters.rest_speed)
 
     def body_at(
         self, now: float, parameters: PlannerParameters, keep_lost: float = 0.0

@@ -23,7 +23,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import frozen_array
 from rrth_planner.model.errors import ModelError, OptionsError, RrthError, shown
 from rrth_planner.model.separation import BODY_SPEEDS, Separation, SeparationRules
-from rrth_planner.model.trajectory import MotionLimits
+from rrth_planner.model.trajectory import MotionLimits, REST_SPEED
 from rrth_planner.planning.options import ALGORITHMS
 from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reject_unknown, Setting
@@ -39,6 +39,9 @@ TIMEOUTS = {'body_timeout': 0.2, 'joint_timeout': 0.1}
 AUTO, MANUAL = 'auto', 'manual'
 # Whether there is separation always, never, or (auto) unless the body stands still.
 ALWAYS, NEVER = 'true', 'false'
+# Where an arm rests is a mean: 1 mrad of noise at 50 Hz makes 0.35 mrad between two of these. What
+# a controller makes of a start so far from the arm is a step [rad].
+START_TOLERANCE = 2e-3
 
 RULES = SeparationRules()
 SPEEDS = [f'{words}: {speed:g}' for words, speed in BODY_SPEEDS]
@@ -67,6 +70,8 @@ def declared(dof: int) -> tuple[Setting, ...]:
         'the greatest of those that fit'
     )
     late = 'greatest delay with which the controller executes a motion'
+    rest = 'greatest speed of a joint at rest, by the mean of up to 0.3 s'
+    start = 'greatest distance of a joint from where its motion begins'
     resuming = 'whether a motion that stopped for the wearer goes on by itself, or after ~/reset'
     folder = 'folder of incident files; empty: rrth_planner/ of the ROS logs'
     return (
@@ -120,6 +125,8 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('body_error', RULES.body_error, 'm', 'greatest error of a box', 0.0, 1.0),
         Setting('controller_delay', RULES.controller_delay, 's', late, 0.0, 1.0),
         Setting('resume', AUTO, f'{AUTO} or {MANUAL}', resuming),
+        Setting('rest_speed', REST_SPEED, 'rad/s', rest, 1e-4, 0.2),
+        Setting('start_tolerance', START_TOLERANCE, 'rad', start, 1e-5, 0.05),
         *(Setting(f.name, f.default, **f.metadata) for f in OPTIONS.values()),
     )
 
@@ -149,6 +156,10 @@ class PlannerParameters(PlanSettings):
         Names of boxes, or of namespaces.
     incident_folder : str
         Empty: a folder of the ROS logs.
+    rest_speed : float
+        Greatest one of a joint at rest [rad/s].
+    start_tolerance : float
+        Greatest distance of a joint from where its motion begins [rad].
 
     """
 
@@ -166,6 +177,8 @@ class PlannerParameters(PlanSettings):
     required_boxes: tuple[str, ...]
     replan: bool
     incident_folder: str
+    rest_speed: float
+    start_tolerance: float
 
     @property
     def stands_still(self) -> bool:
@@ -203,6 +216,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
     if not values['base_frame']:
         raise OptionsError('base_frame: empty, expected the name of the frame of the wearer')
     own = (*('base_frame', 'body_latency', 'keep_lost', 'replan', 'incident_folder', 'resume'),)
+    tolerances = 'rest_speed', 'start_tolerance'
     if values['resume'] not in (AUTO, MANUAL):
         raise OptionsError(f'resume: "{values["resume"]}", expected {AUTO} or {MANUAL}')
     separates = str(values['separation']).lower()
@@ -235,7 +249,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         controller_delay=rules.controller_delay,
         **timeouts,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
-        **{name: values[name] for name in own},
+        **{name: values[name] for name in (*own, *tolerances)},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
 

@@ -61,6 +61,8 @@ class SceneMonitor:
         Called after an unexpected error, with its name and message.
     keep_removed : callable, optional
         Returns how long a part that is removed now stays where it was [s].
+    check_clock : callable, optional
+        Called before a message is read: its times are compared with those of others.
 
     """
 
@@ -73,12 +75,14 @@ class SceneMonitor:
         on_body: Callable[[WearerBody, int, bool], None] = lambda body, arrived, is_newest: None,
         on_error: Callable[[str], None] = lambda what: None,
         keep_removed: Callable[[], float] = lambda: 0.0,
+        check_clock: Callable[[], None] = lambda: None,
     ) -> None:
         """Subscribe."""
         self._node = node
         self._joint_names = parameters.arm.joint_names
         self._base_frame, self._latency = parameters.base_frame, parameters.body_latency
         self._on_change, self._notify_body = on_change, on_body
+        self._check_clock = check_clock
         self._frames = Frames(node, parameters.base_frame)
         self._warned: dict[tuple[str, str], float] = {}
         self._inputs = inputs
@@ -150,6 +154,8 @@ class SceneMonitor:
 
     def _read_waiting(self) -> None:
         """Read the bodies in their order, until one has to wait for its frame."""
+        if self._waiting:
+            self._check_clock()
         while self._waiting:
             msg, arrival, since, is_description = self._waiting.popleft()
             waited = time.monotonic() - since
@@ -207,6 +213,7 @@ class SceneMonitor:
         # Other machines share this topic: messages without any joint of the arm are ignored.
         if not has_joint_of(msg, self._joint_names):
             return
+        self._check_clock()
         now, source = self._now(), self._inputs.joints
         self._take(
             source,

@@ -56,6 +56,11 @@ class WearerBody:
         known = {key[0] for key, _ in parts}.union(b.name for _, p in parts for b in p.boxes)
         return [name for name in names if name not in known]
 
+    def shifted(self, step: float) -> 'WearerBody':
+        """Return the body by a clock that was set forward by a step [s]."""
+        both = (self.parts, self.lost)
+        return WearerBody(*(tuple((k, p.shifted(step)) for k, p in parts) for parts in both))
+
     def at(self, now: float) -> 'WearerBody':
         """Return the body at a time [s]: parts whose lifetime has passed are lost."""
         is_same = all(part.expires > now for _, part in self.parts)

@@ -56,8 +56,9 @@ ASIDE_AT_REST, NEARER_AT_REST = 3e-4, 0.1
 # An arm may lag behind what is commanded by so much beyond the stated delay, in steps of that [s].
 LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # An arm that has rested for so long [s], while it was commanded further than this [rad], ignores
-# its motion: its controller rejects what it is given. It has moved where it went so far [rad].
-IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
+# its motion: its controller rejects what it is given. It has moved where it rests so far from the
+# start [rad].
+IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 2e-3
 # A commitment is found within so much times what it took lately, and at least so long; one that
 # takes longer than that, or than LATEST, is not published: the arm has gone on meanwhile [s].
 TAKES, FOUND_WITHIN, LATEST = 1.5, 0.002, 0.02
@@ -85,6 +86,13 @@ class Sent:
     motion: ExecutingMotion
     lead: float
 
+    def shifted(self, step: float) -> 'Sent':
+        """Return it by a clock that was set forward by a step [s]."""
+        start = self.commitment.start_time + step
+        return Sent(
+            replace(self.commitment, start_time=start), self.motion.shifted(step), self.lead
+        )
+
 
 class Commitments:
     """
@@ -102,8 +110,8 @@ class Commitments:
         self._sent: Sent | None = None
         # The last ones, in their order: a controller may have rejected one.
         self._recent: deque[Sent] = deque()
-        # Since when the arm rests [s], what was commanded then, and where it was.
-        self._rest: tuple[float, Array, Array] | None = None
+        # Since when the arm rests [s], and what was commanded then.
+        self._rest: tuple[float, Array] | None = None
         self._parameters: PlannerParameters | None = None
         self._body: BodyMotion | None = None
         self._last: WearerBody | None = None
@@ -209,6 +217,22 @@ class Commitments:
         """Forget the running motion."""
         self.planned = self._sent = self._replaced = None
 
+    def shift(self, step: float) -> None:
+        """Take all times by a clock that was set forward by a step [s]."""
+        self.planned = self.planned and self.planned.shifted(step)
+        self._replaced = self._replaced and self._replaced.shifted(step)
+        recent = [*self._recent]
+        shifted = [one.shifted(step) for one in recent]
+        self._recent = deque(shifted)
+        if self._sent is not None:
+            # It is one of them, as a rule.
+            pairs = zip(recent, shifted, strict=True)
+            found = next((after for before, after in pairs if before is self._sent), None)
+            self._sent = found or self._sent.shifted(step)
+        self._body, self._rest = self._body and self._body.shifted(step), None
+        self._came, self._blocked = self._came + step, self._blocked + step
+        self._held_until += step
+
     def hold(self, until: float) -> None:
         """Let the present commitment be the last one until a time [s]."""
         self._held_until = until
@@ -234,16 +258,13 @@ class Commitments:
 
     def is_ignored(self, reading: JointReading | None) -> bool:
         """Take note of where the arm is; return whether it rests while it is to move on."""
-        if reading is None or not self.is_active:
+        if reading is None or self._parameters is None or not self.is_active:
             return False
-        place = self._commanded(reading.taken)
-        since, then, here = self._rest or (reading.taken, place, reading.positions)
-        # Not every driver has velocities.
-        way = float(np.abs(reading.positions - here).max())
-        if reading.is_moving(reading.taken) or way > MOVED:
+        if reading.is_moving(reading.taken, self._parameters.rest_speed):
             self._rest = None
             return False
-        self._rest = since, then, here
+        place = self._commanded(reading.taken)
+        self._rest = since, then = self._rest or (reading.taken, place)
         return (
             reading.taken - since > IGNORED_AFTER
             and float(np.abs(place - then).max()) > IGNORED_WAY
@@ -252,9 +273,10 @@ class Commitments:
 
     def has_moved(self, reading: JointReading | None) -> bool:
         """Return whether the arm is elsewhere than where its motion begins."""
-        if reading is None or self.planned is None:
+        if reading is None or self.planned is None or self._parameters is None:
             return False
-        way = reading.positions - self.planned.trajectory.positions[0]
+        place = reading.mean_positions(self._parameters.rest_speed)
+        way = place - self.planned.trajectory.positions[0]
         return float(np.abs(way).max()) > MOVED
 
     @property
@@ -408,8 +430,12 @@ class Commitments:
         begun = [s for s in self._recent if s.commitment.start_time <= reading.taken]
         if len(begun) < 2:
             return False
-        last = begun[-1].commitment
-        is_at_rest = last.end_time < reading.taken and not reading.is_moving(reading.taken)
+        rest_speed = self._parameters.rest_speed
+        is_at_rest = begun[-1].commitment.end_time < reading.taken and not reading.is_moving(
+            reading.taken, rest_speed
+        )
+        if is_at_rest:
+            reading = replace(reading, positions=reading.mean_positions(rest_speed))
         aside, nearer = (ASIDE_AT_REST, NEARER_AT_REST) if is_at_rest else (ASIDE, NEARER)
         gap = np.inf
         # What was commanded until then, by all of them in turn.

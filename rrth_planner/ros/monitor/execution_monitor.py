@@ -22,6 +22,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
+from rrth_planner.execution.clock_watch import ClockStep, ClockWatch, watch_clock
 from rrth_planner.execution.command import begin_of, lead_in, rest_at, stop_along
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
@@ -61,6 +62,11 @@ MARGIN_LEFT = 0.5
 PATIENCE = 0.3
 # Why a whole motion is stopped that began beside a body that stands still.
 STREAM_BEGAN = 'bodies come as a stream now: from here on motions are proven separate from it'
+# Clocks are read at once where that takes no longer [s].
+AT_ONCE = 1e-3
+# So long after the clock was set no motion begins: what was measured before, and came after, is
+# too young or too old [s].
+SETTLING = 0.5
 # Why a motion is given up.
 TOO_NEAR = 'the wearer is too near for the motion to continue'
 NOT_FOLLOWED = 'the arm is at rest off its motion, and does not follow it'
@@ -149,6 +155,12 @@ class ExecutionMonitor:
         # proven and the stop is not: the motion that it ends.
         self._withheld_stop: ExecutingMotion | None = None
         self._stops: deque[Stop] = deque(maxlen=10)
+        # The node's clock beside the steady one; by that one, until when no motion begins [s], and
+        # why.
+        self._clocks: ClockWatch | None = None
+        self._settled, self._unsettled_by = -math.inf, ''
+        # Whether the next stop begins on reception: the controller's clock may not have stepped.
+        self._is_unstamped = False
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._on_timer, clock=steady)
@@ -185,13 +197,20 @@ class ExecutionMonitor:
         with self._lock:
             if self._is_closed:
                 raise RequestError(ErrorCode.PREEMPTED, 'the planner is shutting down')
+            self._check_clock()
+            if time.monotonic() < self._settled:
+                raise RequestError(
+                    ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                    f'{self._unsettled_by} less than {SETTLING:g} s ago: the ages of body and '
+                    'joints are not known yet',
+                )
             before = copy(self._tracker), self._parameters, self._goal, self._state
             commitments = copy(self._commitments)
             try:
                 now, delay = self._now(), parameters.controller_delay
                 lead = self._lead_in(planned, joins, now, delay)
                 commanded = self._commitments.begin(planned, parameters, lead)
-                self._tracker.begin(commanded, now, delay)
+                self._tracker.begin(commanded, now, delay, parameters.rest_speed)
                 self._parameters, self._goal = parameters, goal
                 self._state, self._in_the_way_since = MonitorState.MONITORING, None
                 publish()
@@ -203,7 +222,7 @@ class ExecutionMonitor:
                 self._commitments = commitments
                 raise
             self.n_motions += 1
-            self._withheld_stop = None
+            self._withheld_stop, self._is_unstamped = None, False
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
 
@@ -256,12 +275,57 @@ class ExecutionMonitor:
         """
 
         def check() -> None:
+            self._check_clock()
             separation = self._reporter.parameters.separation
             self._commitments.observe(body, separation, self._now())
             if is_newest:
                 self._check_remaining_motion(body, arrived)
 
         self._run_fail_safe(check)
+
+    def check_clock(self) -> None:
+        """Stop the arm where the node's clock has stepped; called before a message is read."""
+        self._run_fail_safe(self._check_clock)
+
+    def _check_clock(self) -> None:
+        before = time.monotonic()
+        now = self._node.get_clock().now().nanoseconds * 1e-9
+        after = time.monotonic()
+        if after - before > AT_ONCE:
+            return
+        is_simulated = self._node.get_parameter('use_sim_time').value
+        steady = 0.5 * (before + after)
+        self._clocks, found = watch_clock(self._clocks, now, steady, is_simulated)
+        if found is not None:
+            self._take_step(found)
+
+    def _take_step(self, found: ClockStep) -> None:
+        """
+        Stop the arm because the node's clock has stepped or is paused; the lock is held.
+
+        All times that are known are taken by the new clock: where the arm is, and how old things
+        are, does not change by a step.
+        """
+        for source in (self._inputs, self._tracker, self._commitments):
+            source.shift(found.step)
+        if self._in_the_way_since is not None:
+            self._in_the_way_since += found.step
+        self._withheld_stop = self._withheld_stop and self._withheld_stop.shifted(found.step)
+        self._settled, self._unsettled_by = time.monotonic() + SETTLING, found.sentence
+        # Nor is what is planned meanwhile published.
+        self.stop_reason, self.n_stops = found.sentence, self.n_stops + 1
+        with suppress(Exception):
+            self._node.get_logger().error(found.sentence)
+        running, now = self.running, self._now()
+        if running is not None and self._state is MonitorState.STOPPING and self.is_active(now):
+            # A controller by the same clock has jumped along its stop.
+            phase = self._phase_or_elapsed(running, now)
+            if phase is not None and phase < running.trajectory.duration:
+                stop = self._stop_of(running, phase, now)
+                self._publishers.publish_motion(stop.trajectory, self._parameters, 0.0)
+                self._tracker.repeat_stop(stop)
+        self._is_unstamped = True
+        self.fail(found.sentence)
 
     def hold(self, until: float) -> ExecutingMotion | None:
         """
@@ -495,6 +559,7 @@ class ExecutionMonitor:
         self._run_fail_safe(self._check_periodically)
 
     def _check_periodically(self) -> None:
+        self._check_clock()
         self._tracker.check_command(self._now())
         if self._state is not MonitorState.IDLE:
             self._check_inputs()
@@ -592,7 +657,7 @@ class ExecutionMonitor:
         is_waiting = self._state is MonitorState.MONITORING and (
             self._commitments.waits_for_reset(now)
         )
-        if self._tracker.is_over(now) and not is_waiting:
+        if self._tracker.is_over(now, self._parameters.rest_speed) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion(TOO_NEAR)
             self._end_motion()
@@ -696,10 +761,12 @@ class ExecutionMonitor:
             before = copy(self._tracker)
             self._tracker.stop(stop)
             try:
-                self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
+                begin = 0.0 if self._is_unstamped else stop.start_time
+                self._publishers.publish_motion(stop.trajectory, self._parameters, begin)
             except Exception:
                 self._tracker = before
                 raise
+            self._is_unstamped = False
         # From here on nothing may raise: the same stop would be published again.
         self._state, self.stop_reason, self.pending_stop = MonitorState.STOPPING, why, ''
         self.n_stops += 1

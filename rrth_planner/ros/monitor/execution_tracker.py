@@ -6,7 +6,6 @@ import functools
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.ros.interface.inputs import Input
 from rrth_planner.ros.messages.joint_state import JointReading
@@ -14,8 +13,6 @@ from rrth_planner.ros.messages.joint_state import JointReading
 # An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
 # long is lost [s].
 GRACE = 0.5
-# An arm is at rest where it moves no further than at `REST_SPEED` for this time [s].
-STILL = 0.1
 # An arm that is further from its motion than this [rad] executes another one where the distance to
 # that is less than this share.
 ASIDE, NEARER = 0.02, 0.25
@@ -24,25 +21,6 @@ ASIDE, NEARER = 0.02, 0.25
 OFF_COMMAND, OFF_AFTER = 0.01, 0.3
 # Spacing of the samples of a stop [s].
 SPACING = 2e-3
-
-
-class MotionDetector:
-    """Whether an arm moves, by its velocities and positions: not every driver has velocities."""
-
-    def __init__(self) -> None:
-        """Begin without a reading."""
-        self._place: Array = np.zeros(0)
-        self._then = 0.0
-
-    def is_moving(self, reading: JointReading, now: float) -> bool:
-        """Return whether the arm moves at a time [s], by its last readings."""
-        q = reading.positions
-        if self._place.shape != q.shape or np.abs(q - self._place).max() > REST_SPEED * STILL:
-            self._place, self._then = q, now
-            return True
-        # After a step back of the clock the elapsed time is unknown; NaN is not at rest.
-        is_fast = not (np.abs(reading.velocities) <= REST_SPEED).all()
-        return is_fast or abs(now - self._then) < STILL
 
 
 def has_missed_stop(
@@ -95,25 +73,36 @@ class ExecutionTracker:
         """Begin with no motion."""
         self.motion: ExecutingMotion | None = None
         # What the controller was given last, also after its end; None: that is not known. Since
-        # when the arm rests off it [s], and how late the controller may be [s].
+        # when the arm rests off it [s], how late the controller may be [s], and at which speed
+        # the arm rests [rad/s].
         self.command: ExecutingMotion | None = None
         self._off_since: float | None = None
-        self._delay = 0.0
+        self._delay, self._rest_speed = 0.0, REST_SPEED
         # Whether that is the last commanded one.
         self.is_latest = True
-        self._joints, self._detector = joints, MotionDetector()
+        self._joints = joints
         # The motion that the present stop ends, and the one that the last motion replaced.
         self._stopped: ExecutingMotion | None = None
         self._previous: ExecutingMotion | None = None
         # When the arm was last found on its motion [s].
         self._last_on_motion = 0.0
 
-    def begin(self, motion: ExecutingMotion, now: float, delay: float = 0.0) -> None:
-        """Track a motion of a controller that is at most `delay` late, from its beginning [s]."""
-        phase = None if self.is_over(now) else self.phase(now)
+    def begin(
+        self,
+        motion: ExecutingMotion,
+        now: float,
+        delay: float = 0.0,
+        rest_speed: float = REST_SPEED,
+    ) -> None:
+        """
+        Track a motion of a controller that is at most `delay` late, from its beginning [s].
+
+        An arm rests where no joint is faster than a speed [rad/s].
+        """
+        phase = None if self.is_over(now, rest_speed) else self.phase(now)
         self._previous = None if phase is None else self.motion
         self._command(motion)
-        self._stopped, self._delay = None, delay
+        self._stopped, self._delay, self._rest_speed = None, delay, rest_speed
         self.is_latest, self._last_on_motion = True, now
 
     def replace(self, motion: ExecutingMotion) -> None:
@@ -147,7 +136,7 @@ class ExecutionTracker:
         # Joint states that do not come any more are those of an arm that stays.
         taken = max(reading.taken, now - lag)
         is_off = command.deviation(reading.positions, taken, lag) > OFF_COMMAND
-        if not is_off or reading.is_moving(now):
+        if not is_off or reading.is_moving(now, self._rest_speed):
             self._off_since = None
         elif self._off_since is None:
             self._off_since = now
@@ -169,17 +158,24 @@ class ExecutionTracker:
         self.motion = self.command = motion
         self._off_since = None
 
-    def is_over(self, now: float) -> bool:
-        """Return whether the motion, if there is one, has ended and the arm is at rest."""
+    def shift(self, step: float) -> None:
+        """Take all times by a clock that was set forward by a step [s]."""
+        motions = self.motion, self._stopped, self._previous
+        self.motion, self._stopped, self._previous = (m and m.shifted(step) for m in motions)
+        self.command = self.motion or (self.command and self.command.shifted(step))
+        self._last_on_motion, self._off_since = self._last_on_motion + step, None
+
+    def is_over(self, now: float, rest_speed: float = REST_SPEED) -> bool:
+        """
+        Return whether the motion, if there is one, has ended and the arm is at rest.
+
+        There no joint is faster than a speed [rad/s].
+        """
         motion, reading = self.motion, self._joints.value
         if motion is None or reading is None:
             return False
         since = now - motion.start_time - motion.trajectory.duration
-        if since <= GRACE - 2.0 * STILL:
-            # The test for standstill costs time that a stop may have to wait for.
-            return False
-        is_moving = self._detector.is_moving(reading, now)
-        return since > GRACE and not is_moving
+        return since > GRACE and not reading.is_moving(now, rest_speed)
 
     def phase(self, now: float) -> float | None:
         """Return the time within the motion [s]; None where the arm is not on it."""

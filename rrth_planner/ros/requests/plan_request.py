@@ -30,7 +30,7 @@ from rrth_planner.ros.requests.pace import (
     require_long_enough,
     slower,
 )
-from rrth_planner.ros.requests.revalidation import Revalidation, START_TOLERANCE
+from rrth_planner.ros.requests.revalidation import Revalidation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,10 +157,10 @@ def plan_request(
             if plan.trajectory is None or code is not ErrorCode.SUCCESS:
                 return outcome
             gap = float(np.abs(plan.trajectory.positions[0] - question.q_start).max())
-            if not gap <= START_TOLERANCE:
+            if not gap <= parameters.start_tolerance:
                 raise RrthError(
                     f'the planned motion begins {gap:.4f} rad from the start that was asked for, '
-                    f'expected at most {START_TOLERANCE:g} rad'
+                    f'expected at most {parameters.start_tolerance:g} rad'
                 )
             if handover is not None:
                 if clock() > handover.time:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 import time
 from typing import Any
 
-import numpy as np
 from rclpy.action import CancelResponse
 from rclpy.action.server import ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -15,7 +14,6 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.io.settings import LOWEST_LIMIT
 from rrth_planner.model.arm import pointing_angle
-from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
 from rrth_planner.model.goal import PacedGoal
 from rrth_planner.ros.interface.inputs import Inputs
@@ -35,8 +33,6 @@ from rrth_planner.ros.requests.request_queue import PlanQueue
 PERIOD = 0.05
 # An arm that rests has arrived where its ray misses the target by no greater angle [rad].
 ARRIVED = 2e-3
-# Its joints move by no more than this in a period then [rad].
-STILL = 1e-4
 # Not before this time after its motion was published, which begins a little later [s].
 EARLIEST = 0.3
 # Results are kept for clients that ask late for so long [s].
@@ -53,8 +49,6 @@ class _Pursuit:
     goal: PacedGoal
     # By the monotonic clock; None: no motion to it is published yet [s].
     commanded: float | None = None
-    # Where the arm was in the period before, shape (dof,) [rad].
-    place: Array | None = None
     ended: Future = field(default_factory=Future)
 
 
@@ -171,7 +165,6 @@ class PointHeadServer:
                 # Also one whose motion was published meanwhile.
                 self._stop(pursuit)
             end = self._end_of(pursuit, reading, angle)
-            pursuit.place = None if reading is None else reading.positions
             if end is not None:
                 pursuit.ended.set_result(end)
 
@@ -186,13 +179,18 @@ class PointHeadServer:
         if monitor.goal is not goal:
             return ErrorCode.PREEMPTED, CANCELLED if is_cancelled else REPLACED
         now = self._node.get_clock().now().nanoseconds * 1e-9
-        if reading is not None and reading.is_moving(now):
+        rest_speed = self._reporter.parameters.rest_speed
+        if reading is not None and reading.is_moving(now, rest_speed):
             return None
+        if reading is not None:
+            # At rest the mean counts: encoders are noisy.
+            arm = self._reporter.parameters.arm
+            angle = pointing_angle(arm, reading.mean_positions(rest_speed), goal.target)
         if monitor.is_active(now):
             is_early = time.monotonic() - pursuit.commanded < EARLIEST
             if is_early or is_cancelled or not monitor.is_monitoring:
                 return None
-            return _arrival(angle) if _is_still(reading, pursuit.place) else None
+            return _arrival(angle)
         if is_cancelled:
             return ErrorCode.PREEMPTED, f'{CANCELLED}, and the arm rests'
         return self._outcome_at_rest(goal, angle)
@@ -218,10 +216,3 @@ def _arrival(angle: float | None) -> tuple[ErrorCode, str] | None:
     if angle is None or not angle <= ARRIVED:
         return None
     return ErrorCode.SUCCESS, f'the arm has arrived, pointing error {angle:.6f} rad'
-
-
-def _is_still(reading: JointReading | None, place: Array | None) -> bool:
-    """Return whether an arm is where it was a period before, shape (dof,) [rad]."""
-    if reading is None or place is None:
-        return False
-    return bool(np.abs(reading.positions - place).max() <= STILL)

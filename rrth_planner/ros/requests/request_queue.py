@@ -11,7 +11,6 @@ import time
 import traceback
 
 from nav_msgs.msg import Path
-import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
@@ -19,7 +18,7 @@ from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.trajectory import REST_SPEED, Trajectory
+from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.ros.interface.inputs import Inputs, RequestError
 from rrth_planner.ros.interface.parameters import PlannerParameters
@@ -112,18 +111,18 @@ class _Resumption:
     is_during_stop: bool
     is_first: bool = True
 
-    def is_due(self, joints: JointReading | None) -> bool:
+    def is_due(self, joints: JointReading | None, rest_speed: float) -> bool:
         """
         Return whether to try now: during the stop, or once a reading after it has the arm at rest.
 
-        Also once the time to wait for that is up.
+        At rest it is no faster than a speed [rad/s]. Also once the time to wait for that is up.
         """
         if self.is_during_stop or time.monotonic() >= self.latest:
             return True
         return (
             joints is not None
             and joints.received >= self.stopped
-            and bool((np.abs(joints.velocities) <= REST_SPEED).all())
+            and not joints.is_moving(joints.taken, rest_speed)
         )
 
 
@@ -404,9 +403,10 @@ class PlanQueue:
             scene = scene_of(self._inputs.body_at(now, parameters))
         except RequestError:
             return False
-        if joints.is_moving(now):
+        if joints.is_moving(now, parameters.rest_speed):
             return False
-        q, margin, length = joints.positions, parameters.margin, parameters.ray_guard_length
+        q = joints.mean_positions(parameters.rest_speed)
+        margin, length = parameters.margin, parameters.ray_guard_length
         is_free = is_place_free(q, arm, scene, margin, length)
         return not is_free and is_place_free(q, arm, scene, margin, 0.0)
 
@@ -518,7 +518,7 @@ class PlanQueue:
             return
         if self._is_overtaken(resumption):
             self._discard_resumption()
-        elif resumption.is_due(self._inputs.joints.value):
+        elif resumption.is_due(self._inputs.joints.value, self._reporter.parameters.rest_speed):
             self._resumption = None
             self.prepare(partial(self._resume, resumption))
 

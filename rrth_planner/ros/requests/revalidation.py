@@ -26,9 +26,6 @@ from rrth_planner.ros.monitor.execution_monitor import MARGIN_LEFT
 from rrth_planner.ros.monitor.execution_tracker import OFF_COMMAND
 from rrth_planner.ros.requests.handover import Handover, LEADS
 
-# A motion that starts further from the arm than this would begin with a jump [rad].
-START_TOLERANCE = 1e-3
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Revalidation:
@@ -110,6 +107,7 @@ class Revalidation:
         """Raise ArmHasMoved where the arm is not at the start of the motion."""
         snapshot, handover, arm = self.snapshot, self.handover, self.parameters.arm
         delay, expected, what = self.parameters.controller_delay, snapshot.q_start, 'moved by'
+        place, tolerance = present.q_start, self.parameters.start_tolerance
         if handover is None:
             present.require_rest(now, arm)
             if present.is_about_to_move(self.running, now, LEADS[0] + ahead(delay), delay):
@@ -119,7 +117,8 @@ class Revalidation:
                 )
         elif handover.is_commanded:
             assert handover.running is not None
-            aside = handover.running.deviation(present.q_start, present.joints.taken, delay)
+            joints = present.joints
+            aside = handover.running.deviation(joints.positions, joints.taken, delay)
             if not aside <= FOLLOWS:
                 raise ArmHasMoved(
                     ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
@@ -132,12 +131,14 @@ class Revalidation:
             expected = snapshot.start_state_at(
                 handover.running, present.joints.taken, arm, delay
             ).state.positions
-        moved = float(np.abs(present.q_start - expected).max())
-        if not moved <= START_TOLERANCE:
+            place = present.joints.positions
+        moved = float(np.abs(place - expected).max())
+        # A motion that starts further from the arm would begin with a jump.
+        if not moved <= tolerance:
             raise ArmHasMoved(
                 ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
                 f'the arm {what} {moved:.4f} rad while its motion was planned, expected at most '
-                f'{START_TOLERANCE:g} rad',
+                f'{tolerance:g} rad (start_tolerance)',
             )
         aside = float(np.abs(present.q_start - self._motion.positions[0]).max())
         if handover is None and not aside <= OFF_COMMAND:
@@ -151,8 +152,9 @@ class Revalidation:
         """Raise RequestError where the arm, beside what it is commanded, is near the wearer."""
         parameters = self.parameters
         left = MARGIN_LEFT * parameters.margin
+        q = present.joints.positions
         if self.plan.escape_time == 0.0 and not is_place_free(
-            present.q_start, parameters.arm, present.scene, left, parameters.ray_guard_length
+            q, parameters.arm, present.scene, left, parameters.ray_guard_length
         ):
             raise RequestError(
                 ErrorCode.START_STATE_IN_COLLISION,
