@@ -19,6 +19,12 @@ from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, samp
 # A motion is rejected where it exceeds a limit by more than this share.
 EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
+# What lets the arm accept a motion that exceeds one.
+SLOWER = ': max_velocity of the arm must be no lower than that of the planner'
+SOFTER = (
+    ': max_acceleration of the arm must be no lower than max_acceleration and stop_acceleration '
+    'of the planner'
+)
 # A motion that ends later than this is rejected [s].
 LONGEST_WAIT = 3600.0
 # Matrices to Bernstein form, by number of coefficients; and the factors that differentiation
@@ -223,10 +229,17 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
     first = c[:, 1:] * _POWERS * rates
     second = first[:, 1:] * _POWERS[:4] * rates
     v, a = top * rules.limits.velocity, top * rules.limits.acceleration
-    for what, unit, polynomials, low, high in (
-        ('position', 'rad', c, arm.bounds[0] - BOUND_TOLERANCE, arm.bounds[1] + BOUND_TOLERANCE),
-        ('velocity', 'rad/s', first, -v, v),
-        ('acceleration', 'rad/s^2', second, -a, a),
+    for what, unit, polynomials, low, high, hint in (
+        (
+            'position',
+            'rad',
+            c,
+            arm.bounds[0] - BOUND_TOLERANCE,
+            arm.bounds[1] + BOUND_TOLERANCE,
+            '',
+        ),
+        ('velocity', 'rad/s', first, -v, v, SLOWER),
+        ('acceleration', 'rad/s^2', second, -a, a, SOFTER),
     ):
         n, size, dof = polynomials.shape
         control = np.swapaxes(_TO_BERNSTEIN[size] @ polynomials, 0, 1).reshape(size, n * dof)
@@ -236,7 +249,7 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
             instant = trajectory.times[k] + share * durations[k]
             raise MessageError(
                 f'{arm.joint_names[i]}: {what} {value:.6g} at {instant:.6g} s, '
-                f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]'
+                f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]{hint}'
             )
 
 

@@ -33,7 +33,7 @@ from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.model.errors import MessageError, RrthError  # noqa: E402
 from rrth_planner.model.trajectory import Trajectory  # noqa: E402
 from rrth_planner.ros.client import dry_run, follow_motion  # noqa: E402
-from rrth_planner.ros.client.answer_parser import answer_from_text  # noqa: E402
+from rrth_planner.ros.client.answer_parser import Answer, answer_from_text  # noqa: E402
 from rrth_planner.ros.client.follow_motion import announced_motion, follow  # noqa: E402
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient  # noqa: E402
 from rrth_planner.ros.messages.body import scene_of, WearerBody
@@ -370,7 +370,7 @@ def test_a_motion_of_another_machine_is_ignored(client):
         client._on_state(joints(FOLDED[:2]), ARRIVAL)
 
     client.take_messages = take_messages
-    follow(client, arm, first, None, 1e-3)
+    follow(client, arm, first, None, 1e-3, Answer(ErrorCode.SUCCESS, '', {}))
     assert client.positions().tolist() == second.positions[-1].tolist()
 
 
@@ -386,7 +386,8 @@ def test_joint_positions_that_are_none_do_not_count(client):
 def test_an_answer_is_read_back():
     answer = answer_from_text(
         'SUCCESS (1): 2 waypoints, duration 1.426 s, path length 1.9430 rad, least clearance '
-        '-0.0389 m, planning time 3.90 ms, seed 1043618065; improvement ended by the time limit'
+        '-0.0389 m, planning time 3.90 ms, seed 1043618065; improvement ended by the time limit; '
+        'request 12'
     )
     assert answer.code is ErrorCode.SUCCESS
     assert answer.figures == {
@@ -396,6 +397,7 @@ def test_an_answer_is_read_back():
         'least_clearance': -0.0389,
         'planning_time_ms': 3.9,
         'seed': 1043618065,
+        'request': 12,
     }
     assert answer_from_text('NO_IK_SOLUTION (-31): no, seed 7').figures == {'seed': 7}
     for text in ('', 'SUCCESS', 'SUCCESS (2): what'):

@@ -59,6 +59,15 @@ class PlanPublishers:
         """Publish the message of a planned motion: to the arm, or with separation to be seen."""
         (self._planned or self._trajectory).publish(msg)
 
+    @property
+    def motion_topic(self) -> str:
+        """The resolved name of the topic on which the controller is to listen."""
+        return str(self._trajectory.topic_name)
+
+    def has_listener(self) -> bool:
+        """Return whether anybody is subscribed to that topic."""
+        return int(self._trajectory.get_subscription_count()) > 0
+
     def assert_liveliness(self) -> None:
         """Assert that the running motion is monitored."""
         if self._planned is None:

@@ -57,6 +57,8 @@ LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # An arm that has rested for so long [s], while it was commanded further than this [rad], ignores
 # its motion: its controller rejects what it is given. It has moved where it went so far [rad].
 IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 1e-3
+# The same of a motion that was given as a whole, without separation: some arms begin late [s].
+IGNORED_WHOLE_AFTER = 1.0
 # A commitment that takes longer to find is not published: the arm has gone on meanwhile. After so
 # long the controller has one that is published [s].
 LATEST, ARRIVAL = 0.02, 0.005
@@ -177,7 +179,7 @@ class Commitments:
 
     def end(self) -> None:
         """Forget the running motion."""
-        self.planned = self.present = self._replaced = None
+        self.planned = self.present = self._replaced = self._rest = None
 
     def hold(self, until: float) -> None:
         """Let the present commitment be the last one until a time [s]."""
@@ -195,11 +197,14 @@ class Commitments:
             return True
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
-    def is_ignored(self, reading: JointReading | None) -> bool:
+    def is_ignored(self, reading: JointReading | None, running: ExecutingMotion) -> bool:
         """Take note of where the arm is; return whether it rests while it is to move on."""
-        if reading is None or not self.is_active:
+        if reading is None:
             return False
-        place = self._commanded(reading.taken)
+        if self.is_active:
+            place, after = self._commanded(reading.taken), IGNORED_AFTER
+        else:
+            place, after = _place_on(running, reading.taken), IGNORED_WHOLE_AFTER
         since, then, here = self._rest or (reading.taken, place, reading.positions)
         # Not every driver has velocities.
         way = float(np.abs(reading.positions - here).max())
@@ -208,17 +213,19 @@ class Commitments:
             return False
         self._rest = since, then, here
         return (
-            reading.taken - since > IGNORED_AFTER
+            reading.taken - since > after
             and float(np.abs(place - then).max()) > IGNORED_WAY
             and float(np.abs(place - reading.positions).max()) > ASIDE
         )
 
-    def has_moved(self, reading: JointReading | None) -> bool:
-        """Return whether the arm is elsewhere than where its motion begins."""
-        if reading is None or self.planned is None:
+    def has_moved(
+        self, reading: JointReading | None, running: ExecutingMotion, least: float = MOVED
+    ) -> bool:
+        """Return whether the arm is further than that [rad] from where its motion begins."""
+        if reading is None:
             return False
-        way = reading.positions - self.planned.trajectory.positions[0]
-        return float(np.abs(way).max()) > MOVED
+        way = reading.positions - (self.planned or running).trajectory.positions[0]
+        return float(np.abs(way).max()) > least
 
     @property
     def is_whole(self) -> bool:
@@ -422,6 +429,13 @@ class Commitments:
                 '' if blocked is None else blocked.box,
             )
         )
+
+
+def _place_on(motion: ExecutingMotion, time: float) -> Array:
+    """Return where a motion is at a time [s], (dof,) [rad]."""
+    elapsed = min(max(time - motion.start_time, 0.0), motion.trajectory.duration)
+    place: Array = positions_at(motion.trajectory, [elapsed])[0]
+    return place
 
 
 def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> float:
