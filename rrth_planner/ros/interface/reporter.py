@@ -116,7 +116,7 @@ class Reporter:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
             node.create_timer(PERIOD, self._publish, clock=steady),
-            node.create_timer(SHORTEST_PERIOD, self._publish_change, clock=steady),
+            node.create_timer(SHORTEST_PERIOD, self._publish_changes, clock=steady),
         ]
 
     def remaining_motion_checked(self, elapsed: float) -> None:
@@ -175,6 +175,8 @@ class Reporter:
     def unfollowed(self, level: bytes, sentence: str) -> None:
         """Publish that the arm does not follow what it is given, or, with OK, that it does."""
         self._unfollowed = level, sentence
+        if sentence:
+            self._node.get_logger().warning(sentence)
         self.publish_soon()
         if self._trouble() != self._published_trouble:
             self._publish_state()
@@ -188,7 +190,7 @@ class Reporter:
         """Publish that the goal of that request is not pursued any more."""
         self._given_up = one_line(why)
         self._node.get_logger().warning(f'goal of request {self._request} given up: {why}')
-        self.publish()
+        self._publish()
 
     def nothing_runs(self) -> None:
         """Publish that no motion is executed, and none will be without a request."""
@@ -215,6 +217,12 @@ class Reporter:
         if self._is_changed and time.monotonic() - self._published >= SHORTEST_PERIOD:
             self._publish()
 
+    def _publish_changes(self) -> None:
+        self._publish_change()
+        # Here only, in the node's own thread: an older state must not be the last one.
+        if self._trouble() != self._published_trouble:
+            self._publish_state()
+
     def _publish(self) -> None:
         with self._lock:
             self._published, self._is_changed = time.monotonic(), False
@@ -224,8 +232,6 @@ class Reporter:
             msg = DiagnosticArray(status=[self._status(now.nanoseconds * 1e-9)])
             msg.header.stamp = now.to_msg()
             self._publisher.publish(msg)
-        if self._trouble() != self._published_trouble:
-            self._publish_state()
 
     def _status(self, now: float) -> DiagnosticStatus:
         report, body = self.report, self._inputs.body.value.at(now)
@@ -266,7 +272,10 @@ class Reporter:
         level, message = summary(now, self._inputs, self.parameters, report)
         monitored = self.monitor_level, self.monitor_state[1]
         separated = LEVELS[self._separation.state], self._separation.text
-        found = (self._unfollowed, (level, message), monitored, separated)
+        found = [(level, message), monitored, separated]
+        if self._unfollowed[1]:
+            # Of the same level it is the first to be mended.
+            found.insert(0, self._unfollowed)
         level, message = max(found, key=lambda one: SEVERITY.index(one[0]))
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
         return status_to_msg(name, level, message, values)

@@ -126,7 +126,8 @@ INTERFACES = {
             '~/state',
             'diagnostic_msgs/msg/DiagnosticStatus',
             'latched: NORMAL, SLOWED, PROTECTIVE_STOP or FAULT, with cause, rate, part of the arm '
-            'and box',
+            'and box. WARN or ERROR also where the arm does not follow its motion, or holds its '
+            'position',
             separation=True,
         ),
         _published(
@@ -142,7 +143,13 @@ INTERFACES = {
             MARKERS,
             'latched: body with margin, arm at start and goal, ray, tool path',
         ),
-        _published('/diagnostics', DIAGNOSTICS, '1 Hz and on change'),
+        _published(
+            '/diagnostics',
+            DIAGNOSTICS,
+            '1 Hz and on change: inputs, the last answer, what the monitor does, whether the arm '
+            'follows; `request`: the number of the last request with a motion, as its answer has '
+            'it, `given up`: why its goal is not pursued any more, if the arm has not arrived',
+        ),
     ),
     'arm_playback': (
         _subscribed(

@@ -587,13 +587,13 @@ class ExecutionMonitor:
             if not self._is_ignored:
                 self._note_ignored(NOT_FOLLOWED, self._commitments.has_moved(reading, running))
         else:
-            self._note_ignored(NOT_FOLLOWED, self._commitments.has_moved(reading, running))
             now = self._now()
             if self._commitments.is_whole:
                 # One that is only late would execute all of it.
                 stop = self._stop_of(running, 0.0, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
                 self._tracker.stop(stop)
+            self._note_ignored(NOT_FOLLOWED, self._commitments.has_moved(reading, running))
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
 
@@ -775,6 +775,7 @@ class ExecutionMonitor:
         sentence = f'{why}: motion given up'
         self._set_state(MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence)
         self._node.get_logger().warning(sentence)
+        self._commitments.fail(why, is_fault=False)
         self._record_stop(running.trajectory, None, is_replanned)
 
     def _end_motion(self) -> None:

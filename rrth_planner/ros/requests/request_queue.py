@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 import math
@@ -236,6 +237,9 @@ class PlanQueue:
         self._is_closed = True
         self.cancel()
         self._monitor.close()
+        # Who waits is told, as far as that is possible.
+        with suppress(Exception):
+            self._note_end()
         self._worker.shutdown(wait=True, cancel_futures=True)
         self._planner.close()
 
