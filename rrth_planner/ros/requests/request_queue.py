@@ -237,7 +237,7 @@ class PlanQueue:
         self._is_closed = True
         self.cancel()
         self._monitor.close()
-        # Who waits is told, as far as that is possible.
+        # Who waits hears of it, as far as that is possible.
         with suppress(Exception):
             self._note_end()
         self._worker.shutdown(wait=True, cancel_futures=True)
