@@ -462,9 +462,9 @@ class DemoClient(PlannerClient):
                     moved = time.monotonic()
                 elif q_aims(q):
                     return
-                if self.level == DiagnosticStatus.ERROR:
-                    # To ask again does not help.
-                    raise DemoError(self.message)
+            if self.level == DiagnosticStatus.ERROR:
+                # To ask again does not help.
+                raise DemoError(self.message)
         raise DemoError(f'the arm did not aim at its target within {self.timeout:g} s: {sentence}')
 
 

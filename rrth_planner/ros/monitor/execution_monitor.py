@@ -626,7 +626,9 @@ class ExecutionMonitor:
         if reading is None or running is None or self._is_ignored:
             return self._is_ignored
         gap = np.abs(reading.positions - running.trajectory.positions[-1]).max()
-        if not self._commitments.is_active and gap > MAX_DEVIATION:
+        # An older reading says nothing of that.
+        is_new = reading.taken > running.start_time + running.trajectory.duration
+        if is_new and gap > MAX_DEVIATION and not self._commitments.is_active:
             self._note_ignored(NOT_FOLLOWED, has_moved=True)
         return self._is_ignored
 
