@@ -192,8 +192,10 @@ def accept(
     )
     # Numbers that overflow become infinite or NaN, which every comparison below rejects.
     with np.errstate(all='ignore'):
-        _check_start(before, new, arm, rules, max(time, start_time))
+        # First what no later motion would change: an arm that did not set off for it is soon far
+        # from where the next one begins.
         _check_limits(new, arm, rules)
+        _check_start(before, new, arm, rules, max(time, start_time))
         ahead = new.end_time - time
     if not ahead <= LONGEST_WAIT:
         raise MessageError(
