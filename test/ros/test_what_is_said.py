@@ -20,6 +20,7 @@ from rclpy.node import Node  # noqa: E402
 from rrth_planner.cli import point_at  # noqa: E402
 from rrth_planner.model.arm import pointing_error  # noqa: E402
 from rrth_planner.ros.client import PlannerClient  # noqa: E402
+from rrth_planner.ros.client.planner_client import GivenUpError  # noqa: E402
 from rrth_planner.ros.middleware.child_process import ChildProcess  # noqa: E402
 from rrth_planner.ros.middleware.qos import LATCHED  # noqa: E402
 import samples  # noqa: E402
@@ -211,7 +212,7 @@ def test_an_arm_with_lower_limits_than_the_stops_of_the_planner_says_which_two_p
     wait_until(lambda: any('rejected' in line for line in begin.lines))
     (line, *_) = [line for line in begin.lines if 'rejected' in line]
     assert ': acceleration ' in line
-    assert 'max_acceleration of the arm' in line
+    assert 'expected -4.04 to 4.04 [rad/s^2]: max_acceleration of the arm' in line
     assert 'stop_acceleration of the planner' in line
     wait_until(lambda: wearer.levels() == {ERROR})
     assert f'executes {begin.namespace}/joint_trajectory' in wearer.reports[-1].message
@@ -249,6 +250,8 @@ def test_who_waits_for_a_goal_that_is_given_up_hears_why(begin, wait_until, call
     wearer.is_seen.clear()
     client.wait_for(lambda: client.why_given_up(second) != '', 'the end of the goal')
     assert client.why_given_up(second).startswith('SENSOR_INFO_STALE (-24): ')
+    with pytest.raises(GivenUpError, match='given this target up: SENSOR_INFO_STALE'):
+        client.require_pursued(second)
     assert 'another request' in client.why_given_up(answer)
     wearer.is_seen.set()
     third = client.point_at(TARGET)
