@@ -229,8 +229,9 @@ def test_an_arm_that_does_not_follow_has_not_arrived(planner, bystander, call):
     assert report['pointing_error'] > 0.1
 
 
-def test_an_arm_that_stays_off_the_end_of_its_motion_is_not_waited_for_for_ever(client):
-    arm = load_arm()
+def test_an_arm_that_stays_off_the_end_of_its_motion_is_not_waited_for_for_ever(ros_context):
+    # No planner of other tests sends it a motion.
+    client, arm = PlannerClient('point_at', 0.5, namespace='/alone'), load_arm()
     client.joint_names = arm.joint_names
     motion, message = turn(np.array(FOLDED) + 0.1, 0.1)
     client.commanded = [message]
