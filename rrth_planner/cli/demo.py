@@ -206,7 +206,7 @@ def _visit(
             margin=settings.margin,
             ray_guard_length=settings.ray_guard_length,
         )
-        client.wait_for_arrival(trajectory)
+        client.wait_for_arrival(trajectory, partial(_aims_at, client, target))
         error = _checked_error(client, name, target)
         lines.append(
             f'{name:10}{planning_time:9.1f} ms{found.length:7.2f} rad{found.duration:9.2f} s'

@@ -136,7 +136,8 @@ def _move(
         # With separation an old body is none.
         (client.publish if parameters.separation is None else client.stand)(body)
     client.publish(target)
-    report.take(answer_from_text(client.ask(PATIENCE).message))
+    answer = answer_from_text(client.ask(PATIENCE).message)
+    report.take(answer)
     if report.exit_code != DONE:
         return
     motion = announced_motion(client, arm, report.figures['duration'])
@@ -145,7 +146,7 @@ def _move(
         # The planner may know a frame that is unknown here.
         point = goal_from_msg(target, parameters.base_frame, frames.lookup).target
     try:
-        follow(client, arm, motion, point, tolerance)
+        follow(client, arm, motion, point, tolerance, answer)
         report.arrived = True
     except NotInTimeError as problem:
         report.end(NOT_ARRIVED, str(problem))

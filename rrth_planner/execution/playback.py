@@ -20,6 +20,12 @@ from rrth_planner.model.trajectory import MotionLimits, piece_coefficients, samp
 # A motion is rejected where it exceeds a limit by more than this share.
 EXCESS = 0.01
 BOUND_TOLERANCE = 1e-6
+# What lets the arm accept a motion that exceeds one.
+SLOWER = ': max_velocity of the arm must be no lower than that of the planner'
+SOFTER = (
+    ': max_acceleration of the arm must be no lower than max_acceleration and stop_acceleration '
+    'of the planner'
+)
 # A motion that ends later than this is rejected [s].
 LONGEST_WAIT = 3600.0
 # Matrices to Bernstein form, by number of coefficients; and the factors that differentiation
@@ -189,8 +195,10 @@ def accept(
     )
     # Numbers that overflow become infinite or NaN, which every comparison below rejects.
     with np.errstate(all='ignore'):
-        _check_start(before, new, arm, rules, max(time, start_time))
+        # First what no later motion would change: an arm that did not set off for it is soon far
+        # from where the next one begins.
         _check_limits(new, arm, rules)
+        _check_start(before, new, arm, rules, max(time, start_time))
         ahead = new.end_time - time
     if not ahead <= LONGEST_WAIT:
         raise MessageError(
@@ -227,10 +235,10 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
     second = first[:, 1:] * _POWERS[:4] * rates
     least, most = bounds_from(arm, trajectory.positions[0])
     v, a = top * rules.limits.velocity, top * rules.limits.acceleration
-    for what, unit, polynomials, low, high in (
-        ('position', 'rad', c, least - BOUND_TOLERANCE, most + BOUND_TOLERANCE),
-        ('velocity', 'rad/s', first, -v, v),
-        ('acceleration', 'rad/s^2', second, -a, a),
+    for what, unit, polynomials, low, high, hint in (
+        ('position', 'rad', c, least - BOUND_TOLERANCE, most + BOUND_TOLERANCE, ''),
+        ('velocity', 'rad/s', first, -v, v, SLOWER),
+        ('acceleration', 'rad/s^2', second, -a, a, SOFTER),
     ):
         n, size, dof = polynomials.shape
         control = np.swapaxes(_TO_BERNSTEIN[size] @ polynomials, 0, 1).reshape(size, n * dof)
@@ -240,7 +248,7 @@ def _check_limits(playback: Playback, arm: ArmModel, rules: PlaybackRules) -> No
             instant = trajectory.times[k] + share * durations[k]
             raise MessageError(
                 f'{arm.joint_names[i]}: {what} {value:.6g} at {instant:.6g} s, '
-                f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]'
+                f'expected {low[i]:.6g} to {high[i]:.6g} [{unit}]{hint}'
             )
     k = not_led_in(arm, trajectory)
     if k is not None:

@@ -48,12 +48,13 @@ class Monitored:
         )
         self.now = 100.0 + PHASE
         self.published, self.said, self.took, self.alive = [], [], [], []
-        self.ages, self.statuses, self.ray_clear = [], [], []
+        self.ages, self.statuses, self.ray_clear, self.doubts = [], [], [], []
         # How long a body waits until it is checked [s].
         self.late = 0.0
         self.reporter = SimpleNamespace(
             parameters=replace(parameters or without_separation(node), replan=False),
             monitor_state=('', ''),
+            unfollowed=lambda *found: self.doubts.append(found),
             publish_soon=lambda: None,
             body_used=self.ages.append,
             remaining_motion_checked=lambda took: self.said.append('free'),
@@ -65,6 +66,8 @@ class Monitored:
         self.inputs = Inputs('body', 'target', 'joints')
         publishers = SimpleNamespace(
             publish_motion=lambda trajectory, _, begin: self.published.append((trajectory, begin)),
+            motion_topic='joint_trajectory',
+            has_listener=lambda: True,
             assert_liveliness=lambda: self.alive.append(self.now),
             publish_ray_clear=self.ray_clear.append,
             flush=lambda: None,

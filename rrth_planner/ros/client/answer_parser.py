@@ -18,8 +18,9 @@ FIGURES = {
     'least_clearance': rf'\bleast clearance {NUMBER} m\b',
     'planning_time_ms': rf'\bplanning time {NUMBER} ms\b',
     'seed': rf'\bseed {NUMBER}',
+    'request': rf'\brequest {NUMBER}',
 }
-WHOLE = ('waypoints', 'seed')
+WHOLE = ('waypoints', 'seed', 'request')
 
 
 class Answer(NamedTuple):
@@ -27,7 +28,7 @@ class Answer(NamedTuple):
     An answer of the planner.
 
     The figures are `waypoints`, `duration` [s], `path_length` [rad], `least_clearance` [m],
-    `planning_time_ms` and `seed`, as far as the sentence has them.
+    `planning_time_ms`, `seed` and the number of the `request`, as far as the sentence has them.
     """
 
     code: ErrorCode

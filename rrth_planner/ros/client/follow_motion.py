@@ -11,6 +11,7 @@ from rrth_planner.model.arm import ArmModel, pointing_error
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError
 from rrth_planner.model.trajectory import positions_at, Trajectory
+from rrth_planner.ros.client.answer_parser import Answer
 from rrth_planner.ros.client.planner_client import NotInTimeError, PlannerClient
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg
 from tqdm import tqdm  # type: ignore[import-untyped]
@@ -45,13 +46,15 @@ def follow(
     motion: Trajectory,
     target: Array | None,
     tolerance: float,
+    answer: Answer,
 ) -> None:
     """
     Return once the arm stands at the end of its motion, or of one that has replaced it.
 
     A motion that does not point to the target, (3,) [m], as a stop, is not the last one. A joint
-    may be off the end by the tolerance [rad]. Raises NotInTimeError where the arm is not there
-    within the duration of the motion and the client's timeout.
+    may be off the end by the tolerance [rad]. Raises GivenUpError as soon as the planner has given
+    the goal of its answer up, and another NotInTimeError where the arm is not there within the
+    duration of the motion and the client's timeout.
     """
     n_commanded = len(client.commanded)
     begin = present = time.monotonic()
@@ -79,10 +82,13 @@ def follow(
             is_there = client.is_still_at(motion.positions[-1], tolerance, REST_SPEED)
             if not is_there or present - begin < motion.duration:
                 arrived_at = None
+                client.require_pursued(answer)
                 continue
             arrived_at = present if arrived_at is None else arrived_at
             if present - arrived_at >= SETTLED and _aims_at(arm, motion, target):
                 return
+            if not _aims_at(arm, motion, target):
+                client.require_pursued(answer)
     topic = client.resolve_topic_name('joint_trajectory')
     if not _aims_at(arm, motion, target):
         raise NotInTimeError(

@@ -4,12 +4,13 @@
 
 import asyncio
 from collections.abc import Callable, Generator, Sequence
+from contextlib import suppress
 from functools import partial
 import time
 from typing import Any, TypeVar
 import warnings
 
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped
 import numpy as np
 from rclpy.duration import Duration
@@ -24,7 +25,7 @@ from rclpy.task import Future
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array, frozen_array
-from rrth_planner.model.errors import MessageError, RrthError
+from rrth_planner.model.errors import MessageError, one_line, RrthError
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.client.answer_parser import Answer, answer_from_text
 from rrth_planner.ros.interface.parameters import (
@@ -33,6 +34,8 @@ from rrth_planner.ros.interface.parameters import (
     PlannerParameters,
 )
 from rrth_planner.ros.interface.separation_status import separation_from_msg, SeparationStatus
+from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY
+from rrth_planner.ros.messages.error_codes import ErrorCode
 from rrth_planner.ros.messages.joint_state import (
     configuration_from_msg,
     joint_reading,
@@ -72,6 +75,10 @@ ARRIVED, STILL = 1e-3, 1e-6
 
 class NotInTimeError(RrthError):
     """A timeout."""
+
+
+class GivenUpError(NotInTimeError):
+    """What is waited for will not come: the planner has given the goal up."""
 
 
 class DemoError(RrthError):
@@ -128,6 +135,12 @@ class PlannerClient(Node):
                 LATCHED,
                 event_callbacks=quietly,
             )
+        # The planner's diagnostics: level and message, the number of the request whose motion was
+        # published last, and why its goal was given up, if it was.
+        self.level, self.message = DiagnosticStatus.OK, ''
+        self._request, self._given_up = 0, ''
+        self._planner = self.resolve_service_name(NODE).lstrip('/')
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         # It may wait among many others, whose answers it receives, too.
         self._plan = self.create_client(Trigger, f'{NODE}/plan', qos_profile=SERVICE)
         self._spinner = SingleThreadedExecutor()
@@ -181,6 +194,36 @@ class PlannerClient(Node):
                 if time.monotonic() > limit:
                     raise _late(what, timeout)
                 await asyncio.sleep(POLLED)
+
+    def why_given_up(self, answer: Answer) -> str:
+        """
+        Return why the planner does not pursue the goal of an answer any more; '' while it does.
+
+        Known while messages are received, as in `wait_for`, a tenth of a second later at most.
+        After arrival it is ''.
+        """
+        request = answer.figures.get('request')
+        if request is None or self._request < request:
+            return ''
+        if self._request > request:
+            return 'the motion of another request has replaced the one to this target'
+        return self._given_up
+
+    def require_pursued(self, answer: Answer) -> None:
+        """Raise GivenUpError where the planner does not pursue the goal of an answer any more."""
+        why = self.why_given_up(answer)
+        if why:
+            raise GivenUpError(f'the planner has given this target up: {why}')
+
+    def _on_diagnostics(self, msg: DiagnosticArray) -> None:
+        for status in msg.status:
+            if status.name != f'{self._planner}: planning':
+                continue
+            values = {pair.key: pair.value for pair in status.values}
+            with suppress(KeyError, ValueError):
+                self._request = int(values[REQUEST_KEY])
+                self._given_up = values[GIVEN_UP_KEY]
+            self.level, self.message = status.level, one_line(status.message)
 
     def _run(self, waits: Waits[T], timeout: float) -> T:
         """Return what comes of some waits, each for a time at most [s]."""
@@ -330,6 +373,7 @@ class DemoClient(PlannerClient):
         The arm is at rest at a speed of at most `still` [rad/s]; its servos settle in a time [s].
         """
         super().__init__('rrth_demo', timeout, check)
+        self._answer = Answer(ErrorCode.FAILURE, '', {})
         self.arm, self._still, self._settling = arm, still, settling
         # As `see_separation` keeps them; statuses with the time when they were sent [s].
         self.bodies: list[bytes] = []
@@ -349,17 +393,30 @@ class DemoClient(PlannerClient):
         if not response.success:
             raise DemoError(f'the planner rejected the request: {response.message}')
         self.wait_for(lambda: bool(self.commanded), 'joint_trajectory')
-        figures = answer_from_text(response.message).figures
+        self._answer = answer_from_text(response.message)
+        figures = self._answer.figures
         if 'planning_time_ms' not in figures:
             raise DemoError(f'no planning time in the answer "{response.message}"')
         trajectory = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
         return trajectory, figures['planning_time_ms']
 
-    def wait_for_arrival(self, trajectory: Trajectory) -> None:
-        """Wait until the arm stands still at the end of a motion."""
-        q_end = trajectory.positions[-1]
+    def wait_for_arrival(self, trajectory: Trajectory, q_aims: Callable[[Array], bool]) -> None:
+        """
+        Wait until the arm stands still at the end of its motion, and aims.
+
+        Where the planner has stopped it, that is the end of the motion that came instead.
+        """
+
+        def has_arrived() -> bool:
+            last = joint_trajectory_from_msg(self.commanded[-1], self.joint_names)
+            q_end = last.positions[-1]
+            if self.is_still_at(q_end, ARRIVED, self._still) and q_aims(q_end):
+                return True
+            self.require_pursued(self._answer)
+            return False
+
         self.wait_for(
-            lambda: self.is_still_at(q_end, ARRIVED, self._still),
+            has_arrived,
             f'the arm at the end of its motion of {trajectory.duration:.2f} s',
             trajectory.duration + self.timeout,
         )
@@ -408,6 +465,9 @@ class DemoClient(PlannerClient):
                     moved = time.monotonic()
                 elif q_aims(q):
                     return
+            if self.level == DiagnosticStatus.ERROR:
+                # To ask again does not help.
+                raise DemoError(self.message)
         raise DemoError(f'the arm did not aim at its target within {self.timeout:g} s: {sentence}')
 
 

@@ -31,7 +31,7 @@ from rrth_planner.ros.middleware.parameter_declaration import ARM, declare, reje
 # The options of all algorithms by name; the same name means the same in each.
 OPTIONS = {f.name: f for kind in ALGORITHMS.values() for f in fields(kind)}
 STOP_LIMITS = {'stop_acceleration': 'rad/s^2', 'stop_jerk': 'rad/s^3'}
-LONGEST_TIMEOUT, LONGEST_LATENCY = 86400.0, 10.0
+LONGEST_TIMEOUT, LONGEST_LATENCY, LONGEST_PATIENCE = 86400.0, 10.0, 600.0
 # A timeout that is not given: with separation these [s], else none.
 NOT_GIVEN = -1.0
 TIMEOUTS = {'body_timeout': 0.2, 'joint_timeout': 0.1}
@@ -60,6 +60,10 @@ def declared(dof: int) -> tuple[Setting, ...]:
     lost = 'time that a lost part of the body stays where it was before the arm stops'
     allowed = 'parts of the arm that may meet a box or another part, beside those of its file'
     second = 'library behind the second check of every motion'
+    again = (
+        'so long after a stop a motion to the same goal is tried while inputs are missing or the '
+        'wearer is in the way'
+    )
     separate = (
         'publish only motions that are proven clear of a wearer who moves; auto: unless his body '
         'stands still, as one that was sent once'
@@ -105,6 +109,7 @@ def declared(dof: int) -> tuple[Setting, ...]:
         Setting('allowed', [''], 'part: box', allowed),
         Setting('incident_folder', '', 'path', folder),
         Setting('replan', True, '-', 'plan again after a fail-safe stop'),
+        Setting('patience', 5.0, 's', again, 0.0, LONGEST_PATIENCE),
         Setting(
             'joint_timeout',
             NOT_GIVEN,
@@ -150,7 +155,7 @@ class PlannerParameters(PlanSettings):
         `AUTO` or `MANUAL`.
     body_timeout, joint_timeout : float
         [s]; 0: never.
-    body_latency, keep_lost : float
+    body_latency, keep_lost, patience : float
         [s].
     required_boxes : tuple of str
         Names of boxes, or of namespaces.
@@ -176,6 +181,7 @@ class PlannerParameters(PlanSettings):
     keep_lost: float
     required_boxes: tuple[str, ...]
     replan: bool
+    patience: float
     incident_folder: str
     rest_speed: float
     start_tolerance: float
@@ -249,7 +255,7 @@ def parameters_from_values(values: Mapping[str, Any], arm: ArmModel) -> PlannerP
         controller_delay=rules.controller_delay,
         **timeouts,
         required_boxes=tuple(name for name in values['required_boxes'] or () if name),
-        **{name: values[name] for name in (*own, *tolerances)},
+        **{name: values[name] for name in (*own, *tolerances, 'patience')},
         **{field.name: getattr(settings, field.name) for field in fields(settings)},
     )
 

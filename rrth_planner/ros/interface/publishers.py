@@ -87,6 +87,16 @@ class PlanPublishers:
         if self._planned is not None:
             self._planned.publish(msg)
 
+    @property
+    def motion_topic(self) -> str:
+        """The resolved name of the topic on which the controller is to listen."""
+        return str(self._node.resolve_topic_name('joint_trajectory'))
+
+    def has_listener(self) -> bool:
+        """Return whether anybody is subscribed to that topic."""
+        publishers = (self._whole, self._committed)
+        return any(p is not None and p.get_subscription_count() > 0 for p in publishers)
+
     def assert_liveliness(self) -> None:
         """Assert that the running motion is monitored."""
         if self._whole is not None:

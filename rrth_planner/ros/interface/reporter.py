@@ -18,18 +18,26 @@ from rrth_planner.ros.interface.figures import Figures
 from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.parameters import in_effect, PlannerParameters
 from rrth_planner.ros.interface.separation_status import (
+    LEVELS,
     NO_PROMISE,
     separation_to_msg,
     SeparationState,
     SeparationStatus,
 )
 from rrth_planner.ros.messages.body import WearerBody
-from rrth_planner.ros.messages.diagnostics import status_to_msg
+from rrth_planner.ros.messages.diagnostics import GIVEN_UP_KEY, REQUEST_KEY, status_to_msg
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode
 from rrth_planner.ros.middleware.qos import LATCHED
 
 # Diagnostics are published at least this often [s].
 PERIOD = 1.0
+# From the best level to the worst.
+SEVERITY = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.STALE,
+    DiagnosticStatus.ERROR,
+)
 # Warnings of fast parts are logged at most this often [s].
 WARNING_PERIOD = 5.0
 # A rate is published again once it has changed by so much [-].
@@ -85,15 +93,20 @@ class Reporter:
         self.report = PlanReport()
         self._node, self._inputs = node, inputs
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        # The state of the monitor, and its reason.
-        self.monitor_state = ('no motion', '')
+        # The state of the monitor, its reason, and the level of that.
+        self.monitor_state, self.monitor_level = ('no motion', ''), DiagnosticStatus.OK
+        # Level and sentence while the arm has not followed what it was given; else OK.
+        self._unfollowed = (DiagnosticStatus.OK, '')
+        # The number of the request whose motion was commanded last, and why its goal is not
+        # pursued any more before the arm has arrived.
+        self._request, self._given_up = 0, ''
         self._remaining_motion_checks, self._stops_published = Figures(), Figures()
         self._body_ages = Figures()
         self._n_incidents, self._last_incident = 0, ''
         self._separation, self._commitments = SeparationStatus(), Figures()
         self._body: BodyMotion | None = None
         self._state: Publisher | None = None
-        self._published_state = self._separation
+        self._published_state, self._published_trouble = self._separation, self._unfollowed
         if parameters.separation is not None:
             self._state = node.create_publisher(DiagnosticStatus, '~/state', LATCHED)
             self._publish_state()
@@ -107,7 +120,7 @@ class Reporter:
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timers = [
             node.create_timer(PERIOD, self._publish, clock=steady),
-            node.create_timer(SHORTEST_PERIOD, self._on_timer, clock=steady),
+            node.create_timer(SHORTEST_PERIOD, self._publish_changes, clock=steady),
         ]
 
     @property
@@ -173,11 +186,42 @@ class Reporter:
         self._publish_state()
 
     def _publish_state(self) -> None:
-        status = self._shown_state
+        status, trouble = self._shown_state, self._trouble()
         if self._state is not None:
             name = f'{self._node.get_fully_qualified_name().lstrip("/")}: separation'
-            self._state.publish(separation_to_msg(name, status))
-        self._published_state = status
+            self._state.publish(separation_to_msg(name, status, trouble))
+        self._published_state, self._published_trouble = status, trouble
+
+    def _trouble(self) -> tuple[bytes, str]:
+        """Return level and sentence of what is wrong with the execution of the last motion."""
+        monitored = self.monitor_level, self.monitor_state[1]
+        return max(self._unfollowed, monitored, key=lambda found: found[0])
+
+    def unfollowed(self, level: bytes, sentence: str) -> None:
+        """Publish that the arm does not follow what it is given, or, with OK, that it does."""
+        self._unfollowed = level, sentence
+        if sentence:
+            self._node.get_logger().warning(sentence)
+        self.publish_soon()
+        if self._trouble() != self._published_trouble:
+            self._publish_state()
+
+    def pursued(self, request: int) -> None:
+        """Publish that the arm pursues the goal of a request, by its number."""
+        self._request, self._given_up = request, ''
+        self.publish_soon()
+
+    def given_up(self, why: str) -> None:
+        """Publish that the goal of that request is not pursued any more."""
+        self._given_up = one_line(why)
+        self._node.get_logger().warning(f'goal of request {self._request} given up: {why}')
+        self._publish()
+
+    def nothing_runs(self) -> None:
+        """Publish that no motion is executed, and none will be without a request."""
+        is_fault = self._separation.state is SeparationState.FAULT
+        if not is_fault and self._separation != SeparationStatus():
+            self.separation_status(SeparationStatus())
 
     def incident(self, file: Path | None) -> None:
         """Count an incident, and keep the name of its file if there is one."""
@@ -194,13 +238,16 @@ class Reporter:
         self._is_changed = True
         self._publish_change()
 
-    def _on_timer(self) -> None:
-        self._publish_changed_state()
-        self._publish_change()
-
     def _publish_change(self) -> None:
         if self._is_changed and time.monotonic() - self._published >= SHORTEST_PERIOD:
             self._publish()
+
+    def _publish_changes(self) -> None:
+        self._publish_changed_state()
+        self._publish_change()
+        # Here only, in the node's own thread: an older state must not be the last one.
+        if self._trouble() != self._published_trouble:
+            self._publish_state()
 
     def _publish(self) -> None:
         with self._lock:
@@ -233,6 +280,8 @@ class Reporter:
             'allowed contacts': '; '.join(map(': '.join, self.parameters.arm.allowed)),
             'monitor': monitor,
             'last stop': reason,
+            REQUEST_KEY: self._request,
+            GIVEN_UP_KEY: self._given_up,
             'age of body at decisions': self._body_ages,
             'remaining motion checks': self._remaining_motion_checks,
             'fail-safe stops': self._stops_published,
@@ -247,6 +296,13 @@ class Reporter:
             values[f'rejected messages, {name}'] = topic.n_rejected
             values[f'last rejection, {name}'] = topic.rejection or ''
         level, message = summary(now, self._inputs, self.parameters, report)
+        monitored = self.monitor_level, self.monitor_state[1]
+        separated = LEVELS[self._published_state.state], self._published_state.text
+        found = [(level, message), monitored, separated]
+        if self._unfollowed[1]:
+            # Of the same level it is the first to be mended.
+            found.insert(0, self._unfollowed)
+        level, message = max(found, key=lambda one: SEVERITY.index(one[0]))
         name = f'{self._node.get_fully_qualified_name().lstrip("/")}: planning'
         return status_to_msg(name, level, message, values)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the running motion is executed beside a wearer who moves, and why, as a message."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 import math
 
@@ -41,6 +41,11 @@ class SeparationStatus:
     bar: str = ''
     box: str = ''
 
+    @property
+    def text(self) -> str:
+        """The name of the state, and its cause."""
+        return f'{self.state.name}: {self.cause}' if self.cause else self.state.name
+
 
 # What a motion beside a body that stands still comes without, and how to have it.
 NO_PROMISE = (
@@ -57,12 +62,19 @@ LEVELS = {
 }
 
 
-def separation_to_msg(name: str, status: SeparationStatus) -> DiagnosticStatus:
-    """Return the message of `~/state`; its message begins with the name of the state."""
+def separation_to_msg(
+    name: str, status: SeparationStatus, trouble: tuple[bytes, str] = (DiagnosticStatus.OK, '')
+) -> DiagnosticStatus:
+    """
+    Return the message of `~/state`; its message begins with the name of the state.
+
+    trouble: a level and a sentence, which count where the level is higher than that of the state.
+    """
     state = status.state
-    text = f'{state.name}: {status.cause}' if status.cause else state.name
+    level, cause = max((LEVELS[state], status.cause), trouble, key=lambda found: found[0])
+    text = replace(status, cause=cause).text
     values = {RATE_KEY: f'{status.rate:.3f}', BAR_KEY: status.bar, BOX_KEY: status.box}
-    return status_to_msg(name, LEVELS[state], text, values)
+    return status_to_msg(name, level, text, values)
 
 
 def separation_from_msg(msg: DiagnosticStatus) -> SeparationStatus:

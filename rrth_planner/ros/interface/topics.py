@@ -133,7 +133,8 @@ INTERFACES = {
             '~/state',
             'diagnostic_msgs/msg/DiagnosticStatus',
             'latched: NORMAL, SLOWED, PROTECTIVE_STOP or FAULT, with cause, rate, part of the arm '
-            'and box; UNSEPARATED beside a body that stands still',
+            'and box; UNSEPARATED beside a body that stands still. WARN or ERROR also where the '
+            'arm does not follow its motion, or holds its position',
             separation=('auto', True),
         ),
         _published(
@@ -149,7 +150,13 @@ INTERFACES = {
             MARKERS,
             'latched: body with margin, arm at start and goal, ray, tool path',
         ),
-        _published('/diagnostics', DIAGNOSTICS, '1 Hz and on change'),
+        _published(
+            '/diagnostics',
+            DIAGNOSTICS,
+            '1 Hz and on change: inputs, the last answer, what the monitor does, whether the arm '
+            'follows; `request`: the number of the last request with a motion, as its answer has '
+            'it, `given up`: why its goal is not pursued any more, if the arm has not arrived',
+        ),
     ),
     'arm_playback': (
         _subscribed(

@@ -7,6 +7,10 @@ from collections.abc import Mapping
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rrth_planner.model.errors import one_line
 
+# What the planner's diagnostics have of the request whose motion was published last: its number,
+# and why its goal was given up.
+REQUEST_KEY, GIVEN_UP_KEY = 'request', 'given up'
+
 
 def status_to_msg(
     name: str, level: bytes, message: str, values: Mapping[str, object]

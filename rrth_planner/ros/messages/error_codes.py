@@ -58,6 +58,16 @@ MEANINGS = {
     'the details',
 }
 
+# To plan again in a moment changes nothing: neither wearer nor inputs are the reason.
+FINAL = frozenset(
+    {
+        ErrorCode.FAILURE,
+        ErrorCode.PREEMPTED,
+        ErrorCode.NO_IK_SOLUTION,
+        ErrorCode.INVALID_GOAL_CONSTRAINTS,
+    }
+)
+
 CODE_OF_STATUS = {
     PlanStatus.SOLVED: ErrorCode.SUCCESS,
     PlanStatus.TIMEOUT: ErrorCode.TIMED_OUT,

@@ -59,6 +59,8 @@ LONGEST_LAG, LAG_STEP = 0.06, 0.004
 # its motion: its controller rejects what it is given. It has moved where it rests so far from the
 # start [rad].
 IGNORED_AFTER, IGNORED_WAY, MOVED = 0.3, 0.02, 2e-3
+# The same of a motion that was given as a whole, without separation: some arms begin late [s].
+IGNORED_WHOLE_AFTER = 1.0
 # A commitment is found within so much times what it took lately, and at least so long; one that
 # takes longer than that, or than LATEST, is not published: the arm has gone on meanwhile [s].
 TAKES, FOUND_WITHIN, LATEST = 1.5, 0.002, 0.02
@@ -215,7 +217,7 @@ class Commitments:
 
     def end(self) -> None:
         """Forget the running motion."""
-        self.planned = self._sent = self._replaced = None
+        self.planned = self._sent = self._replaced = self._rest = None
 
     def shift(self, step: float) -> None:
         """Take all times by a clock that was set forward by a step [s]."""
@@ -256,28 +258,39 @@ class Commitments:
             return True
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
-    def is_ignored(self, reading: JointReading | None) -> bool:
+    def is_ignored(
+        self, reading: JointReading | None, running: ExecutingMotion, rest_speed: float
+    ) -> bool:
         """Take note of where the arm is; return whether it rests while it is to move on."""
-        if reading is None or self._parameters is None or not self.is_active:
+        if reading is None:
             return False
-        if reading.is_moving(reading.taken, self._parameters.rest_speed):
+        if reading.is_moving(reading.taken, rest_speed):
             self._rest = None
             return False
-        place = self._commanded(reading.taken)
+        if self.is_active:
+            place, after = self._commanded(reading.taken), IGNORED_AFTER
+        else:
+            place, after = _place_on(running, reading.taken), IGNORED_WHOLE_AFTER
         self._rest = since, then = self._rest or (reading.taken, place)
         return (
-            reading.taken - since > IGNORED_AFTER
+            reading.taken - since > after
             and float(np.abs(place - then).max()) > IGNORED_WAY
             and float(np.abs(place - reading.positions).max()) > ASIDE
         )
 
-    def has_moved(self, reading: JointReading | None) -> bool:
-        """Return whether the arm is elsewhere than where its motion begins."""
-        if reading is None or self.planned is None or self._parameters is None:
+    def has_moved(
+        self,
+        reading: JointReading | None,
+        running: ExecutingMotion,
+        rest_speed: float,
+        least: float = MOVED,
+    ) -> bool:
+        """Return whether the arm is further than that [rad] from where its motion begins."""
+        if reading is None:
             return False
-        place = reading.mean_positions(self._parameters.rest_speed)
-        way = place - self.planned.trajectory.positions[0]
-        return float(np.abs(way).max()) > MOVED
+        way = reading.mean_positions(rest_speed)
+        way = way - (self.planned or running).trajectory.positions[0]
+        return float(np.abs(way).max()) > least
 
     @property
     def is_whole(self) -> bool:
@@ -501,6 +514,13 @@ class Commitments:
                 '' if blocked is None else blocked.box,
             )
         )
+
+
+def _place_on(motion: ExecutingMotion, time: float) -> Array:
+    """Return where a motion is at a time [s], (dof,) [rad]."""
+    elapsed = min(max(time - motion.start_time, 0.0), motion.trajectory.duration)
+    place: Array = positions_at(motion.trajectory, [elapsed])[0]
+    return place
 
 
 def _gap(commitment: Commitment, reading: JointReading, time_ago: float) -> float:

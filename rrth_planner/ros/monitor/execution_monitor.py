@@ -18,6 +18,8 @@ from threading import RLock
 import time
 import traceback
 
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
@@ -42,6 +44,7 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
+from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.monitor.commitments import Commitments
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 
@@ -72,6 +75,8 @@ TOO_NEAR = 'the wearer is too near for the motion to continue'
 NOT_FOLLOWED = 'the arm is at rest off its motion, and does not follow it'
 # So many motions one after the other that an arm ignores from their begin on are the last ones.
 MOST_IGNORED = 3
+# An arm that was reported to ignore a motion follows one where that has led it further [rad].
+FOLLOWED = 0.02
 # By whether the arm follows the last commanded motion.
 SWITCHED = {
     False: 'arm ignored the last commanded motion: monitoring the previous one, which it follows',
@@ -145,8 +150,14 @@ class ExecutionMonitor:
         # when [s], and whether to plan again after it.
         self.stop_reason = self.pending_stop = ''
         self._pending_since, self._is_replanned = 0.0, True
-        # How many motions the arm has ignored from their begin on, one after the other.
-        self._n_ignored = 0
+        # How many motions the arm has ignored from their begin on, one after the other; whether
+        # it ignores the last one, and whether anything of that kind was reported since it has
+        # followed one.
+        self._n_ignored, self._is_ignored, self._is_doubted = 0, False, False
+        # Whether the last motion was executed to its end.
+        self.has_arrived = False
+        # The level of the last stop, and whether the arm stays where that ends.
+        self._stop_level, self._is_held = DiagnosticStatus.WARN, False
         # Of the plan: a margin that is changed later does not apply to its motion.
         self._parameters = reporter.parameters
         # Since when the wearer has been in the way of the running motion [s].
@@ -223,8 +234,11 @@ class ExecutionMonitor:
                 raise
             self.n_motions += 1
             self._withheld_stop, self._is_unstamped = None, False
+            self._is_ignored = self.has_arrived = self._is_held = False
             # From here on the arm moves: an error must stop it.
             self._run_fail_safe(lambda: self._set_state(MonitorState.MONITORING, ''))
+            with suppress(Exception):
+                self._require_listener()
 
     def _lead_in(
         self, planned: ExecutingMotion, joins: float | None, now: float, delay: float
@@ -398,12 +412,17 @@ class ExecutionMonitor:
             self._is_replanned = is_replanned and (self._is_replanned or not self.pending_stop)
             self.pending_stop = why
             self._pending_since = time.perf_counter()
+            # To brake is no failure.
+            level = DiagnosticStatus.WARN if is_replanned else DiagnosticStatus.OK
+            self._stop_level = DiagnosticStatus.ERROR if is_fault else level
             self._stop_for_failure()
             with suppress(Exception):
                 self._commitments.fail(why, is_fault)
         elif self.running is not None and is_fault:
             # The arm stops already; what is planned for after that does not begin.
             self.stop_reason, self.n_stops = why, self.n_stops + 1
+            with suppress(Exception):
+                self._set_state(self._state, why, DiagnosticStatus.ERROR)
             if not self._stops or self._stops[-1].is_replanned:
                 with suppress(Exception):
                     self._record_stop(self.running.trajectory, None, is_replanned=False)
@@ -537,8 +556,7 @@ class ExecutionMonitor:
             if motion is not None:
                 self._tracker.replace(motion)
             if self._commitments.planned is not planned:
-                self._node.get_logger().error(SWITCHED[False])
-                self._set_state(MonitorState.MONITORING, SWITCHED[False])
+                self._report_switch(False)
 
     def _holds(
         self, check: Callable[..., bool], running: ExecutingMotion, phase: float, scene: Scene
@@ -624,6 +642,7 @@ class ExecutionMonitor:
         self._node.get_logger().error(
             'arm did not follow the commanded stop: stop published again'
         )
+        self._doubt(DiagnosticStatus.ERROR, 'arm did not follow the commanded stop')
 
     def _check_previous_motion(self) -> None:
         """Monitor the previous motion where the arm follows that: its controller rejected one."""
@@ -632,22 +651,79 @@ class ExecutionMonitor:
             and not self._commitments.is_active
             and self._tracker.follow_previous()
         ):
-            self._node.get_logger().error(SWITCHED[self._tracker.is_latest])
-            self._set_state(MonitorState.MONITORING, SWITCHED[self._tracker.is_latest])
+            self._report_switch(self._tracker.is_latest)
             self._check_remaining_motion(self._inputs.body.value, time.time_ns())
+
+    def _report_switch(self, is_latest: bool) -> None:
+        """Report that the arm follows the motion before the last one, or the last one again."""
+        self._node.get_logger().error(SWITCHED[is_latest])
+        level = DiagnosticStatus.OK if is_latest else DiagnosticStatus.WARN
+        self._set_state(MonitorState.MONITORING, SWITCHED[is_latest], level)
+        if not is_latest:
+            self._note_ignored('arm ignored the last commanded motion')
+        self._is_ignored = not is_latest
+
+    def _require_listener(self) -> None:
+        """Report where nobody receives motions at all."""
+        if not self._is_doubted and not self._publishers.has_listener():
+            topic = self._publishers.motion_topic
+            self._doubt(DiagnosticStatus.WARN, f'nobody is subscribed to {topic}')
+
+    def _note_ignored(self, why: str, has_moved: bool = False) -> None:
+        """Count a motion that the arm ignores, and report that it does."""
+        # An arm that ignores one motion after the other, as with its drives off, holds.
+        self._n_ignored = 0 if has_moved else self._n_ignored + 1
+        self._is_ignored, n = True, self._n_ignored
+        level = DiagnosticStatus.ERROR if n >= MOST_IGNORED else DiagnosticStatus.WARN
+        self._doubt(level, f'{why} ({n} motions one after the other)' if n > 1 else why)
+
+    def _doubt(self, level: bytes, why: str) -> None:
+        """Report, until the arm follows a motion, that it may not be given what it needs."""
+        self._is_doubted = True
+        topic = self._publishers.motion_topic
+        self._reporter.unfollowed(level, f'{why}: expected a controller that executes {topic}')
+
+    def _check_followed_motion(self, reading: JointReading | None) -> None:
+        """Withdraw what was reported of an arm that follows its motion now."""
+        running = self.running
+        # With separation one that it has ignored is not followed any more.
+        is_other = not self._tracker.is_latest or (
+            self._commitments.is_active and self._is_ignored
+        )
+        if (
+            self._is_doubted
+            and running is not None
+            and not is_other
+            and self._commitments.has_moved(
+                reading, running, self._parameters.rest_speed, FOLLOWED
+            )
+            and self._tracker.phase(self._now()) is not None
+        ):
+            self._n_ignored, self._is_ignored, self._is_doubted = 0, False, False
+            self._reporter.unfollowed(DiagnosticStatus.OK, '')
 
     def _check_ignored_motion(self) -> None:
         """Give up a motion that the arm ignores, wherever it rests, also far from it."""
-        reading = self._inputs.joints.value
-        if self._state is MonitorState.MONITORING and self._commitments.is_ignored(reading):
-            # An arm that ignores one motion after the other, as with its drives off, holds.
-            self._n_ignored = 0 if self._commitments.has_moved(reading) else self._n_ignored + 1
-            running, now = self.running, self._now()
-            if running is not None and self._commitments.is_whole:
+        reading, running = self._inputs.joints.value, self.running
+        if self._state is not MonitorState.MONITORING or running is None:
+            return
+        rest_speed = self._parameters.rest_speed
+        if not self._commitments.is_ignored(reading, running, rest_speed):
+            self._check_followed_motion(reading)
+        elif not self._commitments.is_active:
+            # It was given all of it, and may be late: it is monitored as long as that takes.
+            if not self._is_ignored:
+                has_moved = self._commitments.has_moved(reading, running, rest_speed)
+                self._note_ignored(NOT_FOLLOWED, has_moved)
+        else:
+            now = self._now()
+            if self._commitments.is_whole:
                 # One that is only late would execute all of it.
                 stop = self._stop_of(running, 0.0, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, stop.start_time)
                 self._tracker.stop(stop)
+            has_moved = self._commitments.has_moved(reading, running, rest_speed)
+            self._note_ignored(NOT_FOLLOWED, has_moved)
             self._give_up_motion(NOT_FOLLOWED, self._n_ignored < MOST_IGNORED)
             self._end_motion()
             self._tracker.forget_command()
@@ -660,14 +736,32 @@ class ExecutionMonitor:
         if self._tracker.is_over(now, self._parameters.rest_speed) and not is_waiting:
             if self._state is MonitorState.MONITORING and not self._commitments.is_arrived(now):
                 self._give_up_motion(TOO_NEAR)
+            elif self._state is MonitorState.MONITORING and self._is_ignored_to_its_end():
+                is_replanned = self._commitments.is_active and self._n_ignored < MOST_IGNORED
+                self._give_up_motion(NOT_FOLLOWED, is_replanned)
             self._end_motion()
             return None
         phase = self._tracker.phase(now)
+        if phase is not None and self._reporter.monitor_state[1] == OFF_TRAJECTORY:
+            is_stopping = self._state is MonitorState.STOPPING
+            self._set_state(self._state, self.stop_reason if is_stopping else '')
         is_lost = phase is None and self._tracker.is_lost(now)
         if is_lost and self._reporter.monitor_state[1] != OFF_TRAJECTORY:
             self._node.get_logger().error(OFF_TRAJECTORY)
             self._set_state(self._state, OFF_TRAJECTORY)
         return phase
+
+    def _is_ignored_to_its_end(self) -> bool:
+        """Return whether the arm has not followed the last motion, which is over."""
+        reading, running = self._inputs.joints.value, self.running
+        if reading is None or running is None or self._is_ignored:
+            return self._is_ignored
+        gap = np.abs(reading.positions - running.trajectory.positions[-1]).max()
+        # An older reading says nothing of that.
+        is_new = reading.taken > running.start_time + running.trajectory.duration
+        if is_new and gap > MAX_DEVIATION and not self._commitments.is_active:
+            self._note_ignored(NOT_FOLLOWED, has_moved=True)
+        return self._is_ignored
 
     def _stop(self, phase: float, then: float, scene: Scene, arrived: int, why: str) -> None:
         """Stop the arm for a body, from its phase at a time `then` [s]; the lock is held."""
@@ -690,6 +784,7 @@ class ExecutionMonitor:
         took = self._elapsed(arrived)
         warning = '' if is_safe else self._clearance_warning(stopped.trajectory, scene)
         self._reporter.stop_published(took)
+        self._stop_level = DiagnosticStatus.WARN
         self._report_stop(stopped, warning, f'; published after {1e3 * took:.2f} ms')
         self._record_stop(stopped.trajectory, None if warning else scene)
         self._commitments.fail(why, is_fault=False)
@@ -732,6 +827,7 @@ class ExecutionMonitor:
         if self._commitments.is_active and self._parameters.resume == MANUAL:
             # It goes on after `~/reset`, or a request.
             is_replanned = False
+        self._is_held = not is_replanned
         goal, n_motions = self._goal, self.n_motions
         self._stops.append(Stop(stop, goal, self._parameters, scene, is_replanned, n_motions))
 
@@ -814,6 +910,7 @@ class ExecutionMonitor:
         sentence = f'{why}: motion given up'
         self._set_state(MonitorState.STOPPING if is_replanned else MonitorState.HOLDING, sentence)
         self._node.get_logger().warning(sentence)
+        self._commitments.fail(why, is_fault=False)
         self._record_stop(running.trajectory, None, is_replanned)
 
     def _end_motion(self) -> None:
@@ -822,9 +919,12 @@ class ExecutionMonitor:
         self._commitments.end()
         self.pending_stop = ''
         if self._state is MonitorState.MONITORING:
-            self._n_ignored = 0
-        if self._state is MonitorState.STOPPING and not self._reporter.parameters.replan:
-            self._set_state(MonitorState.HOLDING, self._reporter.monitor_state[1])
+            self._n_ignored, self._is_doubted, self.has_arrived = 0, False, True
+            self._reporter.unfollowed(DiagnosticStatus.OK, '')
+        if self._state is MonitorState.STOPPING and self._is_held:
+            self._set_state(
+                MonitorState.HOLDING, self._reporter.monitor_state[1], self._stop_level
+            )
         elif self._state is not MonitorState.HOLDING:
             self._set_state(MonitorState.IDLE, '')
 
@@ -832,7 +932,7 @@ class ExecutionMonitor:
         """Report in log and diagnostics why the arm stops."""
         left = max(0.0, stop.start_time + stop.trajectory.duration - self._now())
         sentence = f'{self.stop_reason}: fail-safe stop, at rest in {left:.2f} s{warning}'
-        self._set_state(MonitorState.STOPPING, sentence)
+        self._set_state(MonitorState.STOPPING, sentence, self._stop_level)
         # Two calls: rclpy raises where one line of code logs at changing severities.
         if warning:
             self._node.get_logger().error(f'{sentence}{note}')
@@ -861,9 +961,12 @@ class ExecutionMonitor:
             self._set_state(MonitorState.HOLDING, sentence)
             self._node.get_logger().warning(sentence)
 
-    def _set_state(self, state: MonitorState, sentence: str) -> None:
+    def _set_state(
+        self, state: MonitorState, sentence: str, level: bytes = DiagnosticStatus.WARN
+    ) -> None:
         self._state = state
         self._reporter.monitor_state = (state.value, sentence)
+        self._reporter.monitor_level = level if sentence else DiagnosticStatus.OK
         self._reporter.publish_soon()
 
     def _elapsed(self, arrived: int) -> float:

@@ -200,9 +200,9 @@ class PointHeadServer:
         arrival = _arrival(angle)
         if arrival is not None:
             return arrival
-        response = self._queue.response_to_given_up(goal)
-        if response is not None:
-            return response.code, response.sentence
+        why = self._queue.why_given_up(goal)
+        if why is not None:
+            return why
         reason = self._reporter.monitor_state[1]
         error = 'unknown' if angle is None else f'{angle:.4f}'
         return ErrorCode.FAILURE, (

@@ -4,6 +4,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 import math
@@ -26,7 +27,7 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import PlanReport, Reporter
 from rrth_planner.ros.interface.separation_status import NO_PROMISE
 from rrth_planner.ros.messages.body import scene_of
-from rrth_planner.ros.messages.error_codes import answer, ErrorCode
+from rrth_planner.ros.messages.error_codes import answer, ErrorCode, FINAL
 from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
@@ -43,13 +44,14 @@ LONGEST_SETTLING = 1.0
 AGAIN = 0.01
 # A wearer whose hand is in the ray of an arm at rest has so long to take it out [s].
 RAY_PATIENCE = 2.0
-# After a stop the same goal is tried for so long, so often [s].
-PATIENCE, RESUME_PERIOD = 5.0, 0.05
+# After a stop the same goal is tried so often [s].
+RESUME_PERIOD = 0.05
 # It is waited for so long, each time, until it is known whether the body stands still [s].
 LONGEST_UNKNOWN = 2.0
 # More requests than these do not wait; that is logged at most this often [s].
 MOST_WAITING, WARNING_PERIOD = 64, 5.0
 CANCELLED = (ErrorCode.PREEMPTED, 'the request was cancelled')
+OVERTAKEN = (ErrorCode.PREEMPTED, 'another request has come meanwhile')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,9 +87,9 @@ class Response:
 class _Ticket:
     """One plan, until its motion is published or it ends without one."""
 
-    def __init__(self, goal: PointingGoal | None) -> None:
-        """Begin; without a goal it is that of the last target."""
-        self.goal, self.is_cancelled = goal, False
+    def __init__(self, goal: PointingGoal | None, request: int) -> None:
+        """Begin, with the number of its request; without a goal it is that of the last target."""
+        self.goal, self.request, self.is_cancelled = goal, request, False
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,21 +163,23 @@ class PlanQueue:
         self._is_closed = False
         # So far, and how many of them are not answered yet.
         self._n_requests, self._n_waiting = 0, 0
-        # The goal that was given up last after a stop, and the response to its last try.
-        self._given_up: tuple[PointingGoal | None, Response | None] = None, None
+        # The number of the request whose goal the arm pursues; None: of none.
+        self._pursued: int | None = None
+        # The goal that was given up last after a stop, and why.
+        self._given_up: tuple[PointingGoal | None, ErrorCode, str] = None, *CANCELLED
         # Not the node's clock: simulated time may stand still.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(PERIOD, self._follow_up, clock=steady)
 
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
-        future, ticket = Future(), _Ticket(goal)
         begin = time.perf_counter()
         if self._n_waiting >= MOST_WAITING:
             sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
             self._node.get_logger().warning(sentence, throttle_duration_sec=WARNING_PERIOD)
             return Response(False, ErrorCode.PREEMPTED, sentence, Path, lambda: None)
         self._n_requests += 1
+        future, ticket = Future(), _Ticket(goal, self._n_requests)
 
         def work() -> None:
             try:
@@ -219,6 +223,8 @@ class PlanQueue:
         # A copy is made at one go, while the worker removes tickets.
         for ticket in ended.copy():
             ticket.is_cancelled = True
+            if ticket.request == self._pursued:
+                self._given_up = ticket.goal, *CANCELLED
         return len(ended)
 
     def withdraw(self, goal: PointingGoal) -> None:
@@ -235,16 +241,19 @@ class PlanQueue:
         is_open = any(ticket.goal is goal for ticket in self._open.copy())
         return is_open or self._monitor.has_stopped(goal)
 
-    def response_to_given_up(self, goal: PointingGoal) -> Response | None:
+    def why_given_up(self, goal: PointingGoal) -> tuple[ErrorCode, str] | None:
         """Return how the last try after a stop ended, where this goal was given up then."""
-        given_up, response = self._given_up
-        return response if given_up is goal else None
+        given_up, code, sentence = self._given_up
+        return (code, sentence) if given_up is goal else None
 
     def close(self) -> None:
         """End all work; nothing is published afterwards, and no request may follow."""
         self._is_closed = True
         self.cancel()
         self._monitor.close()
+        # Who waits hears of it, as far as that is possible.
+        with suppress(Exception):
+            self._note_end()
         self._worker.shutdown(wait=True, cancel_futures=True)
         self._planner.close()
 
@@ -261,12 +270,15 @@ class PlanQueue:
 
         The request is settled as soon as its motion is published, in the node's own thread.
         patience: how long to plan again while the wearer moves [s]; None: `time_limit`. Return
-        whether the wearer is in the way of it, or has moved.
+        whether it may have a motion a moment later.
         """
         parameters = self._parameters_for(ticket)
 
         def settle_published(outcome: PlanOutcome, parameters: PlannerParameters) -> None:
-            settle(self._response(outcome, parameters, begin))
+            sentence = f'{outcome.sentence}; request {ticket.request}'
+            if not self._publishers.has_listener():
+                sentence += f'; nobody is subscribed to {self._publishers.motion_topic}'
+            settle(self._response(replace(outcome, sentence=sentence), parameters, begin))
 
         try:
             outcome = self._plan(goal, ticket, parameters, settle_published, patience)
@@ -285,7 +297,7 @@ class PlanQueue:
             outcome = replace(outcome, sentence=outcome.sentence + noted)
             self._reporter.incident(file)
         settle(self._response(outcome, parameters, begin))
-        return outcome.is_outdated or outcome.is_in_the_way
+        return outcome.code not in FINAL
 
     def _plan(
         self,
@@ -487,6 +499,8 @@ class PlanQueue:
             lambda: self._publishers.publish_planned(msg),
             math.inf if handover is None else handover.joins,
         )
+        self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
+        self._reporter.pursued(ticket.request)
         return True
 
     def _follow_up(self) -> None:
@@ -503,24 +517,45 @@ class PlanQueue:
                 self._discard_resumption()
                 duration = stop.trajectory.duration
                 self._resumption = _Resumption(
-                    _Ticket(stop.goal),
+                    _Ticket(stop.goal, self._pursued or 0),
                     stop.goal,
                     stop.n_motions,
                     self._n_requests,
                     self._now() + duration,
                     time.monotonic() + duration + LONGEST_SETTLING,
-                    time.monotonic() + duration + PATIENCE,
+                    time.monotonic() + duration + self._reporter.parameters.patience,
                     is_during_stop=stop.scene is not None,
                 )
                 self._open.add(self._resumption.ticket)
         resumption = self._resumption
-        if resumption is None:
-            return
-        if self._is_overtaken(resumption):
+        if resumption is not None and self._is_overtaken(resumption):
+            self._give_up(resumption, *OVERTAKEN)
             self._discard_resumption()
-        elif resumption.is_due(self._inputs.joints.value, self._reporter.parameters.rest_speed):
+        elif resumption is not None and resumption.is_due(
+            self._inputs.joints.value, self._reporter.parameters.rest_speed
+        ):
             self._resumption = None
             self.prepare(partial(self._resume, resumption))
+        self._note_end()
+
+    def _give_up(self, resumption: _Resumption, code: ErrorCode, sentence: str) -> None:
+        """Keep why the goal of a stopped motion is given up, unless another motion has begun."""
+        if resumption.n_motions == self._monitor.n_motions:
+            self._given_up = resumption.goal, code, sentence
+
+    def _note_end(self) -> None:
+        """Report a goal that is not pursued any more before the arm has arrived."""
+        monitor, goal = self._monitor, self._monitor.goal
+        if goal is None or monitor.is_monitoring or self.pursues(goal):
+            return
+        if self._pursued is not None:
+            self._pursued = None
+            if not monitor.has_arrived:
+                why = self.why_given_up(goal)
+                stopped = self._reporter.monitor_state[1] or monitor.stop_reason
+                self._reporter.given_up(stopped if why is None else answer(*why))
+        if monitor.running is None:
+            self._reporter.nothing_runs()
 
     def _is_overtaken(self, resumption: _Resumption) -> bool:
         """Return whether one was commanded since its stop, or requested since its first try."""
@@ -536,21 +571,25 @@ class PlanQueue:
         """Plan again for the goal of a motion that was stopped; called in the worker's thread."""
         ticket = resumption.ticket
         if ticket.is_cancelled or self._is_overtaken(resumption):
+            self._give_up(resumption, *(CANCELLED if ticket.is_cancelled else OVERTAKEN))
             self._open.discard(ticket)
             return
         responses: list[Response] = []
         begin, present = time.perf_counter(), time.monotonic()
         n_requests = resumption.n_requests if not resumption.is_first else self._n_requests
-        is_blocked = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
+        may_pass = self._work(resumption.goal, begin, ticket, responses.append, 0.0)
         response = responses[-1]
         if resumption.is_during_stop and not response.is_solved:
             self._resumption = replace(resumption, is_during_stop=False)
             return
+        is_last = not may_pass or present >= resumption.end
         if response.is_solved or resumption.is_first:
             response.conclude()
-        if not response.is_solved and resumption.is_first:
+        elif is_last:
+            self._reporter.revise(response.code, response.sentence)
+        if not response.is_solved and (resumption.is_first or is_last):
             self._monitor.report_hold(response.text)
-        if is_blocked and present < resumption.end:
+        if not is_last:
             self._resumption = replace(
                 resumption,
                 n_requests=n_requests,
@@ -560,7 +599,7 @@ class PlanQueue:
             )
         else:
             if not response.is_solved:
-                self._given_up = resumption.goal, response
+                self._give_up(resumption, response.code, response.sentence)
             self._open.discard(ticket)
 
     def _check_stop(self, stop: Stop) -> None:
