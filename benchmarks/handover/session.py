@@ -209,6 +209,8 @@ class _Session:
                 assert_liveliness=lambda: None,
                 publish_ray_clear=lambda _: None,
                 flush=lambda: None,
+                motion_topic='joint_trajectory',
+                has_listener=lambda: True,
             ),
         )
         self._timer: Callable[[], None] = lambda: None
@@ -253,6 +255,8 @@ class _Session:
                 create_timer=create_timer,
                 get_clock=lambda: clock,
                 get_logger=lambda: logger,
+                # Virtual time has nothing to do with the steady clock.
+                get_parameter=lambda _: SimpleNamespace(value=True),
                 context=SimpleNamespace(ok=lambda: True),
             ),
         )
