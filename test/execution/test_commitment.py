@@ -32,7 +32,7 @@ ARM = table_1_arm(0.02)
 SETTINGS = Separation(arm=ARM, rules=RULES, margin=MARGIN, limits=limits(), stop_limits=limits())
 PERIOD = 1.0 / 120.0
 # Where a stop is replaced by another motion: the arm may be so far from that.
-JUMP, SPEED_JUMP = 2e-4, 0.0205
+JUMP, SPEED_JUMP = 2e-4, 0.022
 
 
 def body_at(age=0.02, scene=None):
