@@ -29,7 +29,7 @@ TRANSPORTS = (0.0, 0.02, 0.05, 0.1)
 VERSIONS = (ControllerVersion.V4_20, ControllerVersion.V4_42, ControllerVersion.V6_9)
 PAGE = Path('docs/ros_control.md')
 # The block of the page that this program writes.
-TOP, END = '<!-- written by python -m benchmarks.handover --write -->\n', '<!-- end -->\n'
+TOP, END = '<!-- written by python -m benchmarks.handover --write -->\n', '<!-- written end -->\n'
 HEADER = (
     '| controller | separation | lag [ms] | handovers | extensions | stops | '
     'off the message before, at most [rad] | of them > 1e-4 rad | greatest velocity [limit] | '

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from rrth_planner.execution.command import ahead
 from rrth_planner.execution.commitment import Commitment
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import tool_pose
@@ -28,7 +29,7 @@ CHAIN = 5
 # Dead times: what the delay of the controller leaves of them is the age of a frame [s].
 DEAD_TIMES, DELAY = (0.03, 0.05, 0.1), 0.01
 CONTACT_SPEEDS, STOPS = (0.1, 0.25, 0.0), ('4/40', '10/400')
-# How late an extension is that jumps [s], looked at so often until then.
+# How late after its publication an extension comes that jumps [s], looked at so often until then.
 LATE, LOOKS = 0.02, 9
 # A stop is one that ended so much before the next commitment came [s].
 ENDED = 1e-3
@@ -131,7 +132,8 @@ def timed(dead: float, case: Case, plan: MotionPlan, rng: np.random.Generator) -
 
 def jump_of(before: Commitment, after: Commitment) -> Array:
     """Return by how much the arm jumps where a commitment comes up to LATE late [rad, rad/s]."""
-    late = np.linspace(0.0, LATE, LOOKS)
+    # It begins once a controller has it.
+    late = np.linspace(0.0, LATE - ahead(DELAY), LOOKS)
     one = sample(before.trajectory, after.start_time - before.start_time + late)
     other = sample(after.trajectory, late)
     return np.array([np.abs(one[k] - other[k]).max() for k in (0, 1)])

@@ -95,13 +95,14 @@ class MarkerEyes(Eyes):
             if is_seen or self._unseen == DELETED:
                 markers.append(marker)
         now, sent = taken + self._age, (self._n, self._n)
-        edits = read_edits(MarkerArray(markers=markers), now, FRAME, latency=self._age)
+        array = MarkerArray(markers=markers)
+        edits = read_edits(array, now, FRAME, latency=self._age)
         self._known = self._order.apply(
             self._known,
             edits,
             sent,
             now,
-            is_description=self._publishers.is_description(edits, sent, now),
+            is_description=self._publishers.is_description(array, sent, now),
             keep_removed=KEPT,
         )
 

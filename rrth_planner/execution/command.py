@@ -105,18 +105,24 @@ def led(lead: Trajectory, after: ExecutingMotion) -> ExecutingMotion:
 
 
 def stop_along(
-    running: ExecutingMotion, phase: float, now: float, limits: MotionLimits, delay: float
+    running: ExecutingMotion,
+    phase: float,
+    now: float,
+    limits: MotionLimits,
+    delay: float,
+    is_on_reception: bool = False,
 ) -> ExecutingMotion:
     """
     Return the fail-safe stop along a motion, to be published now [s].
 
     phase: the time within the motion that is commanded now [s]; delay: greatest delay of the
-    controller [s]. Before the motion begins the stop begins with it.
+    controller [s]; is_on_reception: the controller executes it from its begin, whatever time it
+    is by its clock. Before the motion begins the stop begins with it.
     """
     if phase < 0.0:
         stop = fast_stop(running.trajectory, phase, limits)
         return ExecutingMotion(trajectory=stop, start_time=running.start_time)
-    back = min(phase, now - begin_of(now, delay))
+    back = 0.0 if is_on_reception else min(phase, now - begin_of(now, delay))
     stop = fast_stop(running.trajectory, phase - back, limits, back + ahead(delay))
     return ExecutingMotion(trajectory=stop, start_time=now - back)
 

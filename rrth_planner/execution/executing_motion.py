@@ -127,8 +127,8 @@ class ExecutingMotion:
         gaps = np.abs(places - q).max(axis=1)
         k = int(gaps.argmin())
         square = float(paces[k] @ paces[k])
-        # Not every driver has velocities.
-        is_slow = square > PACED**2 and float(v @ paces[k]) < SLOWEST * square
+        # Not every driver has velocities: some send zeros.
+        is_slow = v.any() and square > PACED**2 and float(v @ paces[k]) < SLOWEST * square
         return bool(gaps[k] <= FOLLOWS) and not is_slow
 
     def deviation(self, q: Array, taken: float, lag: float) -> float:

@@ -200,7 +200,7 @@ def test_an_error_that_cannot_be_recorded_is_answered(start, monkeypatch):
         raise OSError('nothing works')
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'publish', fail)
+        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
         patch.setattr(incidents, 'error_incident', fail)
         message = stranger.answer().message
     assert message == 'FAILURE (99999): planning failed unexpectedly: OSError: nothing works'
@@ -215,7 +215,7 @@ def test_an_error_after_the_plan_is_kept_with_the_motion(start, monkeypatch, tmp
         raise OSError('no publisher')
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner._queue._publishers, 'publish', fail)
+        patch.setattr(planner._queue._publishers, 'publish_motion', fail)
         message = stranger.answer().message
     (file,) = tmp_path.iterdir()
     assert message == (

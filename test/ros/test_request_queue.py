@@ -15,6 +15,7 @@ from rclpy.node import Node  # noqa: E402
 from rrth_planner.model.goal import PointingGoal  # noqa: E402
 from rrth_planner.pipeline.in_process_planner import InProcessPlanner  # noqa: E402
 from rrth_planner.ros.interface.inputs import Inputs  # noqa: E402
+from rrth_planner.ros.interface.parameters import NEVER  # noqa: E402
 from rrth_planner.ros.interface.publishers import PlanPublishers  # noqa: E402
 from rrth_planner.ros.interface.reporter import Reporter  # noqa: E402
 from rrth_planner.ros.messages.body import WearerBody  # noqa: E402
@@ -40,7 +41,7 @@ def _queue():
         np.array(worlds.FOLDED), np.zeros(ARM.dof), now, now, float('inf')
     )
     inputs.body.measured = inputs.joints.measured = now
-    publishers, reporter = PlanPublishers(node), Reporter(node, inputs, parameters)
+    publishers, reporter = PlanPublishers(node, NEVER), Reporter(node, inputs, parameters)
     monitor = ExecutionMonitor(node, inputs, reporter, publishers)
     queue = PlanQueue(node, inputs, reporter, publishers, monitor, InProcessPlanner())
     yield queue

@@ -19,8 +19,9 @@ from trajectory_msgs.msg import JointTrajectory
 
 # A motion that points so far past the target was planned for another one [m].
 OTHER_TARGET = 1e-3
-# Durations of a motion in an answer and in its message are as close as that [s].
-SAME_DURATION = 2e-3
+# Durations of a motion in an answer and in its message are as close as that; what a moving arm was
+# commanded before it takes at most so long [s].
+SAME_DURATION, LONGEST_LEAD_IN = 2e-3, 2.0
 # An arm that has arrived stays there for so long [s].
 SETTLED = 0.1
 # And moves no faster [rad/s].
@@ -34,7 +35,7 @@ def announced_motion(client: PlannerClient, arm: ArmModel, duration: float) -> T
     def received() -> list[Trajectory]:
         # The motion of an earlier request, latched on the topic, may come first.
         motions = _motions_of(client.commanded, arm)
-        return [m for m in motions if abs(m.duration - duration) < SAME_DURATION]
+        return [m for m in motions if _is_of_duration(m, duration)]
 
     client.wait_for(lambda: bool(received()), client.resolve_topic_name('joint_trajectory'))
     return received()[-1]
@@ -103,6 +104,17 @@ def follow(
         f'{motion.duration:.2f} s, expected at most {tolerance:g} [rad] and an arm at rest within '
         f'{client.timeout:g} s more{hint}'
     )
+
+
+def _is_of_duration(motion: Trajectory, duration: float) -> bool:
+    """Return whether a motion takes so long [s], after the rest or motion that it begins with."""
+    begins_at_rest = len(motion.times) > 1 and not (
+        motion.velocities[:2].any() or np.ptp(motion.positions[:2], axis=0).any()
+    )
+    longer = motion.duration - duration
+    if begins_at_rest:
+        return abs(longer - motion.times[1]) < SAME_DURATION or abs(longer) < SAME_DURATION
+    return -SAME_DURATION < longer < LONGEST_LEAD_IN * motion.velocities[0].any() + SAME_DURATION
 
 
 def _motions_of(commanded: Sequence[JointTrajectory], arm: ArmModel) -> list[Trajectory]:

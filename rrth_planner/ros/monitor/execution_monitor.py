@@ -279,7 +279,14 @@ class ExecutionMonitor:
         if self._commitments.is_active or self._tracker.commands(running):
             phase = now - running.start_time
         parameters = self._parameters
-        return stop_along(running, phase, now, parameters.stop_limits, parameters.controller_delay)
+        return stop_along(
+            running,
+            phase,
+            now,
+            parameters.stop_limits,
+            parameters.controller_delay,
+            self._is_unstamped,
+        )
 
     def on_body(self, body: WearerBody, arrived: int, is_newest: bool = True) -> None:
         """
@@ -331,6 +338,7 @@ class ExecutionMonitor:
         with suppress(Exception):
             self._node.get_logger().error(found.sentence)
         running, now = self.running, self._now()
+        self._is_unstamped = True
         if running is not None and self._state is MonitorState.STOPPING and self.is_active(now):
             # A controller by the same clock has jumped along its stop.
             phase = self._phase_or_elapsed(running, now)
@@ -338,7 +346,6 @@ class ExecutionMonitor:
                 stop = self._stop_of(running, phase, now)
                 self._publishers.publish_motion(stop.trajectory, self._parameters, 0.0)
                 self._tracker.repeat_stop(stop)
-        self._is_unstamped = True
         self.fail(found.sentence)
 
     def hold(self, until: float) -> ExecutingMotion | None:
@@ -578,7 +585,7 @@ class ExecutionMonitor:
 
     def _check_periodically(self) -> None:
         self._check_clock()
-        self._tracker.check_command(self._now())
+        self._tracker.check_command(self._now(), time.monotonic())
         if self._state is not MonitorState.IDLE:
             self._check_inputs()
         if self.pending_stop:

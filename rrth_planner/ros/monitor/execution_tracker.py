@@ -127,8 +127,12 @@ class ExecutionTracker:
         """Take it that the controller holds the arm where that is."""
         self.command = self._off_since = None
 
-    def check_command(self, now: float) -> None:
-        """Forget the command where the arm has rested off it for a while, by its readings."""
+    def check_command(self, now: float, steady: float) -> None:
+        """
+        Forget the command where the arm has rested off it for a while, by its readings.
+
+        steady: now by a clock that is never set, and does not stand still [s].
+        """
         command, reading = self.command, self._joints.value
         if command is None or reading is None:
             return
@@ -139,8 +143,8 @@ class ExecutionTracker:
         if not is_off or reading.is_moving(now, self._rest_speed):
             self._off_since = None
         elif self._off_since is None:
-            self._off_since = now
-        elif abs(now - self._off_since) > OFF_AFTER:
+            self._off_since = steady
+        elif steady - self._off_since > OFF_AFTER:
             self.forget_command()
 
     def commands(self, motion: ExecutingMotion) -> bool:
@@ -163,7 +167,7 @@ class ExecutionTracker:
         motions = self.motion, self._stopped, self._previous
         self.motion, self._stopped, self._previous = (m and m.shifted(step) for m in motions)
         self.command = self.motion or (self.command and self.command.shifted(step))
-        self._last_on_motion, self._off_since = self._last_on_motion + step, None
+        self._last_on_motion += step
 
     def is_over(self, now: float, rest_speed: float = REST_SPEED) -> bool:
         """
