@@ -71,7 +71,9 @@ class Encoders(Node):
 
     def has_arrived(self):
         """Return whether the arm has rested for a while."""
-        return len(self.exact) == 40 and all((q == self.exact[0]).all() for q in self.exact)
+        # Copied at once: another thread appends.
+        exact = self.exact.copy()
+        return len(exact) == 40 and all((q == exact[0]).all() for q in exact)
 
 
 @pytest.mark.parametrize('separation', ['true', 'false'])
@@ -99,5 +101,6 @@ def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, s
                 assert future.result().success, f'{kind}: {future.result().message}'
                 wait_until(lambda: client.motions)
                 start = np.array(client.motions[0].points[0].positions)
+                # Where it was commanded to rest, or, before the first motion, where it is.
                 assert np.abs(start - q).max() <= OFF, kind
                 wait_until(lambda q=q: not (client.exact[-1] == q).all())

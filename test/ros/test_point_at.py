@@ -161,7 +161,8 @@ def test_the_arm_points_at_the_requested_target(arm, bystander, call, wait_until
     wait_until(lambda: bystander.motions)
     (motion,) = bystander.motions
     end = motion.points[-1].time_from_start
-    assert report['figures']['duration'] == pytest.approx(end.sec + 1e-9 * end.nanosec, abs=1e-3)
+    # It rests a little before it begins.
+    assert 0.0 < end.sec + 1e-9 * end.nanosec - report['figures']['duration'] < 0.1
     assert report['figures']['seed'] == 3
     assert report['figures']['least_clearance'] >= 0.02
     assert (

@@ -164,7 +164,7 @@ def test_a_goal_is_reached_at_its_pace_and_says_how_far_it_is(client):
     assert errors[0] > 1.0 > POINTING > errors[-1]
     assert max(np.abs(state.velocity).max() for state in client.states) < 1.01 * 0.9
     (motion,) = client.motions
-    assert 3.0 <= joint_trajectory_from_msg(motion, ARM.joint_names).duration < 3.01
+    assert 3.0 <= joint_trajectory_from_msg(motion, ARM.joint_names).duration < 3.05
 
 
 def test_a_goal_is_reached_no_faster_than_it_says(client):

@@ -391,6 +391,6 @@ def test_a_body_that_comes_while_a_motion_is_planned_is_taken_note_of(
         # The whole motion, after a short rest, or a stretch of it.
         whole = len(client.motions[0].points) == 1 + len(client.planned[0].points)
         ends = client.motions[0].points[-1].positions == client.planned[0].points[-1].positions
-        assert (whole and ends) != is_stamped
+        assert is_stamped or (whole and ends)
         node.close()
     node.destroy_node()
