@@ -35,7 +35,7 @@ TARGETS = (1.5, 0.1, 0.3), (1.5, 0.5, 0.4)
 # So many requests of each kind.
 N_REQUESTS = {'0.1 mrad': 3, '1 mrad': 10, '4,096 counts': 3}
 # A mean of 31 readings is hardly ever further off [rad], nor is a count.
-OFF = 1.2e-3
+OFF, FIRST_OFF = 1.2e-3, 5e-3
 
 
 class Encoders(Node):
@@ -88,7 +88,7 @@ def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, s
         stack.enter_context(ChildProcess(node('planner'), given, lambda _: None))
         stack.enter_context(spinning(client))
         wait_until(client.plan.service_is_ready, 120.0)
-        targets = cycle(TARGETS)
+        targets, is_first = cycle(TARGETS), True
         for kind, n_requests in N_REQUESTS.items():
             client.encode = ENCODERS[kind]
             for _ in range(n_requests):
@@ -101,6 +101,7 @@ def test_all_requests_begin_and_where_the_arm_is(separation, wait_until, send, s
                 assert future.result().success, f'{kind}: {future.result().message}'
                 wait_until(lambda: client.motions)
                 start = np.array(client.motions[0].points[0].positions)
-                # Where it was commanded to rest, or, before the first motion, where it is.
-                assert np.abs(start - q).max() <= OFF, kind
+                # Of the first motion the planner may have had a single reading before.
+                assert np.abs(start - q).max() <= (FIRST_OFF if is_first else OFF), kind
+                is_first = False
                 wait_until(lambda q=q: not (client.exact[-1] == q).all())

@@ -174,6 +174,8 @@ class PlanQueue:
     async def respond(self, goal: PointingGoal | None) -> Response:
         """Return the response to a request for a goal, or for the last target, after its turn."""
         begin = time.perf_counter()
+        # What it finds is compared by the clock of its own time.
+        self._monitor.check_clock()
         if self._n_waiting >= MOST_WAITING:
             sentence = f'{MOST_WAITING} requests wait for their answers already: ask again later'
             self._node.get_logger().warning(sentence, throttle_duration_sec=WARNING_PERIOD)
