@@ -16,8 +16,8 @@ import sys
 
 from rrth_planner.simulation.trajectory_controller import ControllerVersion
 
-from benchmarks.handover.judge import EXTENSION, HANDOVER, Join, STOP, Sum, summed
-from benchmarks.handover.session import Case, joins_of
+from benchmarks.handover.judge import EXTENSION, HANDOVER, STOP, Sum, summed
+from benchmarks.handover.session import Case, joins_of_item
 from benchmarks.separation.runs import each
 
 # Handovers, extensions and stops at each lag.
@@ -58,11 +58,6 @@ def line_of(name: str, case: Case, total: Sum) -> str:
     )
 
 
-def run(n: int, item: tuple[Case, int]) -> list[Join]:
-    """Return what was seen in a session."""
-    return joins_of(item[0], n, item[1])
-
-
 def lines(n: int, seed: int, jobs: int) -> list[str]:
     """Return the lines of the table, with n handovers, extensions and stops at each lag."""
     rows: list[tuple[str, list[Case]]] = [
@@ -87,7 +82,7 @@ def lines(n: int, seed: int, jobs: int) -> list[str]:
         # Half of those of a lag are with separation.
         share = -(-n // (2 * len(cases)))
         items = [(case, seed + k) for k, case in enumerate(cases)]
-        joins = each(partial(run, share), items, jobs, name)
+        joins = each(partial(joins_of_item, share), items, jobs, name)
         line = line_of(name, cases[0], summed([join for some in joins for join in some]))
         print(line, flush=True)
         found.append(line)

@@ -114,6 +114,11 @@ def joins_of(case: Case, n: int, seed: int) -> list[Join]:
     return _Session(case, seed).run(n)
 
 
+def joins_of_item(n: int, item: tuple[Case, int]) -> list[Join]:
+    """Return `joins_of` a case and a seed, for a process of its own."""
+    return joins_of(item[0], n, item[1])
+
+
 @cache
 def _parameters() -> PlannerParameters:
     arm = the_arm()

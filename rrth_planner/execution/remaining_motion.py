@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of the remaining motion against the present wearer."""
 
-from dataclasses import replace
-
 import numpy as np
 from rrth_planner.collision.box_tree import tree_depth
 from rrth_planner.collision.certificate import BERNSTEIN_3, BERNSTEIN_4, FINENESS
@@ -23,54 +21,8 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import (
-    joined,
-    near_point,
-    part_of,
     positions_at,
-    sample,
-    Trajectory,
 )
-
-# At a handover the states of both motions agree to rounding: positions, velocities and
-# accelerations [rad, rad/s, rad/s^2].
-SAME_STATE = 1e-11, 1e-9, 1e-6
-# Newton's steps to the time of that state; a square of a speed that counts as none [rad^2/s^2].
-REFINEMENTS, TINY = 3, 1e-12
-
-
-def with_lead_in(
-    before: ExecutingMotion, phase: float, after: ExecutingMotion, now: float
-) -> ExecutingMotion:
-    """
-    Return a motion that begins a little later, preceded by the present motion until then.
-
-    The arm is now at the time `phase` within the motion before [s]. The motion after is returned
-    as it is where it does not continue that.
-    """
-    duration = before.trajectory.duration
-    if phase < 0.0 or len(before.trajectory.times) == 1 or len(after.trajectory.times) == 1:
-        return after
-    # By position, not by time: clocks differ by microseconds, and an arm may be slower than its
-    # motion.
-    first = after.trajectory.positions[0]
-    end = before.near(min(phase + after.start_time - now, duration), first)
-    for _ in range(REFINEMENTS):
-        q, v, _ = (row[0] for row in sample(before.trajectory, [end]))
-        end += float((first - q) @ v) / max(float(v @ v), TINY)
-    end = near_point(before.trajectory, end)
-    if not phase < end <= duration or not _is_same_state(before.trajectory, end, after.trajectory):
-        return after
-    lead_in = part_of(before.trajectory, phase, end)
-    return replace(after, trajectory=joined(lead_in, after.trajectory), start_time=now)
-
-
-def _is_same_state(before: Trajectory, end: float, after: Trajectory) -> bool:
-    """Return whether a motion begins with the state of another one at a time [s]."""
-    begin = (after.positions[0], after.velocities[0], after.accelerations[0])
-    return all(
-        np.abs(one[0] - other).max() <= same
-        for one, other, same in zip(sample(before, [end]), begin, SAME_STATE, strict=True)
-    )
 
 
 def is_remaining_free(

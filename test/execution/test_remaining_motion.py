@@ -6,7 +6,6 @@ import functools
 
 from hypothesis import given, strategies as st
 import numpy as np
-import pytest
 from rrth_planner.collision import reference_checker
 from rrth_planner.collision.certificate import certify
 from rrth_planner.collision.reference_checker import frames, quintic_states
@@ -16,15 +15,12 @@ from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
     is_place_free,
     is_remaining_free,
-    with_lead_in,
 )
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.trajectory import (
-    joined,
     part_of,
     piece_coefficients,
     sample,
-    Trajectory,
 )
 from rrth_planner.timing.fast_stop import fast_stop, LATENCY
 from rrth_planner.timing.parameterization import limit_ratio
@@ -234,55 +230,3 @@ def some_motions():
     """Return a few motions round the wearer."""
     rng = np.random.default_rng(12)
     return [motion for motion in [random_motion(rng) for _ in range(12)] if motion is not None]
-
-
-@pytest.mark.parametrize(
-    ('late', 'rate'), [(0.0, 1.0), (1e-5, 1.0), (-1e-5, 1.0), (0.003, 1.0), (0.0, 0.5), (0.0, 0.1)]
-)
-def test_a_handover_is_tracked_from_its_publication_on(late, rate):
-    n_known = 0
-    for motion in some_motions():
-        before = ExecutingMotion(trajectory=motion, start_time=100.0)
-        begin, begin_ahead = 0.3 * motion.duration, 0.025
-        # Its first two points are close, as those of a lead-in.
-        at = begin + rate * begin_ahead
-        later = joined(
-            part_of(motion, at, at + 0.001), part_of(motion, at + 0.001, motion.duration)
-        )
-        after = ExecutingMotion(trajectory=later, start_time=150.0)
-        now = 150.0 - begin_ahead
-        whole = with_lead_in(before, begin - late, after, now)
-        # At rest the position does not determine the time.
-        if np.abs(sample(motion, [at])[1]).max() < 0.05:
-            continue
-        n_known += 1
-        assert whole.start_time == now
-        assert whole.trajectory.duration == pytest.approx(motion.duration - begin + late, abs=1e-6)
-        times = np.linspace(0.0, whole.trajectory.duration, 300)
-        q, _, _ = sample(whole.trajectory, times)
-        expected, _, _ = sample(motion, begin - late + times)
-        assert np.abs(q - expected).max() < 1e-5
-        # No jump where they meet, and none in a stop that follows it.
-        assert limit_ratio(whole.trajectory, limits()) < 1.01
-        assert limit_ratio(fast_stop(whole.trajectory, 0.001, limits()), limits()) < 1.01
-    assert n_known >= 5
-
-
-def test_an_arm_off_its_motion_is_not_located_before_the_handover():
-    motion = some_motions()[0]
-    before = ExecutingMotion(trajectory=motion, start_time=100.0)
-    half = 0.5 * motion.duration
-    later = part_of(motion, half, motion.duration)
-    after = ExecutingMotion(trajectory=later, start_time=100.0 + half)
-    assert with_lead_in(before, half - 0.02, after, 100.0 + half - 0.02).start_time < 100.0 + half
-    # Its motion is over before, has not begun, or does not lead there.
-    assert with_lead_in(before, 0.9 * motion.duration, after, 100.0) is after
-    assert with_lead_in(before, -0.1, after, 100.0) is after
-    aside = Trajectory(
-        times=later.times,
-        positions=later.positions + [0.0, 1e-4, 0.0, 0.0],
-        velocities=later.velocities,
-        accelerations=later.accelerations,
-    )
-    aside = ExecutingMotion(trajectory=aside, start_time=100.0 + half)
-    assert with_lead_in(before, half - 0.02, aside, 100.0 + half - 0.02) is aside

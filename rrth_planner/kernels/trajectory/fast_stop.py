@@ -28,6 +28,9 @@ AHEAD, FURTHER, CELL, MOST_CELLS = 3.0, 4.0, 0.01, 256
 # Shares of the limits that are tried: at first a little more than 1, since the motion may itself
 # be at a limit when the stop begins; less where the points of the stop exceed the limits.
 RESERVES = (1.003, 0.985, 0.95, 0.85)
+# A motion that rests so shortly before a stop may begin ends there: within this time it would have
+# moved on by 7e-6 rad at 40 rad/s^3 [s].
+AT_REST = 0.01
 
 
 @kernel(int64(CUBE, VEC, float64, int64, OUT_VEC, OUT_CUBE), is_inner=True)
@@ -113,7 +116,8 @@ def write_fast_stop(curves, times, now, lead, velocity, acceleration, jerk, poin
     copy(velocity, limits[0])
     copy(acceleration, limits[1])
     copy(jerk, limits[2])
-    rest = first_rest(curves, times, now)
+    # A motion that went on long before the stop may begin is not stopped by its rest.
+    rest = first_rest(curves, times, now + max(lead - AT_REST, 0.0))
     end, begin = times[rest], avoid_points(times, now + lead)
     window = 0.0
     while begin + window < end:
