@@ -13,7 +13,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/env"
 "$folder/env/bin/python" -m pip install -q --disable-pip-version-check \
-    python-fcl==0.7.0.11 numpy==2.2.6 coal==3.0.2
+    python-fcl==0.7.0.11 numpy==2.2.6
 "$folder/env/bin/python" - <<'PYTHON'
 import fcl
 import numpy as np

@@ -3,6 +3,7 @@
 """Messages to the core's types and back: round trips, and a sentence for each rejection."""
 
 from dataclasses import replace
+from fractions import Fraction
 from itertools import pairwise
 
 from hypothesis import given, settings, strategies as st
@@ -332,6 +333,16 @@ def test_a_trajectory_survives_the_way_to_a_message_and_back():
     back = joint_trajectory_from_msg(msg, JOINTS)
     for name in ('times', 'positions', 'velocities', 'accelerations'):
         np.testing.assert_array_equal(getattr(back, name), getattr(motion(), name))
+
+
+@pytest.mark.parametrize('begin', [0.0, 12.25, 1_795_920_508.139292717, 1_800_000_000.0 - 2**-22])
+def test_the_stamp_of_a_motion_is_its_begin_to_half_a_nanosecond(begin):
+    # As one number, nanoseconds since 1970 are 256 apart.
+    still = np.zeros((1, 4))
+    point = Trajectory([0.0], [FOLDED], still, still)
+    stamp = joint_trajectory_to_msg(point, JOINTS, 'torso', begin).header.stamp
+    found = Fraction(stamp.sec) + Fraction(stamp.nanosec, 10**9)
+    assert abs(found - Fraction(begin)) <= Fraction(1, 2 * 10**9)
 
 
 @settings(max_examples=50)

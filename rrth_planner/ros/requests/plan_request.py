@@ -14,7 +14,7 @@ from rrth_planner.io.incident import disagreement_incident, Incident
 from rrth_planner.model.arrays import Array, FARTHEST
 from rrth_planner.model.errors import RrthError
 from rrth_planner.model.goal import PointingGoal
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.trajectory import MotionState, sample, Trajectory
 from rrth_planner.pipeline.motion_plan import MotionPlan
 from rrth_planner.pipeline.planning_process import Planner
 from rrth_planner.pipeline.request import PlanQuestion
@@ -217,8 +217,12 @@ def _handover(
     start = snapshot.start_state_at(running, time, parameters.arm, delay)
     is_commanded = snapshot.is_commanded(running, delay) and start.running is not None
     if is_commanded and running is not None and start.time < running.trajectory.duration:
-        # At a point of the motion where there is one.
+        # Numbers of seconds since 1970 are 0.24 us apart: the state is that of such a one.
         time = running.start_time + start.time
+        since = time - running.start_time
+        q, v, a = (row[0] for row in sample(running.trajectory, [since]))
+        state = MotionState(positions=q, velocities=v, accelerations=a)
+        start = replace(start, state=state, time=since)
     return Handover(time, lead, start, running, delay, is_commanded)
 
 
