@@ -412,6 +412,7 @@ class _Session:
             snapshot.goal,
             parameters,
             joins=math.inf if handover is None else handover.joins,
+            planned_from=None if handover is None else handover.before,
         )
         return True
 

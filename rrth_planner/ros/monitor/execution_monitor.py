@@ -188,6 +188,7 @@ class ExecutionMonitor:
         parameters: PlannerParameters,
         publish: Callable[[], None] = lambda: None,
         joins: float | None = math.inf,
+        planned_from: ExecutingMotion | None = None,
     ) -> None:
         """
         Publish a motion, and monitor it with the parameters of its plan.
@@ -203,6 +204,8 @@ class ExecutionMonitor:
         joins : float or None
             The time within what is commanded at which the motion begins [s]; inf: at rest. None:
             what is commanded until then is not known.
+        planned_from : ExecutingMotion or None
+            What was commanded when the motion was planned, where that counts.
 
         """
         with self._lock:
@@ -218,6 +221,11 @@ class ExecutionMonitor:
             before = copy(self._tracker), self._parameters, self._goal, self._state
             commitments = copy(self._commitments)
             try:
+                if planned_from is not None and planned_from is not self._tracker.command:
+                    raise RequestError(
+                        ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                        'the arm was commanded something else while its motion was planned',
+                    )
                 now, delay = self._now(), parameters.controller_delay
                 lead = self._lead_in(planned, joins, now, delay)
                 commanded = self._commitments.begin(planned, parameters, lead)

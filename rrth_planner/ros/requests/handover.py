@@ -66,6 +66,11 @@ class Handover:
         return self.time + (LATE if self.start_state.running is None else 0.0)
 
     @property
+    def before(self) -> ExecutingMotion | None:
+        """What has to be commanded still when the motion is published; None: anything."""
+        return self.running if self.is_commanded else None
+
+    @property
     def joins(self) -> float | None:
         """The time within the commanded motion at which it begins [s]; None: not by its time."""
         if not self.is_commanded or self.running is None:

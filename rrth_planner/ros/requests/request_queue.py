@@ -500,6 +500,7 @@ class PlanQueue:
             parameters,
             lambda: self._publishers.publish_planned(msg),
             math.inf if handover is None else handover.joins,
+            None if handover is None else handover.before,
         )
         self._pursued, self._given_up = ticket.request, (None, *CANCELLED)
         self._reporter.pursued(ticket.request)
