@@ -1,5 +1,4 @@
 #!/usr/bin/env bash
-# Copyright 2026 The rrth_planner authors
 # SPDX-License-Identifier: Apache-2.0
 #
 # python-fcl 0.7.0.11: the distance from a thin capsule to a box that lies symmetrically beside it.
