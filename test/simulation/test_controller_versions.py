@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from rrth_planner.execution.command import lead_in, led
 from rrth_planner.execution.executing_motion import ExecutingMotion
-from rrth_planner.execution.remaining_motion import with_lead_in
 from rrth_planner.model.errors import OptionsError
 from rrth_planner.model.path import Path
 from rrth_planner.model.trajectory import part_of, sample
@@ -64,7 +64,8 @@ def handed_over(rate, share, rules, lag=0.0, *, ahead=AHEAD, has_lead_in=False, 
         trajectory=brake(RUNNING, share * RUNNING.duration, LIMITS), start_time=at
     )
     published = at - ahead
-    message = with_lead_in(before, published - BEGIN, new, published) if has_lead_in else new
+    lead = lead_in(before.trajectory, published - BEGIN, at - BEGIN)
+    message = led(lead, new) if has_lead_in else new
     assert (message is new) != has_lead_in
     # It joins the running motion a little before.
     begin = published - SETTLING
