@@ -435,6 +435,30 @@ def test_a_stop_that_the_arm_missed_comes_again_though_not_proven_where_nothing_
     assert len(arm.published) >= 3
 
 
+def test_an_arm_that_is_late_by_what_is_stated_is_not_taken_to_ignore_its_motion(separated):
+    arm = separated(controller_delay=0.5)
+    begin = arm.now
+    while arm.now < begin + 1.0:
+        arm.now += FRAME
+        # It rests for 0.45 s, and then executes all of it.
+        arm.read(*arm.commanded(max(arm.now - 0.45, arm.published[0][1]))[:2])
+        arm.see(FAR)
+        arm.monitor._on_timer()
+        assert arm.monitor._state is MonitorState.MONITORING
+    assert not arm.monitor.stop_reason
+
+
+def test_a_command_that_is_not_known_stays_so_when_the_clock_is_set(separated):
+    arm = separated()
+    tracker = arm.monitor._tracker
+    assert tracker.command is tracker.motion is not None
+    tracker.shift(1.0)
+    assert tracker.command is tracker.motion
+    tracker.forget_command()
+    tracker.shift(1.0)
+    assert tracker.command is None and tracker.motion is not None
+
+
 def test_an_arm_that_begins_the_whole_rest_late_is_stopped_when_it_is_given_up(separated):
     arm = separated()
     assert arm.monitor._commitments.is_whole

@@ -181,8 +181,9 @@ def test_a_client_that_leaves_with_open_requests_stops_no_motion_of_another(
 
     # One that was killed counts as there until its lease ends, one that left for a moment.
     wait_until(lambda: is_killed or n_gone() > 0)
-    # The motion comes to its end.
+    # The motion comes to its end, and all answers have left or are dropped.
     wait_until(lambda: np.abs(watcher.states[-1].velocity).max() < 1e-6)
+    wait_until(lambda: len(watcher.clear) > 250)
     print(f'{n_requests} open requests: {n_gone()} answers not sent', end=', ')
     print(f'~/ray_clear at most {1e3 * watcher.lateness():.0f} ms after the one before')
     assert not [line for line in said if 'fail-safe stop' in line or 'fault' in line]

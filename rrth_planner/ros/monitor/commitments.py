@@ -259,12 +259,15 @@ class Commitments:
         return self.phase(max(now, present.end_time)) >= present.motion.duration - ARRIVED
 
     def is_ignored(
-        self, reading: JointReading | None, running: ExecutingMotion, rest_speed: float
+        self,
+        reading: JointReading | None,
+        running: ExecutingMotion,
+        parameters: PlannerParameters,
     ) -> bool:
         """Take note of where the arm is; return whether it rests while it is to move on."""
         if reading is None:
             return False
-        if reading.is_moving(reading.taken, rest_speed):
+        if reading.is_moving(reading.taken, parameters.rest_speed):
             self._rest = None
             return False
         if self.is_active:
@@ -273,7 +276,8 @@ class Commitments:
             place, after = _place_on(running, reading.taken), IGNORED_WHOLE_AFTER
         self._rest = since, then = self._rest or (reading.taken, place)
         return (
-            reading.taken - since > after
+            # A controller may be late by as much as is stated.
+            reading.taken - since > after + parameters.controller_delay
             and float(np.abs(place - then).max()) > IGNORED_WAY
             and float(np.abs(place - reading.positions).max()) > ASIDE
         )

@@ -723,7 +723,7 @@ class ExecutionMonitor:
         if self._state is not MonitorState.MONITORING or running is None:
             return
         rest_speed = self._parameters.rest_speed
-        if not self._commitments.is_ignored(reading, running, rest_speed):
+        if not self._commitments.is_ignored(reading, running, self._parameters):
             self._check_followed_motion(reading)
         elif not self._commitments.is_active:
             # It was given all of it, and may be late: it is monitored as long as that takes.

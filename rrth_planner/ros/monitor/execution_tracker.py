@@ -164,9 +164,10 @@ class ExecutionTracker:
 
     def shift(self, step: float) -> None:
         """Take all times by a clock that was set forward by a step [s]."""
+        is_running = self.command is self.motion
         motions = self.motion, self._stopped, self._previous
         self.motion, self._stopped, self._previous = (m and m.shifted(step) for m in motions)
-        self.command = self.motion or (self.command and self.command.shifted(step))
+        self.command = self.motion if is_running else self.command and self.command.shifted(step)
         self._last_on_motion += step
 
     def is_over(self, now: float, rest_speed: float = REST_SPEED) -> bool:
@@ -179,7 +180,7 @@ class ExecutionTracker:
         if motion is None or reading is None:
             return False
         since = now - motion.start_time - motion.trajectory.duration
-        return since > GRACE and not reading.is_moving(now, rest_speed)
+        return since > GRACE + self._delay and not reading.is_moving(now, rest_speed)
 
     def phase(self, now: float) -> float | None:
         """Return the time within the motion [s]; None where the arm is not on it."""
