@@ -56,6 +56,8 @@ class Separated(Monitored):
     def begin(self):
         """Let the motion begin now, from its first point."""
         self.now += 1.0
+        # The arm is put to the first point: what it was commanded is over.
+        self.monitor._tracker.forget_command()
         self.motion = SWING
         self.published.clear()
         self.read(*self.on_time(0.0))
@@ -446,6 +448,28 @@ def test_an_arm_that_is_late_by_what_is_stated_is_not_taken_to_ignore_its_motion
         arm.monitor._on_timer()
         assert arm.monitor._state is MonitorState.MONITORING
     assert not arm.monitor.stop_reason
+
+
+def test_a_motion_from_rest_begins_with_the_last_instants_of_what_is_commanded(separated):
+    arm = separated()
+    before, begun = arm.published[-1]
+    # The arm is at rest by its speed, and has not quite ended.
+    arm.now = begun + before.duration - 0.01
+    arm.read(*arm.commanded(arm.now)[:2])
+    arm.see(FAR)
+    end, still = before.positions[-1], np.zeros((2, 4))
+    onward = Trajectory([0.0, 1.0], [end, end - [0.3, 0.0, 0.0, 0.0]], still, still)
+    arm.command(ExecutingMotion(trajectory=onward, start_time=arm.now + AHEAD))
+    after, begin = arm.published[-1]
+    times = np.linspace(begin, arm.now + AHEAD, 40)
+    gaps = sample(after, times - begin)[0] - sample(before, times - begun)[0]
+    assert np.abs(sample(before, times - begun)[0] - end).max() > 1e-7
+    assert np.abs(gaps).max() < 1e-9
+    # Nor may one begin elsewhere.
+    arm.now += AHEAD
+    aside = Trajectory([0.0, 1.0], [end + 0.005, end - 0.3], still, still)
+    with pytest.raises(RequestError, match='not commanded to rest where its motion begins'):
+        arm.command(ExecutingMotion(trajectory=aside, start_time=arm.now + AHEAD))
 
 
 def test_a_command_that_is_not_known_stays_so_when_the_clock_is_set(separated):

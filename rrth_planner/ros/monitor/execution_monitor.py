@@ -25,7 +25,13 @@ from rclpy.node import Node
 from rrth_planner.collision.certificate import least_clearance
 from rrth_planner.collision.world import arm_world
 from rrth_planner.execution.clock_watch import ClockStep, ClockWatch, watch_clock
-from rrth_planner.execution.command import begin_of, lead_in, rest_at, stop_along
+from rrth_planner.execution.command import (
+    begin_of,
+    continues,
+    lead_in,
+    rest_at,
+    stop_along,
+)
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
 from rrth_planner.execution.remaining_motion import (
@@ -255,7 +261,7 @@ class ExecutionMonitor:
         command, left = self._tracker.command, planned.start_time - begin_of(now, delay)
         if joins is None or planned.start_time <= now:
             return rest_at(planned.trajectory, 0.0)
-        if math.isinf(joins):
+        if command is None and math.isinf(joins):
             return rest_at(planned.trajectory, left)
         if command is None:
             raise RequestError(
@@ -263,7 +269,15 @@ class ExecutionMonitor:
                 'what the arm is commanded is not known any more, expected the motion that it '
                 'was planned from',
             )
-        return lead_in(command.trajectory, joins - left, joins)
+        # The last instants before a rest may still be commanded.
+        at = planned.start_time - command.start_time if math.isinf(joins) else joins
+        lead = lead_in(command.trajectory, at - left, at)
+        if math.isinf(joins) and not continues(lead, planned.trajectory):
+            raise RequestError(
+                ErrorCode.MOTION_PLAN_INVALIDATED_BY_ENVIRONMENT_CHANGE,
+                'the arm is not commanded to rest where its motion begins',
+            )
+        return lead
 
     def close(self) -> None:
         """Stop the arm, which is no longer monitored, and end monitoring."""
