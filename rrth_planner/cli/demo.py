@@ -26,6 +26,7 @@ from rrth_planner.collision.separation_inspection import (
     SeparationInspection,
     Sights,
 )
+from rrth_planner.execution.command import begin_of
 from rrth_planner.io.arm_file import load_arm
 from rrth_planner.io.extras import require
 from rrth_planner.io.resources import resource_path
@@ -318,9 +319,11 @@ def _inspected(client: DemoClient, separation: Separation, frame: str) -> Separa
         # Whenever it was measured: it is the newest of its time.
         tuple(scene_of(WearerBody().apply(body, math.inf, frame)) for body in bodies),
     )
+    begins = [seconds_of(msg.header.stamp) for msg in client.commitments]
+    before = -begin_of(0.0, separation.rules.controller_delay)
     commitments = [
-        (seconds_of(msg.header.stamp), joint_trajectory_from_msg(msg, names))
-        for msg in client.commitments
+        (begin + before, begin, joint_trajectory_from_msg(msg, names))
+        for begin, msg in zip(begins, client.commitments, strict=True)
     ]
     return inspect_separation(
         client.arm,

@@ -17,7 +17,7 @@ from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Box, Scene
 from rrth_planner.model.separation import seen_body, SeparationRules, speed_bound
-from rrth_planner.model.trajectory import Trajectory
+from rrth_planner.model.trajectory import part_of, Trajectory
 
 # A commitment is judged at its points and so often [s].
 PERIOD = 0.01
@@ -78,7 +78,7 @@ def inspect_separation(
     rules: SeparationRules,
     margin: float,
     sights: Sights,
-    commitments: Sequence[tuple[float, Trajectory]],
+    commitments: Sequence[tuple[float, float, Trajectory]],
     times: Array,
     q: Array,
     v: Array,
@@ -90,8 +90,8 @@ def inspect_separation(
     ----------
     margin : float
         [m].
-    commitments : sequence of (float, Trajectory)
-        What the controller was given, and when that begins [s].
+    commitments : sequence of (float, float, Trajectory)
+        What the controller was given: when it was published, when it begins [s].
     times, q, v : ndarray, shape (n,), (n, dof) twice
         When the arm was where, and how fast [s, rad, rad/s].
 
@@ -99,28 +99,28 @@ def inspect_separation(
     ------
     UnsafeMotionError
         A commitment that does not end at rest, or violates the separation from the wearer as he
-        was published until it began; or a part of the arm faster than the contact speed in a box.
+        was published until then; or a part of the arm faster than the contact speed in a box.
         Not where the part of the wearer had been faster than assumed.
 
     """
     n_unknown = n_excused = 0
-    for begin, trajectory in commitments:
+    for published, begin, trajectory in commitments:
         speed = float(np.abs(trajectory.velocities[-1]).max())
         if not speed <= REST:
             raise UnsafeMotionError(f'a commitment ends at {speed:.2e}, expected rest [rad/s]')
-        found = _violations(arm, rules, margin, sights, begin, trajectory)
+        found = _violations(arm, rules, margin, sights, published, begin, trajectory)
         if not found:
             continue
         boxes = {one.box for one in found}
-        if all(_was_faster(sights, name, begin, rules) for name in boxes):
+        if all(_was_faster(sights, name, published, rules) for name in boxes):
             n_excused += 1
-        elif _has_gap(sights, begin):
+        elif _has_gap(sights, published):
             n_unknown += 1
         else:
             worst = max(found, key=lambda one: one.depth)
             raise UnsafeMotionError(
                 f'a commitment has bar {worst.bar} of the arm {1e3 * worst.depth:.1f} mm too near '
-                f'to {worst.box} {worst.time:.3f} s after it begins'
+                f'to {worst.box} {worst.time:.3f} s after it is published'
             )
     n_contacts = 0
     newest = np.searchsorted(sights.times, times, side='right') - 1
@@ -156,18 +156,21 @@ def _violations(
     rules: SeparationRules,
     margin: float,
     sights: Sights,
+    published: float,
     begin: float,
     trajectory: Trajectory,
 ) -> list[SeparationViolation]:
     """
     Return the violations of a commitment by the newest body; none if there are none by another.
 
-    The newest ones may have been on their way to the planner still.
+    The newest ones may have been on their way to the planner still. What it repeats from before
+    its publication belongs to the commitment before it.
     """
     found: list[list[SeparationViolation]] = []
-    for k in reversed(_known(sights, begin)):
-        body = seen_body(sights.scenes[k], begin - float(sights.times[k]), rules)
-        found.append(separation_violations(arm, body, trajectory, rules, margin, period=PERIOD))
+    own = part_of(trajectory, min(published - begin, trajectory.duration), trajectory.duration)
+    for k in reversed(_known(sights, published)):
+        body = seen_body(sights.scenes[k], published - float(sights.times[k]), rules)
+        found.append(separation_violations(arm, body, own, rules, margin, period=PERIOD))
         if not found[-1]:
             return []
     return found[0]
@@ -177,7 +180,7 @@ def _known(sights: Sights, time: float) -> range:
     """Return which bodies a planner may have known as its newest one at a time [s]."""
     end = sights.between(-np.inf, time).stop
     if end == 0:
-        raise UnsafeMotionError('a commitment begins before there is a body, expected one')
+        raise UnsafeMotionError('a commitment is published before there is a body, expected one')
     return range(min(sights.between(time - OLDEST, time).start, end - 1), end)
 
 

@@ -38,7 +38,7 @@ def sights_of(place):
     return Sights(TIMES, tuple(Scene((box,)) for box in boxes))
 
 
-def inspected(sights, motions=((BEGIN, MOTION),), q=Q, v=V):
+def inspected(sights, motions=((BEGIN, BEGIN, MOTION),), q=Q, v=V):
     """Return the inspection of an arm that executed the motion."""
     return inspect_separation(ARM, RULES, MARGIN, sights, motions, BEGIN + STATES, q, v)
 
@@ -59,19 +59,19 @@ def test_a_commitment_that_does_not_end_at_rest_is_found():
     end = np.array(MOTION.velocities)
     end[-1, 0] = 0.01
     with pytest.raises(UnsafeMotionError, match='a commitment ends at 1.00e-02'):
-        inspected(sights_of(FAR), [(BEGIN, replace(MOTION, velocities=end))])
+        inspected(sights_of(FAR), [(BEGIN, BEGIN, replace(MOTION, velocities=end))])
 
 
 def test_a_commitment_without_any_body_before_it_is_found():
     with pytest.raises(UnsafeMotionError, match='before there is a body'):
-        inspected(sights_of(FAR), [(-1.0, MOTION)])
+        inspected(sights_of(FAR), [(-1.0, -1.0, MOTION)])
 
 
 def test_where_no_body_comes_any_more_the_last_one_counts():
     late = TIMES[-1] + 1.0
-    assert inspected(sights_of(FAR), [(late, MOTION)]).n_excused == 0
+    assert inspected(sights_of(FAR), [(late, late, MOTION)]).n_excused == 0
     # It may be anywhere by then, but so may have been one that was not received.
-    assert inspected(sights_of(FAR / 3.0), [(late, MOTION)]).n_unknown == 1
+    assert inspected(sights_of(FAR / 3.0), [(late, late, MOTION)]).n_unknown == 1
 
 
 def test_a_fast_part_of_the_arm_in_a_box_is_found_and_a_slow_one_is_not():
@@ -97,6 +97,16 @@ def test_a_commitment_may_be_of_a_body_before_the_newest_one():
     # That may have been on its way to the planner still.
     found = inspected(sights_of(np.where((TIMES > BEGIN - 0.02)[:, None], NEAR, FAR)))
     assert (found.n_excused, found.n_unknown, found.n_faster) == (0, 0, 1)
+
+
+def test_a_commitment_that_begins_before_its_publication_may_be_of_a_body_between():
+    sights = sights_of(np.where((TIMES < BEGIN + 0.01)[:, None], NEAR, FAR))
+    still = np.tile(Q[0], (len(Q), 1))
+    published = TIMES[TIMES >= BEGIN + 0.01][0]
+    late = inspected(sights, [(published, BEGIN, MOTION)], q=still, v=0.0 * V)
+    assert (late.n_commitments, late.n_unknown) == (1, 0)
+    with pytest.raises(UnsafeMotionError, match='mm too near to hand'):
+        inspected(sights, [(BEGIN, BEGIN, MOTION)], q=still, v=0.0 * V)
 
 
 def test_nothing_is_known_where_a_body_may_be_missing():
