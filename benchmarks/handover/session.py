@@ -23,6 +23,7 @@ import numpy as np
 from rclpy.node import Node
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.scene import Box, Scene
@@ -42,7 +43,6 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import WearerBody
 from rrth_planner.ros.messages.controller_points import controller_points_from_msg
 from rrth_planner.ros.messages.fields import NANOSECONDS
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.messages.marker_edits import BodyPart
 from rrth_planner.ros.messages.trajectory import joint_trajectory_to_msg
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor

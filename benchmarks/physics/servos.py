@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.wearer_file import load_body
 from rrth_planner.model.arm import forward_kinematics
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.scene import Scene
 from rrth_planner.model.trajectory import Trajectory
 from rrth_planner.ros.interface.inputs import Input
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 from rrth_planner.simulation.body_shapes import whole_box
 from rrth_planner.simulation.moving_body import standing_body

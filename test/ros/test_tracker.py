@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip('rclpy')
 
 from rrth_planner.execution.executing_motion import ExecutingMotion  # noqa: E402
+from rrth_planner.execution.joint_reading import JointReading  # noqa: E402
 from rrth_planner.model.trajectory import sample  # noqa: E402
-from rrth_planner.ros.messages.joint_state import JointReading  # noqa: E402
 from rrth_planner.ros.monitor.execution_tracker import ASIDE, has_missed_stop, LONGEST_LAG  # noqa: E402
 from rrth_planner.timing.fast_stop import fast_stop  # noqa: E402
 from sample_motions import planned_motion  # noqa: E402

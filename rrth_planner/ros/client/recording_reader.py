@@ -11,6 +11,7 @@ from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader
 from mcap_ros2.decoder import DecoderFactory
 import numpy as np
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.recording import CommandedMotion, Recording
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
@@ -20,7 +21,7 @@ from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_publishers import BodyPublishers, UNNUMBERED
 from rrth_planner.ros.messages.fields import NANOSECONDS, seconds_of
 from rrth_planner.ros.messages.goal import goal_from_msg
-from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading, JointReading
+from rrth_planner.ros.messages.joint_state import has_joint_of, joint_reading
 from rrth_planner.ros.messages.marker_edits import read_edits
 from rrth_planner.ros.messages.marker_order import MarkerOrder
 from rrth_planner.ros.messages.trajectory import joint_trajectory_from_msg

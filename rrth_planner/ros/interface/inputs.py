@@ -16,6 +16,7 @@ from rrth_planner.execution.executing_motion import (
     sharp_phase_of,
 )
 from rrth_planner.execution.expected_wearer import expected_scene
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.arm import ArmModel
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.errors import MessageError, RrthError
@@ -26,7 +27,6 @@ from rrth_planner.ros.interface.parameters import AUTO, PlannerParameters
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.body_source import BodySource
 from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
-from rrth_planner.ros.messages.joint_state import JointReading
 
 T = TypeVar('T')
 # A message measured further ahead of now than this came before the clock was set back: its age is

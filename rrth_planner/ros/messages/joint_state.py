@@ -3,14 +3,11 @@
 """Positions and velocities of an arm from joint states that may have other joints, too."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-import functools
 
 import numpy as np
-from rrth_planner.execution.standstill import mean_motion, TICK, WINDOW
+from rrth_planner.execution.joint_reading import JointReading, with_earlier
 from rrth_planner.model.arrays import Array, FARTHEST, frozen_array
 from rrth_planner.model.errors import MessageError
-from rrth_planner.model.trajectory import REST_SPEED
 from rrth_planner.ros.messages.fields import seconds_of
 from sensor_msgs.msg import JointState
 
@@ -63,85 +60,6 @@ def stamped_at(msg: JointState, received: float) -> float:
     return stamp if 0.0 < stamp <= received else received
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointReading:
-    """
-    The state of the arm in one message.
-
-    Parameters
-    ----------
-    positions, velocities : ndarray, shape (dof,)
-        [rad, rad/s]; velocities as given, NaN included, or differences of the positions.
-    taken, received : float
-        Time of the measurement: the stamp if it is a little older than the reception, else the
-        reception; and that [s].
-    velocities_expire : float
-        Until when the velocities count; inf: as long as the positions [s].
-    recent : (ndarray, ndarray) or None
-        `taken` of the readings of the last 0.3 s, this one last, (n,) [s], and their positions,
-        (n, dof) [rad]; None: nothing is known of others.
-
-    """
-
-    positions: Array
-    velocities: Array
-    taken: float
-    received: float
-    velocities_expire: float
-    recent: tuple[Array, Array] | None = None
-
-    def is_moving(self, now: float, rest_speed: float = REST_SPEED) -> bool:
-        """Return whether the arm moves at a time [s], faster than a speed [rad/s]."""
-        is_slow = (np.abs(self.mean_velocities(rest_speed)) <= rest_speed).all()
-        return now <= self.velocities_expire and not bool(is_slow)
-
-    def mean_velocities(self, rest_speed: float = REST_SPEED) -> Array:
-        """
-        Return how fast the arm has moved lately, (dof,) [rad/s], to compare with a speed.
-
-        By the positions, since drivers differentiate noisy ones; where these have not changed, or
-        there are no others, as it was given.
-        """
-        motion = _mean_motion(self, rest_speed)
-        return self.velocities if motion is None else motion[1]
-
-    def mean_positions(self, rest_speed: float = REST_SPEED) -> Array:
-        """Return where the arm is, (dof,) [rad], if it rests: the mean over the same time."""
-        motion = _mean_motion(self, rest_speed)
-        return self.positions if motion is None else motion[0]
-
-    def shifted(self, step: float) -> 'JointReading':
-        """Return the reading by a clock that was set forward by a step [s]."""
-        recent = None if self.recent is None else (self.recent[0] + step, self.recent[1])
-        return replace(
-            self,
-            taken=self.taken + step,
-            received=self.received + step,
-            velocities_expire=self.velocities_expire + step,
-            recent=recent,
-        )
-
-
-@functools.lru_cache(maxsize=8)
-def _mean_motion(reading: JointReading, rest_speed: float) -> tuple[Array, Array] | None:
-    """Return mean positions and velocities; None where only the reading itself counts."""
-    if reading.recent is None or not (reading.recent[1] != reading.positions).any():
-        return None
-    with np.errstate(over='ignore', invalid='ignore'):
-        return mean_motion(*reading.recent, rest_speed)
-
-
-def _with_earlier(q: Array, taken: float, before: JointReading | None) -> tuple[Array, Array]:
-    """Return the times and positions of a reading and of those up to `WINDOW` before."""
-    times, positions = np.array([taken]), q[None]
-    if before is None or before.recent is None:
-        return times, positions
-    # After a step back of the clock, or of a stamp, there are none before.
-    then, earlier = before.recent
-    is_lately = (then >= taken - WINDOW - TICK) & (then < taken)
-    return np.append(then[is_lately], times), np.concatenate([earlier[is_lately], positions])
-
-
 def joint_reading(
     msg: JointState, joint_names: Sequence[str], received: float, before: JointReading | None
 ) -> JointReading:
@@ -160,7 +78,7 @@ def joint_reading(
     q = configuration_from_msg(msg, joint_names)
     names, measured = list(msg.name), stamped_at(msg, received)
     taken = measured if received - measured <= LONGEST_WAY else received
-    recent = _with_earlier(q, taken, before)
+    recent = with_earlier(q, taken, before)
     if len(msg.velocity):
         if len(msg.velocity) != len(names):
             raise MessageError(

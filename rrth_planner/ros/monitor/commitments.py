@@ -27,6 +27,7 @@ from rrth_planner.execution.commitment import (
     path_state,
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.arrays import Array
 from rrth_planner.model.separation import Separation
 from rrth_planner.model.trajectory import part_of, positions_at, Trajectory
@@ -37,7 +38,6 @@ from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.separation_status import SeparationState, SeparationStatus
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.messages.joint_state import JointReading
 
 # At a lower rate the arm is slowed down for the wearer.
 FULL_RATE = 0.995

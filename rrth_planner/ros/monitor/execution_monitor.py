@@ -34,6 +34,7 @@ from rrth_planner.execution.command import (
 )
 from rrth_planner.execution.executing_motion import ExecutingMotion, MAX_DEVIATION
 from rrth_planner.execution.expected_wearer import is_expected_free
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import (
     escapes_by_continuing,
     is_place_free,
@@ -50,7 +51,6 @@ from rrth_planner.ros.interface.publishers import PlanPublishers
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.messages.body import scene_of, WearerBody
 from rrth_planner.ros.messages.error_codes import ErrorCode
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.monitor.commitments import Commitments
 from rrth_planner.ros.monitor.execution_tracker import ExecutionTracker
 

@@ -6,9 +6,9 @@ import functools
 
 import numpy as np
 from rrth_planner.execution.executing_motion import ExecutingMotion, LONGEST_LAG, phase_of
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.model.trajectory import REST_SPEED, sample, Trajectory
 from rrth_planner.ros.interface.inputs import Input
-from rrth_planner.ros.messages.joint_state import JointReading
 
 # An arm at rest so long after the end of its motion has arrived; one that is off its motion for so
 # long is lost [s].

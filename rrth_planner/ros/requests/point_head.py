@@ -12,6 +12,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.io.settings import LOWEST_LIMIT
 from rrth_planner.model.arm import pointing_angle
 from rrth_planner.model.errors import MessageError
@@ -20,7 +21,6 @@ from rrth_planner.ros.interface.inputs import Inputs
 from rrth_planner.ros.interface.reporter import Reporter
 from rrth_planner.ros.interface.scene_monitor import SceneMonitor
 from rrth_planner.ros.messages.error_codes import code_of_rejection, ErrorCode
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.messages.paced_goal import paced_goal
 from rrth_planner.ros.messages.point_head import PointHead
 from rrth_planner.ros.middleware.answers import Answers

@@ -17,6 +17,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rrth_planner.execution.command import ahead
 from rrth_planner.execution.executing_motion import ExecutingMotion
+from rrth_planner.execution.joint_reading import JointReading
 from rrth_planner.execution.remaining_motion import is_place_free
 from rrth_planner.model.goal import PointingGoal
 from rrth_planner.model.trajectory import Trajectory
@@ -28,7 +29,6 @@ from rrth_planner.ros.interface.reporter import PlanReport, Reporter
 from rrth_planner.ros.interface.separation_status import NO_PROMISE
 from rrth_planner.ros.messages.body import scene_of
 from rrth_planner.ros.messages.error_codes import answer, ErrorCode, FINAL
-from rrth_planner.ros.messages.joint_state import JointReading
 from rrth_planner.ros.middleware.executor_barrier import ExecutorBarrier, NodeIsBusyError
 from rrth_planner.ros.monitor.execution_monitor import ExecutionMonitor, Stop
 from rrth_planner.ros.requests.incidents import incident_of, incident_of_stop, keep, sentence_of
